@@ -1,0 +1,124 @@
+"""Whether the obstacle can hold the load at all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.problem import ContactProblem
+
+_RELATIVE_WORK = 1e-6
+"""Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
+linear programming (tolerance 1e-7) cannot decide and the drivers can."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnsolvableLoad:
+    """A rigid motion along which the load does work that contact cannot take up.
+
+    Parameters
+    ----------
+    motion : (n_contact, 2) array
+        Normal and tangential components of the escape at the contact nodes, scaled to a largest entry of one.
+    work : float [N]
+        Work of the load on it, less what friction takes up; positive.
+    """
+
+    motion: FloatArray
+    work: float
+
+    @property
+    def description(self) -> str:
+        """One sentence that names the escape."""
+        lifts, slides = self.motion[:, 0] < -1e-6, np.abs(self.motion[:, 1]) > 1e-6
+        if lifts.any():
+            how = "pushes" if np.ptp(self.motion[:, 0]) < 1e-6 else "tips"
+            how += " the body away from the obstacle"
+        elif slides.any():
+            how = "slides the body along the obstacle against all the friction there is"
+        else:
+            how = "moves the body where no obstacle can meet it"
+        return f"the load {how} (work {self.work:.3g} on that rigid motion); change the load or hold the body"
+
+
+def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
+    """Return a rigid motion on which the load cannot be balanced, or None if contact tractions may balance it.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+
+    Returns
+    -------
+    UnsolvableLoad or None
+
+    Notes
+    -----
+    A motion v escapes if it nowhere presses into the obstacle harder than friction can wedge, ``v_n + s |v_t| <= 0``,
+    and the load does more work on it than friction present without pressure takes up, ``L(v) > sum w c |v_t|``. By
+    linear duality no escape exists exactly if tractions with ``sigma_n <= 0`` and ``|sigma_t| <= c + s |sigma_n|``
+    balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
+    test never condemns a load that can be held; what it misses the driver's status still reports.
+    """
+    motions = problem.body.rigid_motions()
+    if not len(motions):
+        return None
+    unit = np.abs(motions).reshape(len(motions), -1).max(axis=1)
+    motions, load = motions / unit[:, None, None], problem.body.rigid_load() / unit
+    forces = problem.body.weights[:, None] * problem.glued_state.traction
+    force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
+    if force_scale == 0.0:
+        return None
+    touches = np.isfinite(problem.gap)
+    best = None
+    for cohesion, slope in _friction_envelopes(problem):
+        resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
+        coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
+        motion = np.tensordot(coefficients, motions, axes=1)
+        work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
+        if work > _RELATIVE_WORK * force_scale and (best is None or work > best.work):
+            best = UnsolvableLoad(motion / np.abs(motion).max(), work)
+    return best
+
+
+def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
+    """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
+    none = np.zeros(problem.n_contact)
+    pressure = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    cohesion = problem.friction_bound(none)
+    slopes = [-problem.friction_slope(none)]
+    for factor in 10.0 ** np.arange(-6, 7):
+        slopes.append((problem.friction_bound(none - factor * pressure) - cohesion) / (factor * pressure))
+    cap = problem.friction_bound(none - 1e12 * pressure)
+    return [(cohesion, np.maximum(np.max(slopes, axis=0), 0.0)), (cap, none)]
+
+
+def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return (n_motions,) coefficients in [-1, 1] of the escape on which the load does most work, zeros if none.
+
+    `slope` is nan at nodes that never touch.
+    """
+    touches = np.isfinite(slope)
+    normal, tangential = motions[:, touches, 0].T, motions[:, touches, 1].T  # (n_touching, n_motions)
+    slope, resistance = slope[touches], resistance[touches]
+    if len(motions) == 1:
+        for sign in np.sign(load):
+            if np.all(sign * normal[:, 0] + slope * np.abs(tangential[:, 0]) <= 1e-9):
+                return np.array([sign])
+        return np.zeros(1)
+
+    from scipy.optimize import linprog
+
+    n_touching, n_motions = normal.shape
+    # Unknowns: coefficients c and e >= |v_t|. Maximise load c - resistance e.
+    unit = np.eye(n_touching)
+    conditions = np.block([[normal, np.diag(slope)], [tangential, -unit], [-tangential, -unit]])
+    result = linprog(
+        np.concatenate([-load, resistance]),
+        A_ub=conditions,
+        b_ub=np.zeros(3 * n_touching),
+        bounds=[(-1.0, 1.0)] * n_motions + [(0.0, None)] * n_touching,
+    )
+    if result.x is None:  # zero is always admissible, so this is the solver's failure: do not condemn the load
+        return np.zeros(n_motions)
+    return np.asarray(result.x[:n_motions], dtype=float)

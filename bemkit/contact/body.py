@@ -1,0 +1,161 @@
+"""The elastic body as contact sees it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.conditions import LinearConditions
+
+
+class SingularResponse(ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller
+    """The conditions at the contact nodes leave the body free to move, or contradict each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState:
+    """Displacements and tractions at the contact nodes, in (n, t) components.
+
+    Parameters
+    ----------
+    displacement : (n_contact, 2) array [m]
+    traction : (n_contact, 2) array [Pa]
+        What the obstacle does to the body; pressed nodes have a negative normal component.
+
+    Raises
+    ------
+    ValueError
+        If the shapes are not ``(n_contact, 2)``.
+    """
+
+    displacement: FloatArray
+    traction: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "traction"):
+            array = getattr(self, name)
+            if array.ndim != 2 or array.shape != (len(self.displacement), 2):
+                raise ValueError(f"{name} has the shape {array.shape}; give ({len(self.displacement)}, 2)")
+
+    @property
+    def u_n(self) -> FloatArray:
+        """(n_contact,) array [m], normal displacement."""
+        return self.displacement[:, 0]
+
+    @property
+    def u_t(self) -> FloatArray:
+        """(n_contact,) array [m], tangential displacement."""
+        return self.displacement[:, 1]
+
+    @property
+    def sigma_n(self) -> FloatArray:
+        """(n_contact,) array [Pa], normal traction."""
+        return self.traction[:, 0]
+
+    @property
+    def sigma_t(self) -> FloatArray:
+        """(n_contact,) array [Pa], tangential traction."""
+        return self.traction[:, 1]
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all entries are finite numbers."""
+        return bool(np.isfinite(self.displacement).all() and np.isfinite(self.traction).all())
+
+    def blended(self, other: "ContactState", fraction: float) -> "ContactState":
+        """Return the state the given fraction of the way to `other`.
+
+        Two responses of one body blend into a response again, because the body is linear.
+
+        Parameters
+        ----------
+        other : ContactState
+        fraction : float
+            Zero gives this state, one gives `other`.
+
+        Returns
+        -------
+        ContactState
+        """
+        if fraction == 1.0:
+            return other
+        return ContactState(
+            self.displacement + fraction * (other.displacement - self.displacement),
+            self.traction + fraction * (other.traction - self.traction),
+        )
+
+
+class LinearBody(Protocol):
+    """One or several elastic bodies under their loads, reduced to the contact nodes.
+
+    Everything nonlinear in bemkit sees bodies through this protocol alone. A body never learns of friction; drivers
+    never learn how the body finds its response.
+    """
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        ...
+
+    @property
+    def weights(self) -> FloatArray:
+        """(n_contact,) array [m], positive: nodal force = weight times traction."""
+        ...
+
+    @property
+    def stiffness_scale(self) -> float:
+        """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho."""
+        ...
+
+    def respond(self, conditions: LinearConditions) -> ContactState:
+        """Return displacement and traction of the loaded body under two conditions per contact node.
+
+        Parameters
+        ----------
+        conditions : LinearConditions
+
+        Returns
+        -------
+        ContactState
+
+        Raises
+        ------
+        SingularResponse
+            If the conditions do not determine the response.
+        """
+        ...
+
+    def rigid_motions(self) -> FloatArray:
+        """Return the motions of the body that only contact can hold.
+
+        Returns
+        -------
+        (n_motions, n_contact, 2) array
+            Normal and tangential components at the contact nodes; linearly independent.
+        """
+        ...
+
+    def rigid_load(self) -> FloatArray:
+        """Return the work of the given load on each of these motions.
+
+        Returns
+        -------
+        (n_motions,) array [N]
+            Per unit of thickness and of motion.
+        """
+        ...
+
+    def imbalance(self, state: ContactState) -> tuple[float, float]:
+        """Return how far load and contact tractions are from equilibrium.
+
+        Parameters
+        ----------
+        state : ContactState
+
+        Returns
+        -------
+        force, moment : float
+            Relative to the largest force (times the size of the body) at hand.
+        """
+        ...

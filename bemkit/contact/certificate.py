@@ -1,0 +1,106 @@
+"""The certificate: how well a state satisfies contact and friction, in numbers anyone can check."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.problem import ContactProblem, ContactState
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Largest violation of each condition over all contact nodes; all numbers are dimensionless and zero is perfect.
+
+    Parameters
+    ----------
+    penetration : float
+        ``u_n - g`` where positive.
+    tension : float
+        ``sigma_n`` where positive.
+    complementarity : float
+        The smaller of traction and distance where both exist: a node that is open and carries traction.
+    cone_excess : float
+        ``|sigma_t| - bound(sigma_n)`` where positive, the bound taken at the *present* normal traction.
+    slip_opposition : float
+        The smaller of ``|slip|`` and ``|sigma_t + bound(sigma_n) sign(slip)|``: slip without full, opposing friction.
+    force_imbalance, moment_imbalance : float
+        What the body says about equilibrium, see `LinearBody.imbalance`.
+    """
+
+    penetration: float
+    tension: float
+    complementarity: float
+    cone_excess: float
+    slip_opposition: float
+    force_imbalance: float
+    moment_imbalance: float
+
+    @property
+    def worst(self) -> float:
+        """The largest entry; ``nan`` if any entry is."""
+        return float(np.max(list(self.as_dict().values())))
+
+    def is_below(self, tolerance: float) -> bool:
+        """Whether every entry is at most `tolerance` (never true for ``nan``)."""
+        return self.worst <= tolerance
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the entries by name."""
+        return asdict(self)
+
+
+def certify(problem: ContactProblem, state: ContactState) -> Certificate:
+    """Measure a state against conditions (6) to (8), whoever produced it.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    state : ContactState
+
+    Returns
+    -------
+    Certificate
+
+    Notes
+    -----
+    Tractions are measured by the largest traction in the state or in the glued state (all nodes held), whichever is
+    larger, so that a nearly lifted body is judged by its load. Lengths are measured by the displacement which that
+    traction causes at one node, ``traction / stiffness_scale``: a far obstacle or a long rigid motion does not
+    loosen the test until it exceeds 1e6 times that displacement, where round-off would speak instead.
+    """
+    stress, length = certificate_scales(problem, state)
+    clearance = problem.gap - state.u_n
+    slip = state.u_t - problem.slip_origin
+    held = np.abs(state.sigma_n)
+    if not problem.law.acts_across_gap:
+        held = np.maximum(held, np.abs(state.sigma_t))
+    traction, distance = held / stress, np.abs(clearance) / length
+    bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)
+    against_slip = np.where(slip > 0.0, state.sigma_t + bound, state.sigma_t - bound)
+    force_imbalance, moment_imbalance = problem.body.imbalance(state)
+    return Certificate(
+        penetration=_largest(-clearance / length),
+        tension=_largest(state.sigma_n / stress),
+        complementarity=_largest(np.minimum(traction, distance)),
+        cone_excess=_largest((np.abs(state.sigma_t) - bound) / stress),
+        slip_opposition=_largest(np.minimum(np.abs(slip) / length, np.abs(against_slip) / stress)),
+        force_imbalance=force_imbalance,
+        moment_imbalance=moment_imbalance,
+    )
+
+
+def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[float, float]:
+    """Return the traction [Pa] and the length [m] by which `certify` measures; see its notes."""
+    stress = float(max(np.abs(state.traction).max(), np.abs(problem.glued_state.traction).max()))
+    furthest = float(np.abs(state.displacement).max())
+    length = max(stress / problem.body.stiffness_scale, 1e-6 * furthest)
+    if stress == 0.0:
+        # Neither load nor reaction: any length will do, and there is nothing to measure tractions by.
+        is_finite = np.isfinite(problem.gap)
+        length = max([furthest, *np.abs(problem.gap[is_finite])])
+    return stress or 1.0, length or 1.0
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.maximum(values, 0.0).max())

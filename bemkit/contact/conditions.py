@@ -1,0 +1,186 @@
+"""Linear conditions at the contact nodes: what drivers ask of a body.
+
+Components are (n, t) throughout: index 0 along the outward normal, index 1 along the tangent. The first of the two
+conditions at a node is its normal, the second its tangential one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LinearConditions:
+    """Two linear conditions ``A_u u + A_t t = c`` at every contact node.
+
+    Parameters
+    ----------
+    on_displacement : (n_contact, 2, 2) array
+        A_u, axes (node, condition, component).
+    on_traction : (n_contact, 2, 2) array
+        A_t, axes (node, condition, component).
+    value : (n_contact, 2) array
+        c.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit each other.
+    """
+
+    on_displacement: FloatArray
+    on_traction: FloatArray
+    value: FloatArray
+
+    def __post_init__(self) -> None:
+        n_contact = len(self.value)
+        if self.value.shape != (n_contact, 2):
+            raise ValueError(f"value has the shape {self.value.shape}; give (n_contact, 2)")
+        for name in ("on_displacement", "on_traction"):
+            shape = getattr(self, name).shape
+            if shape != (n_contact, 2, 2):
+                raise ValueError(f"{name} has the shape {shape}; value has {n_contact} nodes, give {(n_contact, 2, 2)}")
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return len(self.value)
+
+    def replaced(self, rows: BoolArray, other: "LinearConditions") -> "LinearConditions":
+        """Return these conditions with the marked ones taken from `other`.
+
+        Parameters
+        ----------
+        rows : (n_contact, 2) bool array
+            Which conditions (normal, tangential) of which nodes to replace.
+        other : LinearConditions
+
+        Returns
+        -------
+        LinearConditions
+        """
+        return LinearConditions(
+            np.where(rows[:, :, None], other.on_displacement, self.on_displacement),
+            np.where(rows[:, :, None], other.on_traction, self.on_traction),
+            np.where(rows, other.value, self.value),
+        )
+
+    def held_by_springs(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
+        """Return the conditions with weak springs added wherever only tractions are prescribed.
+
+        A body that these conditions leave free to move is then held near `displacement`. The springs carry nothing
+        once the displacement stays where it is, so a sequence of such steps ends without them (proximal steps).
+
+        Parameters
+        ----------
+        displacement : (n_contact, 2) array [m]
+            Where the springs are without force.
+        stiffness : float [Pa/m]
+
+        Returns
+        -------
+        LinearConditions
+        """
+        spring = np.where(np.any(self.on_displacement != 0.0, axis=2), 0.0, stiffness)
+        return LinearConditions(
+            self.on_displacement + spring[:, :, None] * np.eye(2),
+            self.on_traction,
+            self.value + spring * displacement,
+        )
+
+
+def separated(n_contact: int) -> LinearConditions:
+    """Return the conditions of open nodes: ``t = 0``.
+
+    Parameters
+    ----------
+    n_contact : int
+
+    Returns
+    -------
+    LinearConditions
+    """
+    return LinearConditions(np.zeros((n_contact, 2, 2)), _unit_blocks(n_contact), np.zeros((n_contact, 2)))
+
+
+def stick(gap: FloatArray, reference_slip: FloatArray) -> LinearConditions:
+    """Return the conditions of closed nodes that do not slip: ``u_n = g``, ``u_t = reference_slip``.
+
+    Parameters
+    ----------
+    gap : (n_contact,) array [m]
+    reference_slip : (n_contact,) array [m]
+        Tangential displacement at which the node was last at rest (zero for the static law).
+
+    Returns
+    -------
+    LinearConditions
+    """
+    n_contact = len(gap)
+    value = np.stack([gap, reference_slip], axis=1)
+    return LinearConditions(_unit_blocks(n_contact), np.zeros((n_contact, 2, 2)), value)
+
+
+def slip(
+    gap: FloatArray, direction: FloatArray, bound_slope: FloatArray, bound_intercept: FloatArray
+) -> LinearConditions:
+    """Return the conditions of closed nodes that slip: ``u_n = g``, ``t_t = -direction * bound(t_n)``.
+
+    Parameters
+    ----------
+    gap : (n_contact,) array [m]
+    direction : (n_contact,) array
+        +1 for slip along the tangent (``u_t > 0``), -1 against it.
+    bound_slope : (n_contact,) array [-]
+        Derivative of the friction bound, ``-s`` for Coulomb's law.
+    bound_intercept : (n_contact,) array [Pa]
+        The linearised bound is ``bound_slope * t_n + bound_intercept``.
+
+    Returns
+    -------
+    LinearConditions
+
+    Notes
+    -----
+    Algorithm 2 of the paper prints the slip traction with the opposite sign; equation (16) implies the one used here.
+    """
+    n_contact = len(gap)
+    on_displacement = np.zeros((n_contact, 2, 2))
+    on_displacement[:, 0, 0] = 1.0
+    on_traction = np.zeros((n_contact, 2, 2))
+    on_traction[:, 1, 0] = direction * bound_slope
+    on_traction[:, 1, 1] = 1.0
+    return LinearConditions(on_displacement, on_traction, np.stack([gap, -direction * bound_intercept], axis=1))
+
+
+def augmented(
+    gap: FloatArray, reference_slip: FloatArray, multiplier: FloatArray, rho_n: float, rho_t: float
+) -> LinearConditions:
+    """Return the augmented conditions of closed, sticking nodes: ``t + rho (u - u_0) = multiplier``.
+
+    Parameters
+    ----------
+    gap : (n_contact,) array [m]
+        Normal part of u_0.
+    reference_slip : (n_contact,) array [m]
+        Tangential part of u_0.
+    multiplier : (n_contact, 2) array [Pa]
+        sigma^(k) of Algorithm 1, kept fixed during an inner loop.
+    rho_n, rho_t : float [Pa/m]
+
+    Returns
+    -------
+    LinearConditions
+    """
+    n_contact = len(gap)
+    rho = np.array([rho_n, rho_t])
+    on_displacement = np.zeros((n_contact, 2, 2))
+    on_displacement[:, [0, 1], [0, 1]] = rho
+    value = multiplier + rho * np.stack([gap, reference_slip], axis=1)
+    return LinearConditions(on_displacement, _unit_blocks(n_contact), value)
+
+
+def _unit_blocks(n_contact: int) -> FloatArray:
+    return np.broadcast_to(np.eye(2), (n_contact, 2, 2))

@@ -1,0 +1,293 @@
+"""Friction laws: how large the tangential traction may grow under a given normal traction.
+
+A law is a *bound*; the contact conditions themselves are the same for all laws: at a closed node the tangential
+traction stays within the bound, and where the node slips it has the size of the bound and opposes the slip,
+
+    |sigma_t| <= bound(sigma_n),    sigma_t = -bound(sigma_n) u_t / |u_t|  where  u_t != 0.
+
+An own law is a class with `bound` and `bound_derivative`; deriving it from `FrictionLaw` supplies the rest.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, read_only
+
+
+@runtime_checkable
+class FrictionLaw(Protocol):
+    """Bound of the tangential traction; derive from this class and write two methods.
+
+    Notes
+    -----
+    Both methods are called with compressive normal tractions only (``sigma_n <= 0``) and with all contact nodes at
+    once, so coefficients may differ from node to node. `bemkit.testing.check_law` tests everything said here.
+    """
+
+    @property
+    def is_frictionless(self) -> bool:
+        """Whether the bound vanishes for every pressure."""
+        return False
+
+    @property
+    def acts_across_gap(self) -> bool:
+        """Whether ``bound(0)`` also holds at open nodes.
+
+        False (the default): an open node carries no traction. True only for friction that is *given* on the whole
+        contact boundary, which makes the problem convex (see `Tresca`). Without meaning where ``bound(0) = 0``.
+        """
+        return False
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return the largest tangential traction the nodes can carry.
+
+        Parameters
+        ----------
+        sigma_n : (n_contact,) array [Pa]
+            Normal tractions, not positive.
+
+        Returns
+        -------
+        (n_contact,) array [Pa]
+            Not negative, and not falling when the pressure ``-sigma_n`` grows.
+        """
+        ...
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return the derivative of `bound` by `sigma_n`.
+
+        Parameters
+        ----------
+        sigma_n : (n_contact,) array [Pa]
+
+        Returns
+        -------
+        (n_contact,) array [-]
+            Not positive; at a kink the derivative of either side, at ``sigma_n = 0`` that of the compressive side.
+        """
+        ...
+
+    def scaled(self, stress_scale: float) -> "FrictionLaw":
+        """Return the same law for stresses measured in units of `stress_scale` [Pa]."""
+        return RescaledLaw(self, stress_scale)
+
+
+@dataclass(frozen=True)
+class Frictionless(FrictionLaw):
+    """No tangential traction at all."""
+
+    @property
+    def is_frictionless(self) -> bool:
+        """True."""
+        return True
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return zeros."""
+        return np.zeros_like(sigma_n)
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return zeros."""
+        return np.zeros_like(sigma_n)
+
+    def scaled(self, stress_scale: float) -> "Frictionless":
+        """Return the law itself, which knows no stress."""
+        _check_scale(stress_scale)
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Tresca(FrictionLaw):
+    """Given friction: a bound that does not depend on the pressure.
+
+    Parameters
+    ----------
+    bound_value : float or (n_contact,) array [Pa]
+        The bound, not negative.
+
+    Notes
+    -----
+    As in the theory of the Tresca problem the bound is given on the *whole* contact boundary, open nodes included:
+    only then is the problem convex and uniquely solvable. For friction that ends where the contact ends use
+    `CohesiveCoulomb` with ``cohesion=0`` and a ``cap``.
+    """
+
+    bound_value: float | FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bound_value", _coefficient("bound_value", self.bound_value))
+
+    @property
+    def is_frictionless(self) -> bool:
+        """Whether the given bound is zero."""
+        return not np.any(self.bound_value)
+
+    @property
+    def acts_across_gap(self) -> bool:
+        """True: the bound is given on the whole contact boundary."""
+        return True
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return the given bound."""
+        return np.broadcast_to(self.bound_value, sigma_n.shape).astype(float)
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return zeros."""
+        return np.zeros_like(sigma_n)
+
+    def scaled(self, stress_scale: float) -> "Tresca":
+        """Return the law with its bound in units of `stress_scale`."""
+        return Tresca(self.bound_value / _check_scale(stress_scale))
+
+
+@dataclass(frozen=True, eq=False)
+class Coulomb(FrictionLaw):
+    """Coulomb's law: ``bound = s |sigma_n|``, equations (7) and (8) of the paper.
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n_contact,) array [-]
+        s, not negative.
+    """
+
+    friction_coefficient: float | FloatArray
+
+    def __post_init__(self) -> None:
+        value = _coefficient("friction_coefficient", self.friction_coefficient)
+        object.__setattr__(self, "friction_coefficient", value)
+
+    @property
+    def is_frictionless(self) -> bool:
+        """Whether the friction coefficient is zero."""
+        return not np.any(self.friction_coefficient)
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``s |sigma_n|`` (zero under tension, which no solution contains)."""
+        return np.asarray(self.friction_coefficient * np.maximum(-sigma_n, 0.0))
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``-s`` (zero under tension)."""
+        return np.where(sigma_n <= 0.0, -np.asarray(self.friction_coefficient), 0.0)
+
+    def scaled(self, stress_scale: float) -> "Coulomb":
+        """Return the law itself, which knows no stress."""
+        _check_scale(stress_scale)
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class CohesiveCoulomb(FrictionLaw):
+    """Coulomb's law with cohesion and cap: ``bound = min(c + s |sigma_n|, tau_max)``.
+
+    Parameters
+    ----------
+    friction_coefficient : float or (n_contact,) array [-]
+        s, not negative.
+    cohesion : float or (n_contact,) array [Pa]
+        c, not negative; acts while the node is closed and ends when it opens.
+    cap : float or (n_contact,) array [Pa]
+        tau_max, not below the cohesion; infinite by default.
+
+    Notes
+    -----
+    Because cohesion is lost by jump when a node opens, a problem with ``c > 0`` and a moving edge of contact need
+    not have a solution; drivers then say so by their status.
+    """
+
+    friction_coefficient: float | FloatArray
+    cohesion: float | FloatArray = 0.0
+    cap: float | FloatArray = float("inf")
+
+    def __post_init__(self) -> None:
+        for name in ("friction_coefficient", "cohesion"):
+            object.__setattr__(self, name, _coefficient(name, getattr(self, name)))
+        object.__setattr__(self, "cap", _coefficient("cap", self.cap, may_be_infinite=True))
+        if np.any(np.asarray(self.cap) < np.asarray(self.cohesion)):
+            raise ValueError(
+                f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
+                "the cap bounds cohesion and friction together, so give cap >= cohesion"
+            )
+
+    @property
+    def is_frictionless(self) -> bool:
+        """Whether friction coefficient and cohesion are zero, or the cap is."""
+        return not np.any(self.cap) or not (np.any(self.friction_coefficient) or np.any(self.cohesion))
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``min(c + s |sigma_n|, tau_max)``."""
+        return np.minimum(self._uncapped(sigma_n), self.cap)
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
+        is_rising = (self._uncapped(sigma_n) < self.cap) & (sigma_n <= 0.0)
+        return np.where(is_rising, -np.asarray(self.friction_coefficient), 0.0)
+
+    def scaled(self, stress_scale: float) -> "CohesiveCoulomb":
+        """Return the law with cohesion and cap in units of `stress_scale`."""
+        scale = _check_scale(stress_scale)
+        return CohesiveCoulomb(self.friction_coefficient, self.cohesion / scale, self.cap / scale)
+
+    def _uncapped(self, sigma_n: FloatArray) -> FloatArray:
+        return np.asarray(self.cohesion + self.friction_coefficient * np.maximum(-sigma_n, 0.0))
+
+
+@dataclass(frozen=True)
+class RescaledLaw(FrictionLaw):
+    """Any law, seen through another unit of stress and weakened or strengthened by a factor.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+    stress_scale : float [Pa]
+        The unit in which this law receives and returns stresses.
+    fraction : float [-]
+        Factor on the bound; the friction continuation leads it to one.
+    """
+
+    law: FrictionLaw
+    stress_scale: float = 1.0
+    fraction: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_scale(self.stress_scale)
+        _coefficient("fraction", self.fraction)
+
+    @property
+    def is_frictionless(self) -> bool:
+        """Whether the law is frictionless or its fraction is zero."""
+        return self.law.is_frictionless or self.fraction == 0.0
+
+    @property
+    def acts_across_gap(self) -> bool:
+        """What the law says."""
+        return self.law.acts_across_gap
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``fraction * bound(sigma_n * stress_scale) / stress_scale``."""
+        return self.fraction * self.law.bound(sigma_n * self.stress_scale) / self.stress_scale
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return ``fraction * bound_derivative(sigma_n * stress_scale)``."""
+        return self.fraction * self.law.bound_derivative(sigma_n * self.stress_scale)
+
+
+def _coefficient(name: str, value: float | FloatArray, *, may_be_infinite: bool = False) -> float | FloatArray:
+    """Check a coefficient and return it as a float or a read-only array of its own."""
+    array = np.array(value, dtype=float)
+    if array.ndim > 1:
+        raise ValueError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
+    is_wrong = np.isnan(array) | (array < 0.0) | (False if may_be_infinite else np.isinf(array))
+    if np.any(is_wrong):
+        where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
+        raise ValueError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
+    if array.ndim == 0:
+        return float(array)
+    read_only(array)
+    return array
+
+
+def _check_scale(stress_scale: float) -> float:
+    if not (np.isfinite(stress_scale) and stress_scale > 0.0):
+        raise ValueError(f"stress_scale = {stress_scale:g}; give a positive finite stress")
+    return stress_scale

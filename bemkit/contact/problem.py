@@ -1,0 +1,147 @@
+"""The contact problem: a body, a gap, a friction law."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, read_only
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.conditions import stick
+from bemkit.contact.dense import DenseBody
+from bemkit.contact.laws import FrictionLaw
+
+__all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]
+
+
+class LawError(ValueError):
+    """A friction law failed or returned what no bound can be; the message names the law."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactProblem:
+    """Find ``u_n <= g``, ``sigma_n <= 0``, ``sigma_n (u_n - g) = 0`` and friction by the law, for one loaded body.
+
+    Parameters
+    ----------
+    body : LinearBody
+    gap : (n_contact,) array [m]
+        Distance to the obstacle along the normal; negative where body and obstacle overlap before the load acts,
+        ``inf`` where the node can never touch.
+    law : FrictionLaw
+    reference_slip : (n_contact,) array [m], optional
+        Slip is ``u_t - reference_slip``. Zero (the default) is the static law of the paper; the tangential
+        displacement of the last load step gives the incremental law.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit the body, or an entry is not a number.
+    LawError
+        If the law fails or returns bounds of another shape, negative or not finite.
+    """
+
+    body: LinearBody
+    gap: FloatArray
+    law: FrictionLaw
+    reference_slip: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        n_contact = self.body.n_contact
+        slip = np.zeros(n_contact) if self.reference_slip is None else self.reference_slip
+        for name, given in (("gap", self.gap), ("reference_slip", slip)):
+            array = np.array(given, dtype=float)
+            if array.shape != (n_contact,):
+                raise ValueError(f"{name} has the shape {array.shape}; the body has {n_contact} contact nodes")
+            is_wrong = np.isnan(array) | (np.isneginf(array) if name == "gap" else np.isinf(array))
+            if is_wrong.any():
+                node = int(np.argmax(is_wrong))
+                raise ValueError(f"{name} is {array[node]} at contact node {node}; give a number")
+            read_only(array)
+            object.__setattr__(self, name, array)
+        missing = [member for member in _LAW_MEMBERS if not hasattr(self.law, member)]
+        if missing:
+            raise LawError(
+                f"friction law {type(self.law).__name__} has no {', '.join(missing)}; "
+                "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
+            )
+        self.friction_bound(np.zeros(n_contact))
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return self.body.n_contact
+
+    @property
+    def slip_origin(self) -> FloatArray:
+        """(n_contact,) array [m], the reference slip (zeros for the static law)."""
+        return np.zeros(self.n_contact) if self.reference_slip is None else self.reference_slip
+
+    @cached_property
+    def glued_state(self) -> ContactState:
+        """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
+
+        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``.
+        """
+        return self.body.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
+
+    def with_law(self, law: FrictionLaw) -> "ContactProblem":
+        """Return the problem under another law."""
+        other = replace(self, law=law)
+        if "glued_state" in self.__dict__:  # it does not depend on the law
+            other.__dict__["glued_state"] = self.glued_state
+        return other
+
+    def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
+        """Return the bound of the tangential traction at every node.
+
+        Parameters
+        ----------
+        sigma_n : (n_contact,) array [Pa]
+            Normal tractions; tension is read as zero.
+        is_closed : (n_contact,) bool array, optional
+            Open nodes have the bound zero unless the law acts across the gap. All closed by default.
+
+        Returns
+        -------
+        (n_contact,) array [Pa]
+
+        Raises
+        ------
+        LawError
+            If the law fails, or returns a wrong shape or negative or non-finite bounds.
+        """
+        bound = self._ask_law("bound", np.minimum(sigma_n, 0.0))
+        if np.any(bound < 0.0):
+            node = int(np.argmin(bound))
+            raise LawError(
+                f"friction law {type(self.law).__name__}.bound is {bound[node]:g} at contact node {node} "
+                f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
+            )
+        return self._where_acting(bound, is_closed)
+
+    def friction_slope(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
+        """Return the derivative of the bound by the normal traction at every node; see `friction_bound`."""
+        return self._where_acting(self._ask_law("bound_derivative", np.minimum(sigma_n, 0.0)), is_closed)
+
+    def _where_acting(self, values: FloatArray, is_closed: BoolArray | None) -> FloatArray:
+        if is_closed is None or self.law.acts_across_gap:
+            return values
+        return np.where(is_closed, values, 0.0)
+
+    def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
+        name = f"friction law {type(self.law).__name__}.{method}"
+        try:
+            values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
+        except Exception as error:  # whatever an own law raises must surface with the law's name
+            raise LawError(f"{name} failed: {type(error).__name__}: {error}") from error
+        if values.shape != sigma_n.shape:
+            raise LawError(f"{name} returned the shape {values.shape} for {sigma_n.shape}; give one value a node")
+        # A state that is not finite is the driver's to report; finite tractions must give finite bounds.
+        if not np.isfinite(values).all() and np.isfinite(sigma_n).all():
+            node = int(np.argmin(np.isfinite(values)))
+            raise LawError(f"{name} is {values[node]} at contact node {node} (sigma_n = {sigma_n[node]:g})")
+        return values
+
+
+_LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")

@@ -1,0 +1,95 @@
+"""Writing files so that a reader never meets half of one."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+class OutputFileError(OSError):
+    """A file that cannot be written; one line with its name and the remedy."""
+
+
+def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
+    """Find out, before any work is done, whether a file can be written.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What will be written, for messages: "bemkit result".
+    is_own : callable
+        Tells whether an existing file is of this kind, and so may be replaced.
+
+    Returns
+    -------
+    Path
+        The path with symbolic links resolved.
+
+    Raises
+    ------
+    OutputFileError
+        If the folder does not exist or cannot be written to, or another kind of file stands in the way.
+    """
+    try:
+        target = path.resolve()
+        folder = target.parent
+        exists, is_file = target.exists(), target.is_file()
+    except (OSError, ValueError) as error:
+        raise OutputFileError(f"{_shown(path)}: not a usable file name ({error}): choose another") from error
+    if not folder.is_dir():
+        raise OutputFileError(f"{_shown(path)}: the folder {_shown(folder)} does not exist: create it first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputFileError(f"{_shown(path)}: no permission to write in {_shown(folder)}: choose another folder")
+    if exists and not is_file:
+        raise OutputFileError(f"{_shown(path)}: exists and is not a file: choose another name")
+    if exists and not is_own(target):
+        raise OutputFileError(f"{_shown(path)}: exists and is not a {kind}: choose another name or delete it first")
+    return target
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """Give the name of a temporary file in the same folder, which replaces the target if all goes well.
+
+    Parameters
+    ----------
+    target : Path
+
+    Yields
+    ------
+    Path
+        A file that does not exist yet. It is removed again if the body of the ``with`` statement raises anything,
+        an interrupt included; the target is then untouched.
+
+    Raises
+    ------
+    OutputFileError
+        If the system refuses, for example because the disk is full.
+    """
+    temporary = target.with_name(f".{target.name[:100]}.{uuid.uuid4().hex}.tmp")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, target)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputFileError(f"{_shown(target)}: cannot be written ({reason}): choose another place") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _flush(path: Path) -> None:
+    """Make sure the content is on the disk before the name points to it."""
+    descriptor = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _shown(path: Path) -> str:
+    return "".join(character if character.isprintable() else "?" for character in str(path))[:200]

@@ -1,0 +1,268 @@
+"""Curves: what a side of a body, or a curved element, follows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.quadrature import gauss_legendre
+
+_N_CHECK_INTERVALS = 8
+_N_CHECK_POINTS = 8
+_DERIVATIVE_TOLERANCE = 1e-2  # catches a wrong sign, factor or component; forgives the quadrature of a rough curve
+
+
+class Curve(Protocol):
+    """A smooth piece of boundary, traversed with the body on its left.
+
+    A curve of one's own needs only these three members.
+    """
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the curve is a straight segment, so that its elements are their chords."""
+        ...
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve.
+
+        Parameters
+        ----------
+        s : (n,) array
+            Parameters in [0, 1].
+
+        Returns
+        -------
+        (n, 2) array [m]
+            Points; s = 0 is the start, s = 1 the end.
+        """
+        ...
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to its parameter.
+
+        Parameters
+        ----------
+        s : (n,) array
+            Parameters in [0, 1].
+
+        Returns
+        -------
+        (n, 2) array [m]
+            dx/ds along the traversal, nowhere zero.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A straight segment.
+
+    Parameters
+    ----------
+    start, end : (float, float) [m]
+        Its two different end points.
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        start = as_point(self.start, "Segment: start")
+        end = as_point(self.end, "Segment: end")
+        if start == end:
+            raise GeometryError(f"Segment: start and end are the same point {start}: give two different points")
+        object.__setattr__(self, "start", start)
+        object.__setattr__(self, "end", end)
+
+    @property
+    def is_straight(self) -> bool:
+        """True."""
+        return True
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve; both ends are met to the last digit."""
+        s = np.asarray(s)[:, None]
+        return (1.0 - s) * np.array(self.start) + s * np.array(self.end)
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Return the constant vector from start to end."""
+        return np.tile(np.array(self.end) - np.array(self.start), (len(s), 1))
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A circular arc.
+
+    Parameters
+    ----------
+    centre : (float, float) [m]
+        Centre of the circle.
+    radius : float [m]
+        Its radius, positive.
+    start_angle, end_angle : float [rad]
+        Polar angles of the two ends; the arc is traversed anticlockwise if `end_angle` is the larger.
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    start_angle: float
+    end_angle: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", as_point(self.centre, "Arc: centre"))
+        require_positive("Arc", radius=self.radius)
+        sweep = self.end_angle - self.start_angle
+        if not 0.0 < abs(sweep) <= 2.0 * np.pi * (1.0 + 1e-12):  # the slack forgives angles rounded from degrees
+            raise GeometryError(
+                f"Arc: from start_angle={self.start_angle} to end_angle={self.end_angle} is not an arc: "
+                "give angles in radians that differ by more than 0 and at most 2 pi"
+            )
+
+    @property
+    def is_straight(self) -> bool:
+        """False."""
+        return False
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve; s is proportional to the angle."""
+        angle = self._angle(s)
+        return np.array(self.centre) + self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to s."""
+        angle = self._angle(s)
+        speed = self.radius * (self.end_angle - self.start_angle)
+        return speed * np.column_stack([-np.sin(angle), np.cos(angle)])
+
+    def _angle(self, s: FloatArray) -> FloatArray:
+        s = np.asarray(s)
+        return (1.0 - s) * self.start_angle + s * self.end_angle
+
+
+@dataclass(frozen=True, eq=False)
+class ParametricCurve:
+    """A smooth curve given by two vectorised functions.
+
+    Parameters
+    ----------
+    function : callable
+        (n,) parameters in [0, 1] -> (n, 2) points [m].
+    derivative_function : callable
+        (n,) parameters -> (n, 2) derivatives dx/ds [m]; checked against `function`.
+
+    Raises
+    ------
+    GeometryError
+        If a function returns another shape or something not finite, the derivative vanishes, or the
+        derivative does not belong to the function.
+    """
+
+    function: Callable[[FloatArray], FloatArray]
+    derivative_function: Callable[[FloatArray], FloatArray]
+
+    def __post_init__(self) -> None:
+        nodes, weights = gauss_legendre(_N_CHECK_POINTS)
+        ends = np.linspace(0.0, 1.0, _N_CHECK_INTERVALS + 1)
+        half = 0.5 / _N_CHECK_INTERVALS
+        s = ((ends[:-1, None] + half) + half * nodes).ravel()
+        velocity = self.derivative(s)
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        if not speed.min() > 0.0:
+            raise GeometryError(
+                f"ParametricCurve: derivative_function vanishes at s={s[speed.argmin()]:.6g}: "
+                "choose a parameter along which the curve moves everywhere"
+            )
+        steps = np.diff(self.point(ends), axis=0)
+        integrals = half * np.einsum("q,iqk->ik", weights, velocity.reshape(_N_CHECK_INTERVALS, _N_CHECK_POINTS, 2))
+        mismatch = np.linalg.norm(steps - integrals, axis=1)
+        worst = int(mismatch.argmax())
+        if mismatch[worst] > _DERIVATIVE_TOLERANCE * speed.mean() / _N_CHECK_INTERVALS:
+            raise GeometryError(
+                f"ParametricCurve: from s={ends[worst]:.6g} to s={ends[worst + 1]:.6g} function moves by "
+                f"{format_point(steps[worst])}, but derivative_function adds up to {format_point(integrals[worst])}: "
+                "give the derivative of function with respect to s"
+            )
+
+    @property
+    def is_straight(self) -> bool:
+        """False: a parametric curve is always treated as curved."""
+        return False
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve."""
+        return _checked_values("function", self.function(np.asarray(s)), s)
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to s."""
+        return _checked_values("derivative_function", self.derivative_function(np.asarray(s)), s)
+
+
+@dataclass(frozen=True, eq=False)
+class MovedCurve:
+    """The curve (x - shift) * factor, from start to end or, if reversed, from end to start."""
+
+    curve: Curve
+    shift: tuple[float, float] = (0.0, 0.0)
+    factor: float = 1.0
+    is_reversed: bool = False
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the original is straight."""
+        return self.curve.is_straight
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve."""
+        return (self.curve.point(1.0 - s if self.is_reversed else s) - np.array(self.shift)) * self.factor
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to s."""
+        if self.is_reversed:
+            return -self.factor * self.curve.derivative(1.0 - s)
+        return self.factor * self.curve.derivative(s)
+
+
+def reverse_curve(curve: Curve) -> Curve:
+    """Return the same curve, traversed the other way."""
+    match curve:
+        case Segment(start, end):
+            return Segment(end, start)
+        case Arc(centre, radius, start_angle, end_angle):
+            return Arc(centre, radius, end_angle, start_angle)
+        case _:
+            return MovedCurve(curve, is_reversed=True)
+
+
+def as_point(value: tuple[float, float], name: str) -> tuple[float, float]:
+    """Return two finite floats, or say what `name` should have been."""
+    array = np.asarray(value, dtype=float)
+    if array.shape != (2,) or not np.isfinite(array).all():
+        raise GeometryError(f"{name} is {value}: give two finite numbers (x, y)")
+    return float(array[0]), float(array[1])
+
+
+def require_positive(owner: str, **lengths: float) -> None:
+    """Raise unless every named length is finite and positive."""
+    for name, value in lengths.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise GeometryError(f"{owner}: {name} is {value}: give a positive finite length")
+
+
+def _checked_values(name: str, values: FloatArray, s: FloatArray) -> FloatArray:
+    values = np.asarray(values, dtype=float)
+    if values.shape != (len(s), 2):
+        raise GeometryError(
+            f"ParametricCurve: {name} returned an array of shape {values.shape} for {len(s)} parameters: "
+            f"return shape ({len(s)}, 2)"
+        )
+    is_bad = ~np.isfinite(values).all(axis=1)
+    if is_bad.any():
+        raise GeometryError(
+            f"ParametricCurve: {name} is {format_point(values[is_bad][0])} at s={np.asarray(s)[is_bad][0]:.6g}: "
+            "it must be finite on [0, 1]"
+        )
+    return values

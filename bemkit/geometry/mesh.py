@@ -1,0 +1,362 @@
+"""Boundary meshes: elements in closed loops, with named parts."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.geometry.curve import Curve, MovedCurve, as_point, require_positive
+from bemkit.geometry.errors import GeometryError, UnknownPartError
+from bemkit.geometry.loops import swept_areas
+from bemkit.geometry.mesh_checks import (
+    as_index,
+    check_chains,
+    check_curves,
+    check_mesh_loops,
+    check_parts,
+    follow_loops,
+)
+from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.quadrature import gauss_legendre
+
+_N_LENGTH_POINTS = 16
+_Array = TypeVar("_Array", FloatArray, IntArray, BoolArray)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryMesh:
+    """The boundary of one body, cut into elements.
+
+    Every loop is traversed with the body on its left: the outer loop anticlockwise, holes clockwise. The tangent t points
+    along the traversal, the normal n = (t_y, -t_x) out of the body.
+
+    Parameters
+    ----------
+    nodes : (n_nodes, 2) array [m]
+        Points where elements meet; each starts one element and ends one.
+    elements : (n_elements, 2) int array
+        Start node and end node of each element.
+    parts : mapping of str to (k,) int array
+        Named boundary parts, disjoint sets of elements; kept in increasing order.
+    curves : tuple of Curve
+        Curves that curved elements follow.
+    element_curve : (n_elements,) int array, optional
+        Index into `curves`, -1 for a straight element; None if all are straight.
+    element_span : (n_elements, 2) array, optional
+        Parameters of the start and the end of each curved element on its curve.
+    is_exterior : bool
+        Whether the body is the plane outside of the loops, which then all run clockwise.
+
+    Raises
+    ------
+    GeometryError
+        If this is not the boundary of one body: elements of no length, open or branching chains, elements that cross,
+        touch or fold back, coincident nodes, wrong orientation, parts that overlap or point nowhere.
+
+    Notes
+    -----
+    What counts as the same point is decided by the round-off of its own coordinates, never by an absolute length nor by
+    the length of elements. All arrays are read-only.
+    """
+
+    nodes: FloatArray
+    elements: IntArray
+    parts: Mapping[str, IntArray] = field(default_factory=dict)
+    curves: tuple[Curve, ...] = ()
+    element_curve: IntArray | None = None
+    element_span: FloatArray | None = None
+    is_exterior: bool = False
+
+    def __post_init__(self) -> None:
+        nodes = np.array(self.nodes, dtype=float)
+        elements = as_index(self.elements, "elements")
+        check_chains(nodes, elements)
+        self._keep("nodes", nodes)
+        self._keep("elements", elements)
+        object.__setattr__(self, "curves", tuple(self.curves))
+        if (self.element_curve is None) != (self.element_span is None):
+            raise GeometryError("BoundaryMesh: of element_curve and element_span one is missing: give both or neither")
+        if self.element_curve is not None and self.element_span is not None:
+            self._keep("element_curve", as_index(self.element_curve, "element_curve"))
+            self._keep("element_span", np.array(self.element_span, dtype=float))
+            check_curves(nodes, elements, self.curves, self._curve_index, self._span)
+        object.__setattr__(self, "parts", MappingProxyType(check_parts(self.parts, len(elements))))
+        check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
+
+    def _keep(self, name: str, array: FloatArray | IntArray) -> None:
+        read_only(array)
+        object.__setattr__(self, name, array)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what the constructor takes: a mesh from elsewhere is validated like any other."""
+        arguments = (self.nodes, self.elements, dict(self.parts), self.curves, self.element_curve, self.element_span)
+        return BoundaryMesh, (*arguments, self.is_exterior)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, equal to the number of elements."""
+        return len(self.nodes)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return len(self.elements)
+
+    @cached_property
+    def is_straight(self) -> BoolArray:
+        """(n_elements,) bool array: whether the element is its chord."""
+        return _frozen(self._curve_index < 0)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(n_elements, 2) array [m]: start points."""
+        return _frozen(self.nodes[self.elements[:, 0]])
+
+    @cached_property
+    def end(self) -> FloatArray:
+        """(n_elements, 2) array [m]: end points."""
+        return _frozen(self.nodes[self.elements[:, 1]])
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """(n_elements,) array [m]: arc lengths."""
+        lengths = self._pieces.chord_length
+        curved = np.flatnonzero(~self.is_straight)
+        xi, weights = gauss_legendre(_N_LENGTH_POINTS)
+        lengths[curved] = self.jacobian(curved, xi) @ weights
+        return _frozen(lengths)
+
+    @cached_property
+    def centres(self) -> FloatArray:
+        """(n_elements, 2) array [m]: points at xi = 0, on the element."""
+        return _frozen(self.points(np.arange(self.n_elements), np.zeros(1))[:, 0])
+
+    @cached_property
+    def tangents(self) -> FloatArray:
+        """(n_elements, 2) array: unit vectors along the chords."""
+        chord = self.end - self.start
+        return _frozen(chord / np.hypot(*chord.T)[:, None])
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """(n_elements, 2) array: unit normals of the chords, out of the body."""
+        return _frozen(_turned_right(self.tangents))
+
+    @cached_property
+    def node_elements(self) -> IntArray:
+        """(n_nodes, 2) int array: the element that ends and the element that starts at each node."""
+        pairs = np.empty((self.n_nodes, 2), dtype=np.intp)
+        pairs[self.elements[:, 1], 0] = np.arange(self.n_elements)
+        pairs[self.elements[:, 0], 1] = np.arange(self.n_elements)
+        return _frozen(pairs)
+
+    @cached_property
+    def loops(self) -> tuple[IntArray, ...]:
+        """For each closed loop its elements in order, starting at the smallest."""
+        return tuple(_frozen(loop) for loop in follow_loops(self.elements))
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """(2,) array [m]: middle of the bounding box of the boundary."""
+        low, high = self._bounds
+        return _frozen(0.5 * (low + high))
+
+    @cached_property
+    def diameter(self) -> float:
+        """Diagonal [m] of the bounding box of nodes and element centres."""
+        low, high = self._bounds
+        return float(np.hypot(*(high - low)))
+
+    @cached_property
+    def loop_areas(self) -> FloatArray:
+        """(n_loops,) array [m^2]: area within each loop, negative where the loop runs clockwise."""
+        areas = swept_areas(self._pieces)
+        return _frozen(np.array([areas[loop].sum() for loop in self.loops]))
+
+    @property
+    def area(self) -> float:
+        """Area [m^2] of the body, infinite for an exterior."""
+        return float("inf") if self.is_exterior else float(self.loop_areas.sum())
+
+    def part(self, name: str) -> IntArray:
+        """Return the elements of a part.
+
+        Parameters
+        ----------
+        name : str
+            Name of the part.
+
+        Returns
+        -------
+        (k,) int array
+            Element numbers, increasing, read-only.
+
+        Raises
+        ------
+        UnknownPartError
+            Listing the names there are.
+        """
+        if name not in self.parts:
+            known = ", ".join(repr(known) for known in self.parts) or "none"
+            raise UnknownPartError(f"BoundaryMesh: there is no part {name!r}: the parts are {known}")
+        return self.parts[name]
+
+    def points(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        """Evaluate elements.
+
+        Parameters
+        ----------
+        elements : (m,) int array
+            Element numbers.
+        xi : (q,) array
+            Local coordinates in [-1, 1], from start to end.
+
+        Returns
+        -------
+        (m, q, 2) array [m]
+            Points.
+        """
+        before, after = 0.5 - 0.5 * xi, 0.5 + 0.5 * xi
+        straight = before[:, None] * self.start[elements][:, None] + after[:, None] * self.end[elements][:, None]
+        return self._on_curves(elements, xi, point_on, straight)
+
+    def derivatives(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        """Differentiate elements: dx/dxi [m], (m, q, 2), for (m,) elements at (q,) local coordinates."""
+        half_chord = 0.5 * (self.end[elements] - self.start[elements])
+        straight = np.repeat(half_chord[:, None], len(xi), axis=1)
+        derivative = self._on_curves(elements, xi, derivative_on, straight)
+        # the chain rule: half the span of the parameter for xi from -1 to 1
+        is_curved = ~self.is_straight[elements]
+        derivative[is_curved] *= 0.5 * np.diff(self._span[elements][is_curved], axis=1)[:, :, None]
+        return derivative
+
+    def jacobian(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        """Return |dx/dxi| [m], (m, q), for (m,) elements at (q,) local coordinates."""
+        derivative = self.derivatives(elements, xi)
+        return np.hypot(derivative[..., 0], derivative[..., 1])
+
+    def normals_at(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        """Return unit normals out of the body, (m, q, 2), for (m,) elements at (q,) local coordinates."""
+        derivative = self.derivatives(elements, xi)
+        return _turned_right(derivative / np.hypot(derivative[..., 0], derivative[..., 1])[..., None])
+
+    def refined(self, marked: IntArray) -> "BoundaryMesh":
+        """Bisect elements.
+
+        Parameters
+        ----------
+        marked : (k,) int array
+            Numbers of the elements to bisect.
+
+        Returns
+        -------
+        BoundaryMesh
+            Both halves take the place of the element in its parts and in the order of elements; curved elements are
+            halved on their curve.
+        """
+        marked = as_index(marked, "marked")
+        if marked.size and not (marked.min() >= 0 and marked.max() < self.n_elements):
+            raise GeometryError(
+                f"BoundaryMesh: marked contains elements from {marked.min()} to {marked.max()}: "
+                f"use numbers from 0 to {self.n_elements - 1}"
+            )
+        is_halved = np.zeros(self.n_elements, dtype=bool)
+        is_halved[marked] = True
+        first = np.arange(self.n_elements) + np.cumsum(is_halved) - is_halved  # new number of the (first half of the) element
+        halved = np.flatnonzero(is_halved)
+        source = np.repeat(np.arange(self.n_elements), 1 + is_halved)
+
+        # the middle of an element is numbered next to its start node
+        starts_halved = is_halved[self.node_elements[:, 1]]
+        new_node = np.arange(self.n_nodes) + np.cumsum(starts_halved) - starts_halved
+        middle = new_node[self.elements[halved, 0]] + 1
+        nodes = np.empty((self.n_nodes + len(halved), 2))
+        nodes[new_node] = self.nodes
+        nodes[middle] = self.centres[halved]
+        elements = new_node[self.elements][source]
+        elements[first[halved], 1] = middle
+        elements[first[halved] + 1, 0] = middle
+        span = self._span[source]
+        span[first[halved], 1] = span[first[halved] + 1, 0] = self._span[halved].mean(axis=1)
+        return BoundaryMesh(
+            nodes,
+            elements,
+            {name: np.flatnonzero(np.isin(source, members)) for name, members in self.parts.items()},
+            self.curves,
+            None if self.element_curve is None else self.element_curve[source],
+            None if self.element_span is None else span,
+            self.is_exterior,
+        )
+
+    def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> "BoundaryMesh":
+        """Return the mesh of the body (x - shift) * factor.
+
+        Parameters
+        ----------
+        shift : (float, float) [m]
+            Point that becomes the origin.
+        factor : float
+            Magnification, positive.
+
+        Returns
+        -------
+        BoundaryMesh
+            With the same elements and parts.
+        """
+        shift = as_point(shift, "BoundaryMesh: shift")
+        require_positive("BoundaryMesh", factor=factor)
+        return BoundaryMesh(
+            (self.nodes - np.array(shift)) * factor,
+            self.elements,
+            self.parts,
+            tuple(MovedCurve(curve, shift, factor) for curve in self.curves),
+            self.element_curve,
+            self.element_span,
+            self.is_exterior,
+        )
+
+    @cached_property
+    def _curve_index(self) -> IntArray:
+        return np.full(self.n_elements, -1) if self.element_curve is None else self.element_curve
+
+    @cached_property
+    def _span(self) -> FloatArray:
+        return np.zeros((self.n_elements, 2)) if self.element_span is None else self.element_span
+
+    @cached_property
+    def _pieces(self) -> Pieces:
+        return make_pieces(self.curves, self.start, self.end, self._curve_index, self._span)
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        points = np.concatenate([self.nodes, self.centres])
+        return points.min(axis=0), points.max(axis=0)
+
+    def _on_curves(
+        self,
+        elements: IntArray,
+        xi: FloatArray,
+        evaluate: Callable[[Curve, FloatArray], FloatArray],
+        straight: FloatArray,
+    ) -> FloatArray:
+        """Replace the values (m, q, 2) of straight elements by those on curves where elements are curved."""
+        curve = self._curve_index[elements]
+        if (curve >= 0).any():
+            span = self._span[elements]
+            s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
+            straight[curve >= 0] = evaluate_curves(self.curves, curve, s, evaluate)[curve >= 0]
+        return straight
+
+
+def _turned_right(vectors: FloatArray) -> FloatArray:
+    """Turn vectors (..., 2) clockwise by a right angle: tangents to outward normals."""
+    return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)
+
+
+def _frozen(array: _Array) -> _Array:
+    read_only(array)
+    return array

@@ -1,0 +1,120 @@
+"""Outlines: named sides joined to closed loops around a body."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.curve import Curve
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.loops import check_loops
+from bemkit.geometry.pieces import RESOLUTION, make_pieces
+
+_JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
+_LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A named smooth piece of an outline.
+
+    Parameters
+    ----------
+    name : str
+        Its name, by which selections find it.
+    curve : Curve
+        Where it runs, with the body on its left.
+    """
+
+    name: str
+    curve: Curve
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name):
+            raise GeometryError(f"Side: name is {self.name!r}: give a non-empty string")
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The closed loops of sides that bound a body.
+
+    Parameters
+    ----------
+    loops : tuple of tuple of Side
+        Each loop lists its sides in order; the body is always on the left. So the outer loop runs anticlockwise and
+        holes run clockwise.
+    is_exterior : bool
+        Whether the body is the plane outside of the loops, which then all run clockwise.
+
+    Raises
+    ------
+    GeometryError
+        If a loop is not closed or runs the wrong way, sides cross, touch or fold back, a side has a kink or no length, a
+        hole is not in the body, or two sides have the same name.
+    """
+
+    loops: tuple[tuple[Side, ...], ...]
+    is_exterior: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "loops", tuple(tuple(loop) for loop in self.loops))
+        if not self.loops or not all(self.loops):
+            raise GeometryError(f"Outline: loops is {self.loops}: give at least one loop, each of at least one side")
+        names = self.side_names
+        for name in names:
+            if names.count(name) > 1:
+                raise GeometryError(f"Outline: {names.count(name)} sides are named {name!r}: give each its own name")
+        start, end = self._ends()
+        loop_of_side = np.repeat(np.arange(len(self.loops)), [len(loop) for loop in self.loops])
+        curves = tuple(side.curve for side in self.sides)
+        index = np.array([-1 if curve.is_straight else k for k, curve in enumerate(curves)])
+        pieces = make_pieces(curves, start, end, index, np.tile([0.0, 1.0], (len(curves), 1)))
+        check_loops(pieces, loop_of_side, self.is_exterior, self._describe, self._describe_loop, _LEAST_SPLITS)
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """All sides, loop after loop."""
+        return tuple(side for loop in self.loops for side in loop)
+
+    @property
+    def side_names(self) -> tuple[str, ...]:
+        """The names of all sides, loop after loop."""
+        return tuple(side.name for side in self.sides)
+
+    @cached_property
+    def corners(self) -> tuple[FloatArray, ...]:
+        """For each loop the (n_sides, 2) start points [m] of its sides."""
+        ends = np.array([0.0, 1.0])
+        return tuple(np.array([side.curve.point(ends)[0] for side in loop]) for loop in self.loops)
+
+    def _ends(self) -> tuple[FloatArray, FloatArray]:
+        """Return the starts and ends of all sides, joined up; raise if they do not join."""
+        start = np.concatenate(self.corners)
+        end = np.concatenate([np.roll(corners, -1, axis=0) for corners in self.corners])
+        own_end = np.array([side.curve.point(np.array([1.0]))[0] for side in self.sides])
+        if not np.isfinite([start, own_end]).all():
+            bad = int(np.argmin(np.isfinite(start).all(axis=1) & np.isfinite(own_end).all(axis=1)))
+            raise GeometryError(f"Outline: {self._describe(bad)} has an end that is not finite: correct its curve")
+        tolerance = _JOINT_TOLERANCE * np.abs(start).max()
+        followers = [name for loop in self.loops for name in [*[side.name for side in loop[1:]], loop[0].name]]
+        for k in np.flatnonzero(np.hypot(*(own_end - end).T) > tolerance):
+            raise GeometryError(
+                f"Outline: {self._describe(int(k))} ends at {format_point(own_end[k])}, but side {followers[k]!r} starts "
+                f"at {format_point(end[k])}: make every side start where the one before it ends"
+            )
+        for k, side in enumerate(self.sides):
+            if side.curve.is_straight and np.hypot(*(end[k] - start[k])) <= RESOLUTION * np.abs(start[k]).max():
+                raise GeometryError(
+                    f"Outline: {self._describe(k)} at {format_point(start[k])} has no length, or less than the digits of "
+                    "its coordinates resolve: leave it out, or move the body towards the origin"
+                )
+        return start, end
+
+    def _describe(self, k: int) -> str:
+        return f"side {self.side_names[k]!r}"
+
+    def _describe_loop(self, k: int) -> str:
+        names = [side.name for side in self.loops[k]]
+        shown = names if len(names) <= 4 else [*names[:2], "...", names[-1]]
+        return f"loop of sides {', '.join(shown)}"

@@ -1,0 +1,54 @@
+"""Quadrature rules on the reference interval."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, read_only
+
+
+@lru_cache(maxsize=64)
+def gauss_legendre(n_points: int) -> tuple[FloatArray, FloatArray]:
+    """Return the Gauss-Legendre points and weights on [-1, 1].
+
+    Parameters
+    ----------
+    n_points : int
+        At least 1; the rule is exact for polynomials up to degree 2 n_points - 1.
+
+    Returns
+    -------
+    points, weights : (n_points,) arrays
+        Read-only.
+    """
+    points, weights = np.polynomial.legendre.leggauss(n_points)
+    read_only(points)
+    read_only(weights)
+    return points, weights
+
+
+@lru_cache(maxsize=64)
+def gauss_graded(n_points: int, power: int = 4) -> tuple[FloatArray, FloatArray]:
+    """Return a rule on [0, 1] for functions like u log(u), singular at 0.
+
+    Parameters
+    ----------
+    n_points : int
+        Number of points.
+    power : int
+        The Gauss points are mapped by u = v**power, which makes u**a log(u) as smooth as v**(power (a + 1) - 1) log(v).
+
+    Returns
+    -------
+    points, weights : (n_points,) arrays
+        Read-only.
+    """
+    reference, reference_weights = gauss_legendre(n_points)
+    v = 0.5 * (reference + 1.0)
+    points = v**power
+    weights = 0.5 * reference_weights * power * v ** (power - 1)
+    read_only(points)
+    read_only(weights)
+    return points, weights

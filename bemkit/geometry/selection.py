@@ -1,0 +1,98 @@
+"""Selections: which piece of an outline a boundary part covers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.curve import Curve
+from bemkit.geometry.errors import GeometryError
+
+N_SAMPLES = 257
+"""Points at which a predicate is looked at along a side; 2**k + 1, so that halves and quarters are among them."""
+_N_BISECTIONS = 48  # from 1/256 to less than the spacing of numbers near 1
+_END_TOLERANCE = 1e-12  # a part does not begin this close to the end of its side: that is round-off of the predicate
+
+Predicate = Callable[[FloatArray, FloatArray], BoolArray]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A choice of boundary: some sides, or the pieces of them where a predicate holds.
+
+    Parameters
+    ----------
+    sides : tuple of str
+        Names of sides; empty for all sides.
+    where : callable, optional
+        Vectorised predicate: coordinates x and y, each (n,) [m] -> (n,) bool. A piece shorter than 1/256 of its side
+        may be overlooked.
+    """
+
+    sides: tuple[str, ...] = ()
+    where: Predicate | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.sides, str):
+            raise GeometryError(f"Selection: sides is the string {self.sides!r}: give a tuple, ({self.sides!r},)")
+        object.__setattr__(self, "sides", tuple(self.sides))
+
+    def holds(self, side_name: str, points: FloatArray) -> BoolArray:
+        """Tell which points (n, 2) of the named side are selected, (n,)."""
+        if self.sides and side_name not in self.sides:
+            return np.zeros(len(points), dtype=bool)
+        return np.ones(len(points), dtype=bool) if self.where is None else evaluate_predicate(self.where, points)
+
+
+def evaluate_predicate(where: Predicate, points: FloatArray) -> BoolArray:
+    """Evaluate a predicate at points (n, 2); a constant answer counts for all.
+
+    Raises
+    ------
+    GeometryError
+        If the answer is not boolean or has another shape.
+    """
+    answer = np.asarray(where(points[:, 0], points[:, 1]))
+    if answer.dtype != np.bool_ or answer.shape not in ((), (len(points),)):
+        raise GeometryError(
+            f"Selection: where returned an array of {answer.dtype} of shape {answer.shape} for {len(points)} points: "
+            f"return booleans of shape ({len(points)},), as in `x < 0.5`"
+        )
+    return np.broadcast_to(answer, (len(points),))
+
+
+def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
+    """Find where along a curve a predicate changes.
+
+    Parameters
+    ----------
+    curve : Curve
+        The curve.
+    where : callable
+        The predicate, as in `Selection`.
+
+    Returns
+    -------
+    (n,) array
+        Parameters in (0, 1), increasing, to round-off: sampled at 257 points, then bisected.
+    """
+    samples = np.linspace(0.0, 1.0, N_SAMPLES)
+    holds = evaluate_predicate(where, curve.point(samples))
+    changes = np.flatnonzero(holds[1:] != holds[:-1])
+    if not len(changes):
+        return np.zeros(0)
+    low, high, holds_low = samples[changes], samples[changes + 1], holds[changes]
+    for _ in range(_N_BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_before = evaluate_predicate(where, curve.point(middle)) == holds_low
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    return merge_breakpoints(high)
+
+
+def merge_breakpoints(s: FloatArray) -> FloatArray:
+    """Sort parameters, drop those at the ends, and let those that differ by round-off be one."""
+    # to 15 decimals, so that x <= 1/2 and x < 1/2 both break at 1/2
+    s = np.sort(np.round(s, 15))
+    s = s[(s > _END_TOLERANCE) & (s < 1.0 - _END_TOLERANCE)]
+    return s[np.diff(s, prepend=-1.0) > _END_TOLERANCE]

@@ -1,0 +1,233 @@
+"""Shapes: bodies given by a few plain numbers, so that scene files can name them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.geometry.curve import Arc, Segment, as_point, require_positive, reverse_curve
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.outline import Outline, Side
+
+_QUADRANTS = np.pi / 2 * np.arange(5)
+
+
+class Shape(Protocol):
+    """Anything with an outline."""
+
+    def outline(self) -> Outline:
+        """Return the validated closed loops of named sides that bound the body."""
+        ...
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A rectangle with the sides bottom, right, top and left.
+
+    Parameters
+    ----------
+    width, height : float [m]
+        Extents along x and y.
+    corner : (float, float) [m]
+        Lower left corner, where the boundary starts.
+    """
+
+    width: float
+    height: float
+    corner: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_positive("Rectangle", width=self.width, height=self.height)
+        object.__setattr__(self, "corner", as_point(self.corner, "Rectangle: corner"))
+
+    def outline(self) -> Outline:
+        """Return one loop of four sides."""
+        (x, y), x_end, y_end = self.corner, self.corner[0] + self.width, self.corner[1] + self.height
+        names = ("bottom", "right", "top", "left")
+        return Outline((_polygon_loop(((x, y), (x_end, y), (x_end, y_end), (x, y_end)), names),))
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A simple polygon.
+
+    Parameters
+    ----------
+    vertices : tuple of (float, float) [m]
+        At least three corners, anticlockwise.
+    side_names : tuple of str, optional
+        Name of the side that starts at each vertex; "side-1", "side-2", ... if left out.
+
+    Raises
+    ------
+    GeometryError
+        If the vertices run clockwise, repeat, or make sides that cross or touch.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+    side_names: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        vertices = tuple(as_point(vertex, f"Polygon: vertex {k + 1}") for k, vertex in enumerate(self.vertices))
+        if len(vertices) < 3:
+            raise GeometryError(f"Polygon: vertices has {len(vertices)} points: give at least three")
+        for k, vertex in enumerate(vertices):
+            if vertex == vertices[k - 1]:
+                raise GeometryError(f"Polygon: vertices repeats the point {vertex} (vertex {k + 1}): leave one out")
+        if self.side_names is not None:
+            object.__setattr__(self, "side_names", tuple(self.side_names))
+            if len(self.side_names) != len(vertices):
+                raise GeometryError(
+                    f"Polygon: side_names has {len(self.side_names)} names for {len(vertices)} sides: name every side"
+                )
+        x, y = (np.array(vertices) - vertices[0]).T
+        is_clockwise = bool(x @ np.roll(y, -1) - y @ np.roll(x, -1) < 0.0)
+        object.__setattr__(self, "vertices", vertices[::-1] if is_clockwise else vertices)
+        self.outline()  # says first if the sides cross: then there is no telling which way they run
+        if is_clockwise:
+            raise GeometryError("Polygon: vertices run clockwise: list the vertices anticlockwise")
+
+    def outline(self) -> Outline:
+        """Return one loop of straight sides."""
+        names = self.side_names or tuple(f"side-{k + 1}" for k in range(len(self.vertices)))
+        return Outline((_polygon_loop(self.vertices, names),))
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A disk with the sides arc-1 ... arc-4, one for each quadrant, from angle 0 on.
+
+    Parameters
+    ----------
+    radius : float [m]
+        Its radius.
+    centre : (float, float) [m]
+        Its centre.
+    """
+
+    radius: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_positive("Disk", radius=self.radius)
+        object.__setattr__(self, "centre", as_point(self.centre, "Disk: centre"))
+
+    def outline(self) -> Outline:
+        """Return one loop of four arcs."""
+        return Outline((_circle_loop(self.centre, self.radius, "arc"),))
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A ring with the sides outer-1 ... outer-4 and inner-1 ... inner-4, numbered by quadrant.
+
+    Parameters
+    ----------
+    inner_radius, outer_radius : float [m]
+        Radii of the hole and of the ring.
+    centre : (float, float) [m]
+        Common centre.
+    """
+
+    inner_radius: float
+    outer_radius: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_positive("Ring", inner_radius=self.inner_radius, outer_radius=self.outer_radius)
+        if self.inner_radius >= self.outer_radius:
+            raise GeometryError(
+                f"Ring: inner_radius is {self.inner_radius}, not less than outer_radius, {self.outer_radius}: "
+                "give the smaller radius first"
+            )
+        object.__setattr__(self, "centre", as_point(self.centre, "Ring: centre"))
+
+    def outline(self) -> Outline:
+        """Return the outer loop and the hole."""
+        hole = _hole_loop(self.centre, self.inner_radius, "inner")
+        return Outline((_circle_loop(self.centre, self.outer_radius, "outer"), hole))
+
+
+@dataclass(frozen=True)
+class PlateWithHole:
+    """A rectangle with a round hole in the middle; sides bottom, right, top, left and hole-1 ... hole-4 by quadrant.
+
+    Parameters
+    ----------
+    width, height : float [m]
+        Extents along x and y.
+    radius : float [m]
+        Radius of the hole, less than half of either extent.
+    corner : (float, float) [m]
+        Lower left corner.
+    """
+
+    width: float
+    height: float
+    radius: float
+    corner: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_positive("PlateWithHole", width=self.width, height=self.height, radius=self.radius)
+        if 2.0 * self.radius >= min(self.width, self.height):
+            raise GeometryError(
+                f"PlateWithHole: radius is {self.radius}, but the plate is {self.width} by {self.height}: "
+                "give a radius less than half of either"
+            )
+        object.__setattr__(self, "corner", as_point(self.corner, "PlateWithHole: corner"))
+
+    def outline(self) -> Outline:
+        """Return the rectangle and the hole."""
+        centre = (self.corner[0] + 0.5 * self.width, self.corner[1] + 0.5 * self.height)
+        plate = Rectangle(self.width, self.height, self.corner).outline()
+        return Outline((*plate.loops, _hole_loop(centre, self.radius, "hole")))
+
+
+@dataclass(frozen=True)
+class ExteriorOf:
+    """The infinite plane outside of a shape, with the names of its sides.
+
+    Parameters
+    ----------
+    shape : Shape
+        A bounded shape without holes.
+    """
+
+    shape: Shape
+
+    def __post_init__(self) -> None:
+        outline = self.shape.outline()
+        if outline.is_exterior:
+            raise GeometryError("ExteriorOf: shape is already an exterior: give the bounded shape itself")
+        if len(outline.loops) > 1:
+            raise GeometryError(
+                f"ExteriorOf: shape has {len(outline.loops) - 1} hole(s), and what lies in them is not part of the "
+                "exterior: give a shape without holes"
+            )
+
+    def outline(self) -> Outline:
+        """Return the loop of the shape, reversed."""
+        (loop,) = self.shape.outline().loops
+        return Outline((_reversed_loop(loop),), is_exterior=True)
+
+
+def _polygon_loop(vertices: tuple[tuple[float, float], ...], names: tuple[str, ...]) -> tuple[Side, ...]:
+    ends = (*vertices[1:], vertices[0])
+    return tuple(Side(name, Segment(*pair)) for name, *pair in zip(names, vertices, ends, strict=True))
+
+
+def _circle_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[Side, ...]:
+    """Return four arcs, anticlockwise from angle 0."""
+    angles = zip(_QUADRANTS[:-1], _QUADRANTS[1:], strict=True)
+    return tuple(
+        Side(f"{name}-{k + 1}", Arc(centre, radius, float(start), float(end))) for k, (start, end) in enumerate(angles)
+    )
+
+
+def _hole_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[Side, ...]:
+    """Return four arcs, clockwise from angle 2 pi, so that arc k is that of quadrant k."""
+    return _reversed_loop(_circle_loop(centre, radius, name))
+
+
+def _reversed_loop(loop: tuple[Side, ...]) -> tuple[Side, ...]:
+    return tuple(Side(side.name, reverse_curve(side.curve)) for side in reversed(loop))

@@ -1,0 +1,211 @@
+"""Plain texts, numbers and tables in HDF5 files, and a reader that trusts nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bemkit.arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import h5py
+
+_MAX_TEXT = 10_000
+_MAX_ENTRIES_PER_GROUP = 1000
+
+
+class ResultFileError(ValueError):
+    """A result file that cannot be read; one line with its name and the remedy."""
+
+
+def write_attributes(group: h5py.Group, values: Mapping[str, Any]) -> None:
+    """Write texts and numbers as attributes of a group."""
+    for name, value in values.items():
+        group.attrs[name] = value
+
+
+def write_text(group: h5py.Group, name: str, text: str) -> None:
+    """Write a text of any length as a scalar dataset of fixed size."""
+    group.create_dataset(name, data=np.array(text.encode("utf-8"), dtype=_text_type([text])))
+
+
+def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
+    """Write columns of numbers (arrays) and texts (lists of str), one dataset each."""
+    for name, column in columns.items():
+        if isinstance(column, list):
+            data = np.array([text.encode("utf-8") for text in column], dtype=_text_type(column))
+        else:
+            data = column.astype(np.int64) if column.dtype.kind == "i" else column
+        group.create_dataset(name, data=data)
+
+
+def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
+    # fixed length: texts of variable length let a small hostile file expand without limit
+    import h5py
+
+    length = max([1, *(len(text.encode("utf-8")) for text in texts)])
+    dtype: np.dtype[Any] = h5py.string_dtype("utf-8", length)
+    return dtype
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Reader]:
+    """Open an HDF5 file for careful reading.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    Reader
+
+    Raises
+    ------
+    ResultFileError
+        If the file is missing, unreadable, or not HDF5.
+    """
+    import h5py
+
+    name = "".join(character if character.isprintable() else "?" for character in str(path))[:200]
+    try:
+        size = path.stat().st_size if path.is_file() else None
+        if size is None:
+            raise ResultFileError(f"{name}: no such file: give a file written by 'bemkit run -o'")
+        file = h5py.File(str(path), "r")
+    except (OSError, ValueError) as error:
+        if isinstance(error, ResultFileError):
+            raise
+        reason = error.strerror if isinstance(error, PermissionError) else "not an HDF5 file, or a broken one"
+        raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by 'bemkit run -o'") from error
+    with file:
+        yield Reader(name, size, file)
+
+
+class Reader:
+    """Reads what a bemkit result may contain, and nothing else.
+
+    Accepted are hard links to plain datasets stored in this very file, never larger than the file itself: no links
+    to other files, no compression, no texts of variable length outside single attributes.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for messages.
+    size : int [bytes]
+        Of the file.
+    file : h5py.File
+    """
+
+    def __init__(self, name: str, size: int, file: h5py.File) -> None:
+        self._name = name
+        self._size = size
+        self._file = file
+
+    def error(self, problem: str) -> ResultFileError:
+        """Return an error that names the file."""
+        remedy = "" if ":" in problem else ": the file is damaged, run its scene again"
+        return ResultFileError(f"{self._name}: {problem}{remedy}".replace("\n", " "))
+
+    def attributes(self, group: str) -> dict[str, Any]:
+        """Return the texts and numbers attached to a group."""
+        import h5py
+
+        try:
+            attributes = self._group(group).attrs
+            if len(attributes) > _MAX_ENTRIES_PER_GROUP:
+                raise self.error(f"too many attributes in {group}")
+            for name in attributes:
+                stored = attributes.get_id(name)
+                is_text = h5py.check_string_dtype(stored.dtype) is not None
+                if stored.shape != () or not (is_text or stored.dtype.kind in "if"):
+                    raise self.error(f"attribute {name!r} of {group} is not a single text or number")
+            values = dict(attributes.items())
+        except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
+            raise self.error(f"attributes of {group} cannot be read") from error
+        return {
+            name: value[:_MAX_TEXT] if isinstance(value, str) else value.item() if hasattr(value, "item") else value
+            for name, value in values.items()
+        }
+
+    def has(self, path: str) -> bool:
+        """Whether there is something at a path."""
+        return path in self._file
+
+    def floats(self, path: str) -> FloatArray:
+        """Return an array of floats."""
+        return np.asarray(self._array(path, "f"), dtype=np.float64)
+
+    def integers(self, path: str) -> IntArray:
+        """Return an array of integers."""
+        return np.asarray(self._array(path, "i"), dtype=np.intp)
+
+    def text(self, path: str, max_length: int = _MAX_TEXT) -> str:
+        """Return a single text."""
+        stored = self._array(path, "S")
+        if stored.shape != () or stored.dtype.itemsize > max_length:
+            raise self.error(f"{path} is not a text of at most {max_length} bytes")
+        return self._decoded(path, stored.item())
+
+    def table(
+        self, group: str, *, texts: Sequence[str] = (), floats: Sequence[str] = (), integers: Sequence[str] = ()
+    ) -> dict[str, Any]:
+        """Return the named columns of a table, all of one length."""
+        columns: dict[str, Any] = {}
+        for name in texts:
+            stored = self._array(f"{group}/{name}", "S")
+            columns[name] = [self._decoded(f"{group}/{name}", item) for item in stored.ravel().tolist()]
+        columns |= {name: self.floats(f"{group}/{name}") for name in floats}
+        columns |= {name: self.integers(f"{group}/{name}") for name in integers}
+        if len({len(column) for column in columns.values()}) > 1:
+            raise self.error(f"the columns of {group} differ in length")
+        return columns
+
+    def _decoded(self, path: str, stored: bytes) -> str:
+        try:
+            return stored.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise self.error(f"{path} is not UTF-8 text") from error
+
+    def _group(self, path: str) -> h5py.Group:
+        import h5py
+
+        found = self._follow(path)
+        if not isinstance(found, h5py.Group):
+            raise self.error(f"{path} is not a group")
+        return found
+
+    def _array(self, path: str, kind: str) -> npt.NDArray[Any]:
+        import h5py
+
+        found = self._follow(path)
+        try:
+            if not isinstance(found, h5py.Dataset) or found.shape is None:
+                raise self.error(f"{path} is not an array")
+            is_plain = found.chunks is None and found.external is None and not found.is_virtual
+            if not is_plain or found.nbytes > min(self._size, found.id.get_storage_size()):
+                raise self.error(f"{path} is not stored plainly in the file")
+            if found.dtype.kind != kind or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
+                raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")
+            return np.asarray(found[()])
+        except (OSError, RuntimeError, TypeError, MemoryError) as error:
+            raise self.error(f"{path} cannot be read") from error
+
+    def _follow(self, path: str) -> Any:
+        """Return the object at a path, through hard links only."""
+        import h5py
+
+        found: Any = self._file
+        try:
+            for name in filter(None, path.split("/")):
+                if not isinstance(found, h5py.Group) or not isinstance(found.get(name, getlink=True), h5py.HardLink):
+                    raise self.error(f"{path} is missing")
+                found = found[name]
+        except (OSError, RuntimeError, KeyError) as error:
+            raise self.error(f"{path} cannot be read") from error
+        return found

@@ -1,0 +1,187 @@
+"""Assembly of dense operators: one sweep over the element pairs serves all matrices that are wanted.
+
+An operator is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local coordinates, weighted by
+the monomial coefficients of the local test and trial functions. Its columns are gathered first, in a buffer of a few rows of
+elements, so that the large matrix is written once.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from threading import Lock
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.space import BoundarySpace
+from bemkit.operators import kernels
+from bemkit.operators.integrals import PairSweep
+from bemkit.operators.pairs import Degrees, PairIntegrals
+
+Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
+"""The xx, xy, yx, yy entries, each (n_rows, n_trial); None is zero."""
+
+MAX_THREADS = 8
+PAIRS_FOR_THREADS = 500_000
+"""Below this many element pairs the threads of BLAS are better left alone."""
+
+
+class Block:
+    """The integrals of some rows of elements, with what turns them into operator entries."""
+
+    def __init__(
+        self, integrals: PairIntegrals, test_half: FloatArray, trial_half: FloatArray, log_scale: float
+    ) -> None:
+        self.integrals = integrals
+        self.test_half = test_half[:, None]
+        self.trial_half = trial_half[None, :]
+        self.log_scale = log_scale
+
+    def mass(self, a: int, b: int) -> FloatArray:
+        """Return the integrals of xi**a t**b themselves, (n_rows, n_trial)."""
+        constant = kernels.interval_moment(a) * kernels.interval_moment(b)
+        return constant * (self.test_half * self.trial_half)
+
+
+@dataclass(frozen=True, eq=False)
+class TrialTerm:
+    """One part of an operator.
+
+    Parameters
+    ----------
+    coefficients : (n_local, n_powers) array
+        Monomial coefficients of what the kernel acts on: the trial functions or their derivatives.
+    tensor : callable
+        (block, a, b) -> the 2 x 2 tensor of integrals of the powers a (test) and b (trial).
+    """
+
+    coefficients: FloatArray
+    tensor: Callable[[Block, int, int], Tensor]
+
+
+class Assemblable(Protocol):
+    """What assembly needs to know of an operator."""
+
+    @property
+    def trial(self) -> BoundarySpace:
+        """The space of the argument."""
+
+    @property
+    def test(self) -> BoundarySpace:
+        """The space the result is tested with."""
+
+    @property
+    def degrees(self) -> Degrees:
+        """The integrals it needs."""
+
+    @property
+    def test_coefficients(self) -> FloatArray:
+        """(n_local, n_powers) monomial coefficients on the test element."""
+
+    def trial_terms(self) -> list[TrialTerm]:
+        """Return the parts that share the test coefficients."""
+
+
+def assemble_together(operators: Sequence[Assemblable]) -> list[FloatArray]:
+    """Sweep over all element pairs once and return the matrices (test.n_dofs, trial.n_dofs) of all operators.
+
+    Raises
+    ------
+    GeometryError
+        If the operators live on different meshes.
+    """
+    mesh = operators[0].test.mesh
+    if any(operator.test.mesh is not mesh for operator in operators):
+        msg = "the operators live on different meshes: assemble those of one mesh at a time"
+        raise GeometryError(msg)
+    degrees = Degrees()
+    for operator in operators:
+        degrees |= operator.degrees
+    targets = [_Target(operator) for operator in operators]
+    sweep = PairSweep(mesh, degrees)
+    half = 0.5 * mesh.lengths
+    log_scale = float(np.log(mesh.diameter))
+    lock = Lock()
+
+    def fill(rows: slice) -> None:
+        block = Block(sweep.chunk(rows), half[rows], half, log_scale)
+        for target in targets:
+            for a, gathered in target.gather(block):
+                with lock:  # two chunks share the rows of the node between them
+                    target.add(rows, a, gathered)
+
+    with ThreadPoolExecutor(_threads(mesh.n_elements**2)) as pool:
+        list(pool.map(fill, sweep.row_slices()))
+    return [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
+
+
+def _threads(n_pairs: int) -> int:
+    """Return how many threads are worth their while."""
+    if n_pairs < PAIRS_FOR_THREADS:
+        return 1
+    affinity = getattr(os, "sched_getaffinity", None)
+    available = len(affinity(0)) if affinity else os.cpu_count() or 1
+    return min(available, MAX_THREADS)
+
+
+class _Target:
+    """A matrix being filled, indexed (test dof, component, trial dof, component)."""
+
+    def __init__(self, operator: Assemblable) -> None:
+        self.test_dofs = operator.test.element_dofs
+        self.test_dofs_total = operator.test.n_dofs
+        self.n_trial = operator.trial.n_dofs // 2
+        self.test_coefficients = operator.test_coefficients
+        self.terms = operator.trial_terms()
+        self.columns = [_runs(dofs) for dofs in operator.trial.element_dofs.T]
+        self.matrix = np.zeros((self.test_dofs_total // 2, 2, self.n_trial, 2))
+
+    def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:
+        """Return, for each power a on the test elements, the four components by element row and trial dof."""
+        n_rows = block.test_half.shape[0]
+        result = []
+        for a in range(self.test_coefficients.shape[1]):
+            buffers = [np.zeros((n_rows, self.n_trial)) for _ in range(4)]
+            for term in self.terms:
+                for b in np.flatnonzero(np.any(term.coefficients != 0.0, axis=0)).tolist():
+                    for buffer, values in zip(buffers, term.tensor(block, a, b), strict=True):
+                        if values is not None:
+                            self._add_columns(buffer, values, term.coefficients[:, b])
+            result.append((a, buffers))
+        return result
+
+    def _add_columns(self, buffer: FloatArray, values: FloatArray, coefficients: FloatArray) -> None:
+        for coefficient, runs in zip(coefficients.tolist(), self.columns, strict=True):
+            if coefficient:
+                scaled = values if coefficient == 1.0 else coefficient * values
+                for positions, dofs in runs:
+                    buffer[:, dofs] += scaled[:, positions]
+
+    def add(self, rows: slice, a: int, gathered: list[FloatArray]) -> None:
+        """Add the gathered rows to the matrix."""
+        for p, coefficient in enumerate(self.test_coefficients[:, a].tolist()):
+            if not coefficient:
+                continue
+            for positions, dofs in _runs(self.test_dofs[rows, p]):
+                for index, buffer in enumerate(gathered):
+                    values = buffer[positions]
+                    view = self.matrix[:, index // 2, :, index % 2]
+                    view[dofs] += values if coefficient == 1.0 else coefficient * values
+
+
+def _runs(dofs: IntArray) -> list[tuple[slice, slice | IntArray]]:
+    """Cut a dof list into runs of consecutive numbers: pairs (positions, dofs) of slices, which index without copies.
+
+    A list in no particular order is one run whose dofs are an index array.
+    """
+    breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
+    if breaks.size > 8:
+        return [(slice(0, dofs.size), dofs)]
+    edges = [0, *breaks.tolist(), dofs.size]
+    return [(slice(i, j), slice(int(dofs[i]), int(dofs[i]) + j - i)) for i, j in itertools.pairwise(edges)]

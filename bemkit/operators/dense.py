@@ -1,0 +1,101 @@
+"""Dense factorisations with LAPACK: each names what could not be factored."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+
+
+def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return left @ right by the BLAS of scipy.
+
+    numpy and scipy bring one BLAS each, and the threads of one keep spinning for a while after each call: products between LAPACK calls
+    are several times faster when they come from the same library.
+    """
+    from scipy.linalg.blas import dgemm
+
+    a, trans_a = (left.T, 1) if left.flags.c_contiguous else (left, 0)
+    b, trans_b = (right.T, 1) if right.flags.c_contiguous else (right, 0)
+    return np.asarray(dgemm(1.0, a, b, trans_a=trans_a, trans_b=trans_b))
+
+
+class SingularMatrixError(ValueError):
+    """A matrix that must be regular is not; the message names it."""
+
+
+class Cholesky:
+    """Factor a symmetric positive definite matrix, which is also the proof that it is one.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    name : str
+        What the matrix stands for, for the message.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the matrix is not positive definite to working precision.
+    """
+
+    def __init__(self, matrix: FloatArray, name: str) -> None:
+        from scipy.linalg.lapack import dpotrf
+
+        # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
+        self._factor, info = dpotrf(np.array(matrix.T, order="F"), lower=1, overwrite_a=1, clean=0)
+        pivots = np.diag(self._factor)
+        if info or (pivots.size and pivots.min() <= 1e-14 * pivots.max()):
+            msg = f"{name} is not positive definite: check for coincident elements and for supports that leave the body free"
+            raise SingularMatrixError(msg)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve A x = right."""
+        from scipy.linalg.lapack import dpotrs
+
+        return np.asarray(dpotrs(self._factor, right, lower=1)[0])
+
+    def solve_lower(self, right: FloatArray) -> FloatArray:
+        """Solve L x = right with A = L L^T."""
+        from scipy.linalg.lapack import dtrtrs
+
+        return np.asarray(dtrtrs(self._factor, right, lower=1)[0])
+
+    def solve_upper(self, right: FloatArray) -> FloatArray:
+        """Solve L^T x = right with A = L L^T."""
+        from scipy.linalg.lapack import dtrtrs
+
+        return np.asarray(dtrtrs(self._factor, right, lower=1, trans=1)[0])
+
+
+class DenseLU:
+    """Factor a general square matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+        Overwritten if it is column-major.
+    name : str
+        What the matrix stands for, for the message.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the matrix is singular to working precision.
+    """
+
+    def __init__(self, matrix: FloatArray, name: str) -> None:
+        from scipy.linalg.lapack import dgecon, dgetrf, dlange
+
+        norm = dlange("1", matrix)
+        self._factor, self._pivots, info = dgetrf(matrix, overwrite_a=1)
+        reciprocal_condition = 0.0 if info else dgecon(self._factor, norm, norm="1")[0]
+        if not reciprocal_condition > 1e-15:
+            msg = f"{name} is singular (reciprocal condition {reciprocal_condition:.1e}): check that the supports and contacts hold it"
+            raise SingularMatrixError(msg)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve A x = right."""
+        from scipy.linalg.lapack import dgetrs
+
+        return np.asarray(dgetrs(self._factor, self._pivots, right)[0])

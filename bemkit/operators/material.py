@@ -1,0 +1,77 @@
+"""Isotropic linear elasticity in the plane."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+
+class Plane(enum.Enum):
+    """The two plane states: strain (long bodies) and stress (thin plates)."""
+
+    STRAIN = "strain"
+    STRESS = "stress"
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic elastic material in a plane state.
+
+    Parameters
+    ----------
+    youngs_modulus : float [Pa]
+        Positive and finite.
+    poisson_ratio : float [-]
+        Larger than -1 and at most 1/2; 1/2 is incompressible, which boundary integrals allow.
+    plane : Plane
+        Plane strain unless said otherwise.
+
+    Raises
+    ------
+    ValueError
+        If a modulus is not positive and finite or Poisson's ratio lies outside (-1, 1/2].
+
+    Notes
+    -----
+    Plane stress is plane strain with nu -> nu / (1 + nu) at the same shear modulus, so every
+    operator reads only `shear_modulus` and `effective_poisson_ratio`.
+    """
+
+    youngs_modulus: float
+    poisson_ratio: float
+    plane: Plane = Plane.STRAIN
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0.0):
+            msg = f"youngs_modulus is {self.youngs_modulus}: give a positive, finite number of pascals"
+            raise ValueError(msg)
+        if not -1.0 < self.poisson_ratio <= 0.5:
+            msg = f"poisson_ratio is {self.poisson_ratio}: it must lie in (-1, 0.5]"
+            raise ValueError(msg)
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus mu [Pa]."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def effective_poisson_ratio(self) -> float:
+        """The Poisson ratio [-] of the plane-strain formulas."""
+        if self.plane is Plane.STRESS:
+            return self.poisson_ratio / (1.0 + self.poisson_ratio)
+        return self.poisson_ratio
+
+    @property
+    def kappa(self) -> float:
+        """Kolosov's constant [-]: 3 - 4 nu in plane strain, (3 - nu) / (1 + nu) in plane stress."""
+        return 3.0 - 4.0 * self.effective_poisson_ratio
+
+    @property
+    def plane_modulus(self) -> float:
+        """E' [Pa]: E / (1 - nu^2) in plane strain, E in plane stress."""
+        return 2.0 * self.shear_modulus / (1.0 - self.effective_poisson_ratio)
+
+    def scaled(self, stress: float) -> Material:
+        """Return the same material when stresses are measured in units of `stress` [Pa]."""
+        return Material(self.youngs_modulus / stress, self.poisson_ratio, self.plane)

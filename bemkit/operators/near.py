@@ -1,0 +1,178 @@
+"""Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
+from bemkit.operators import kernels
+from bemkit.operators.pairs import Degrees, PairIntegrals
+from bemkit.operators.panels import Panels
+
+SEPARATION = 3.0
+"""A piece of the test element is integrated once every singular point is this many of its half lengths from its centre."""
+N_REGULAR = 10
+N_TOUCHING = 20
+MAX_SPLITS = 60
+"""Pieces shorter than 2**-60 of an element carry nothing that a double can hold."""
+
+
+def integrate_separated(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray, n_points: int) -> PairIntegrals:
+    """Integrate pairs with an outer Gauss rule on the whole test element.
+
+    Parameters
+    ----------
+    panels : Panels
+    degrees : Degrees
+    test, trial : (n,) arrays
+        Element numbers of the pairs.
+    n_points : int
+        Outer points.
+    """
+    result = PairIntegrals.zeros(degrees, (test.size,))
+    points, weights = gauss_legendre(n_points)
+    for xi, weight in zip(points, weights, strict=True):
+        node = panels.start if xi < 0 else panels.end
+        offset = panels.tangent[test] * panels.half[test] * (xi + 1.0 if xi < 0 else xi - 1.0)
+        _add_points(result, panels, trial, node[test], offset, degrees, np.full(test.size, weight), np.full(test.size, xi))
+    result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
+    return result
+
+
+def integrate_near(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
+    """Integrate close or touching pairs: the test element is split until each piece is well away from both singular points.
+
+    Parameters and result as in `integrate_separated`.
+
+    Notes
+    -----
+    Each half of the test element is measured from its own end node, so that the distance to a shared node, and to a node at any
+    small distance from it, is exact however small the piece.
+    """
+    result = PairIntegrals.zeros(degrees, (test.size,))
+    pair = np.arange(test.size)
+    for at_start in (True, False):
+        pieces = _split(panels, test, trial, at_start)
+        for n_points, chosen in ((N_REGULAR, ~pieces.touches), (N_TOUCHING, pieces.touches)):
+            _integrate_pieces(result, panels, degrees, (test, trial, pair), pieces.select(chosen), n_points, at_start)
+    result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
+    return result
+
+
+class _Pieces:
+    """Pieces [low, high] of test elements, as fractions of the length from one end node."""
+
+    def __init__(self, pair: IntArray, low: FloatArray, high: FloatArray, touches: BoolArray) -> None:
+        self.pair, self.low, self.high, self.touches = pair, low, high, touches
+
+    def select(self, chosen: BoolArray) -> _Pieces:
+        return _Pieces(self.pair[chosen], self.low[chosen], self.high[chosen], self.touches[chosen])
+
+
+def _split(panels: Panels, test: IntArray, trial: IntArray, at_start: bool) -> _Pieces:
+    """Bisect one half of each test element until every piece may be integrated by a single rule."""
+    node = (panels.start if at_start else panels.end)[test]
+    number = (panels.start_node if at_start else panels.end_node)[test]
+    step = panels.tangent[test] * (2.0 * panels.half[test] * (1.0 if at_start else -1.0))
+    to_a, to_b = node - panels.start[trial], node - panels.end[trial]
+    meets_a, meets_b = number == panels.start_node[trial], number == panels.end_node[trial]
+    pair = np.arange(test.size)
+    low, high = np.zeros(test.size), np.full(test.size, 0.5)
+    done: list[_Pieces] = []
+    for split in range(MAX_SPLITS + 1):
+        centre = step[pair] * (0.5 * (low + high))
+        reach = SEPARATION * panels.half[test[pair]] * (high - low)
+        at_node = low == 0.0
+        a_is_clear, b_is_clear = np.abs(to_a[pair] + centre) >= reach, np.abs(to_b[pair] + centre) >= reach
+        touches = at_node & (meets_a | meets_b)[pair]
+        ready = (a_is_clear | (at_node & meets_a[pair])) & (b_is_clear | (at_node & meets_b[pair]))
+        if split == MAX_SPLITS:
+            ready[:] = True
+        done.append(_Pieces(pair[ready], low[ready], high[ready], touches[ready]))
+        rest = ~ready
+        if not rest.any():
+            break
+        pair, low, high = pair[rest], low[rest], high[rest]
+        middle = 0.5 * (low + high)
+        pair, low, high = np.tile(pair, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
+    return _Pieces(*(np.concatenate([getattr(piece, name) for piece in done]) for name in ("pair", "low", "high", "touches")))
+
+
+def _integrate_pieces(
+    result: PairIntegrals,
+    panels: Panels,
+    degrees: Degrees,
+    pairs: tuple[IntArray, IntArray, IntArray],
+    pieces: _Pieces,
+    n_points: int,
+    at_start: bool,
+) -> None:
+    """Add the integrals over some pieces to their pairs."""
+    if not pieces.pair.size:
+        return
+    test, trial = pairs[0][pieces.pair], pairs[1][pieces.pair]
+    sums = PairIntegrals.zeros(degrees, (test.size,))
+    if n_points == N_TOUCHING:
+        points, weights = gauss_graded(n_points)
+    else:
+        reference, reference_weights = gauss_legendre(n_points)
+        points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
+    node = (panels.start if at_start else panels.end)[test]
+    step = panels.tangent[test] * (2.0 * panels.half[test] * (1.0 if at_start else -1.0))
+    length = pieces.high - pieces.low
+    for point, weight in zip(points, weights, strict=True):
+        fraction = pieces.low + point * length
+        xi = (2.0 * fraction - 1.0) * (1.0 if at_start else -1.0)
+        _add_points(sums, panels, trial, node, step * fraction, degrees, 2.0 * weight * length, xi)
+    for target, values in ((result.log, sums.log), (result.quotient, sums.quotient), (result.double, sums.double)):
+        for index in np.ndindex(*values.shape[:2]):
+            np.add.at(target[index], pieces.pair, values[index])
+
+
+def _add_points(
+    result: PairIntegrals,
+    panels: Panels,
+    trial: IntArray,
+    node: ComplexArray,
+    offset: ComplexArray,
+    degrees: Degrees,
+    weight: FloatArray,
+    xi: FloatArray,
+) -> None:
+    """Add one outer point for each pair, at `node + offset`."""
+    to_local = panels.to_local[trial]
+    plus = ((node - panels.start[trial]) + offset) * to_local
+    minus = ((node - panels.end[trial]) + offset) * to_local
+    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
+    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
+    result.add(weight, xi, moments, log_minus + log_plus, eta)
+
+
+def integrate_same(panels: Panels, degrees: Degrees, test: IntArray) -> PairIntegrals:
+    """Integrate elements against themselves: the double layer vanishes, the logarithm scales from the unit element."""
+    result = PairIntegrals.zeros(degrees, (test.size,))
+    for a in range(result.log.shape[0]):
+        for b in range(result.log.shape[1]):
+            result.log[a, b] = _unit_log(a, b)
+            result.quotient[a, b] = kernels.interval_moment(a) * kernels.interval_moment(b)
+    result.scale(panels.half[test], panels.half[test], panels.tangent[test])
+    return result
+
+
+@lru_cache(maxsize=64)
+def _unit_log(a: int, b: int) -> float:
+    """Return the integral of xi**a t**b log|xi - t| over [-1, 1]**2."""
+    points, weights = gauss_graded(40, 6)
+    total = 0.0
+    for sign in (-1.0, 1.0):  # two halves, each graded towards its end, where the inner integral is singular
+        near_end = points * sign
+        plus = np.where(sign < 0, points, 2.0 - points) + 0j
+        minus = np.where(sign < 0, points - 2.0, -points) + 0j
+        moments, log_minus, log_plus = kernels.near_moments(plus, minus, b + 1)
+        moments = [moment.real + 0j for moment in moments]
+        inner = kernels.log_moment(b, moments, log_minus + log_plus)
+        total += float(np.sum(weights * (sign - near_end) ** a * inner))
+    return total

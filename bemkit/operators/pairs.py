@@ -1,0 +1,94 @@
+"""Requests for element-pair integrals, and the integrals themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators import kernels
+
+
+@dataclass(frozen=True)
+class Degrees:
+    """Highest powers (test, trial) of the local coordinates that are wanted; None leaves a family of integrals out."""
+
+    log: tuple[int, int] | None = None
+    double: tuple[int, int] | None = None
+
+    def __or__(self, other: Degrees) -> Degrees:
+        """Return the smallest request that covers both."""
+        return Degrees(_cover(self.log, other.log), _cover(self.double, other.double))
+
+    @property
+    def highest_moment(self) -> int:
+        """Highest T_k that the inner integrals need."""
+        log = 0 if self.log is None else self.log[1] + 1
+        return max(1, log, 0 if self.double is None else self.double[1])
+
+
+def _cover(one: tuple[int, int] | None, two: tuple[int, int] | None) -> tuple[int, int] | None:
+    if one is None or two is None:
+        return one if two is None else two
+    return max(one[0], two[0]), max(one[1], two[1])
+
+
+@dataclass(frozen=True, eq=False)
+class PairIntegrals:
+    """The integrals of some element pairs; the first two axes are the powers (test, trial), the others the pairs."""
+
+    log: FloatArray
+    quotient: ComplexArray
+    double: FloatArray
+
+    @classmethod
+    def zeros(cls, degrees: Degrees, shape: tuple[int, ...]) -> PairIntegrals:
+        """Return integrals that are all zero."""
+        log = (0, 0) if degrees.log is None else (degrees.log[0] + 1, degrees.log[1] + 1)
+        double = (0, 0) if degrees.double is None else (degrees.double[0] + 1, degrees.double[1] + 1)
+        return cls(np.zeros(log + shape), np.zeros(log + shape, complex), np.zeros(double + shape))
+
+    def add(
+        self,
+        weight: FloatArray | float,
+        xi: FloatArray | float,
+        moments: list[ComplexArray],
+        log_product: FloatArray,
+        eta: FloatArray,
+    ) -> None:
+        """Add one outer point (or one point for each pair): `weight` at the test coordinate `xi`."""
+        for b in range(self.log.shape[1]):
+            inner = kernels.log_moment(b, moments, log_product)
+            inner_quotient = kernels.quotient_moment(b, moments, eta)
+            for a in range(self.log.shape[0]):
+                factor = weight * xi**a if a else weight
+                self.log[a, b] += factor * inner
+                self.quotient[a, b] += factor * inner_quotient
+        for b in range(self.double.shape[1]):
+            for a in range(self.double.shape[0]):
+                self.double[a, b] += (weight * xi**a / (2.0 * np.pi)) * moments[b].imag
+
+    def scale(self, test_half: FloatArray, half: FloatArray, tangent: ComplexArray) -> None:
+        """Turn sums for half lengths 1 and a real trial axis into the integrals of the elements themselves."""
+        log_half = np.log(half)
+        for a in range(self.log.shape[0]):
+            for b in range(self.log.shape[1]):
+                constant = kernels.interval_moment(a) * kernels.interval_moment(b)
+                if constant:
+                    self.log[a, b] += constant * log_half
+        if self.log.size:
+            self.log[:] *= test_half * half
+            self.quotient[:] *= test_half * (half * tangent * tangent)
+        if self.double.size:
+            self.double[:] *= test_half
+
+    def put(self, rows: IntArray, columns: IntArray, other: PairIntegrals) -> None:
+        """Overwrite the pairs (rows, columns) with those of `other`."""
+        self.log[:, :, rows, columns] = other.log
+        self.quotient[:, :, rows, columns] = other.quotient
+        self.double[:, :, rows, columns] = other.double
+
+    def take(self, chosen: slice) -> PairIntegrals:
+        """Return some of the listed pairs."""
+        return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])

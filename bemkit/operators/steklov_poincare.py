@@ -1,0 +1,311 @@
+"""Steklov-Poincare maps: from the displacement of the boundary to its tractions, by Galerkin or by collocation.
+
+Both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map does. Discretisation alone would
+break it slightly, and with it the independence of the arbitrary constant in the logarithm of the single layer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points, dof_weights
+from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
+from bemkit.operators.collocation import collocation_matrices
+from bemkit.operators.dense import Cholesky, DenseLU, multiply
+from bemkit.operators.material import Material
+from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.rigid import rigid_motions
+
+Field = Callable[[FloatArray], FloatArray]
+"""A vector field: (n, 2) points [m] -> (n, 2) values."""
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedMap:
+    """A body reduced to its open directions: force = stiffness @ displacement - load.
+
+    Parameters
+    ----------
+    stiffness : (n_open, n_open) array
+        In weak form (forces, not tractions).
+    load : (n_open,) array
+        What the given loads and supports press onto the open directions.
+    recover : callable
+        (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x and y.
+    """
+
+    stiffness: FloatArray
+    load: FloatArray
+    recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+class SteklovPoincare(Protocol):
+    """The elastic body seen from its boundary: weak forces = matrix @ displacements."""
+
+    @property
+    def displacement_space(self) -> BoundarySpace:
+        """The space of the displacements; its nodes carry the forces."""
+
+    def matrix(self) -> FloatArray:
+        """Return the weak (n_dofs, n_dofs) matrix [Pa]; rigid motions are in its kernel and in that of its transpose."""
+
+    def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
+        """Return the (n_nodes, 2) nodal forces [N/m] of a traction field [Pa] on some elements."""
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the (n_elements, 2) mean tractions [Pa] that belong to a solution as `CondensedMap.recover` gives it."""
+
+
+class GalerkinMap:
+    """Symmetric Galerkin: S = W + (1/2 M + K)^T V^-1 (1/2 M + K), with tractions in exact equilibrium.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    displacement_space, traction_space : BoundarySpace, optional
+        Continuous linear displacements and piecewise constant tractions unless given.
+
+    Notes
+    -----
+    Paper, eq. (28). V is inverted on the tractions that exert no resultant force and moment, which makes S independent of the constant
+    in the logarithm; S is symmetric, and positive definite on displacements without rigid motions.
+    """
+
+    def __init__(
+        self,
+        mesh: BoundaryMesh,
+        material: Material,
+        displacement_space: BoundarySpace | None = None,
+        traction_space: BoundarySpace | None = None,
+    ) -> None:
+        self.mesh = mesh
+        self.material = material
+        self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
+        self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
+
+    @cached_property
+    def _traction_solver(self) -> tuple[Cholesky, FloatArray, FloatArray, FloatArray]:
+        """Factor V; return it with L^-1 B, and with the part of it that carries resultants, already orthonormal."""
+        u, t = self.displacement_space, self.traction_space
+        v, k, w = single_layer(t, t, self.material), double_layer(u, t, self.material), hypersingular(u, u, self.material)
+        assemble(v, k, w)
+        identity = mass(u, t).matrix()
+        factor = Cholesky(v.matrix(), "the single layer operator")
+        motions = rigid_motions(dof_points(u), self.mesh.centre, self.mesh.diameter).reshape(u.n_dofs, 3)
+        lower = factor.solve_lower(0.5 * identity + k.matrix())
+        resultant, _ = np.linalg.qr(factor.solve_lower(multiply(identity, motions)))
+        lower -= multiply(resultant, multiply(resultant.T, lower))
+        return factor, lower, resultant, w.matrix()
+
+    @cached_property
+    def _matrix(self) -> FloatArray:
+        from scipy.linalg.blas import dsyrk
+
+        _, lower, _, w = self._traction_solver
+        matrix: FloatArray = 0.5 * (w + w.T)
+        product = dsyrk(1.0, lower, trans=1, lower=1)
+        matrix += product
+        matrix += np.tril(product, -1).T
+        read_only(matrix)
+        return matrix
+
+    def matrix(self) -> FloatArray:
+        """Return the weak, symmetric (n_dofs, n_dofs) matrix [Pa]."""
+        return self._matrix
+
+    def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
+        """Return the consistent nodal forces of a traction field on some elements."""
+        return _integrate(self.displacement_space, elements, traction)
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Eliminate every direction that is not open by a Schur complement."""
+        n = force.shape[0]
+        matrix = _rotate_rows(_rotate_columns(self.matrix(), conditions.frame), conditions.frame)
+        local_force = np.einsum("nkc,nc->nk", conditions.frame, force).ravel()
+        free, is_open, fixed = (np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed))
+        prescribed = conditions.displacement.ravel()[fixed]
+        factor = Cholesky(matrix[np.ix_(free, free)], "the body held by its supports and its contact boundary")
+        rest = local_force[free] - matrix[np.ix_(free, fixed)] @ prescribed
+        coupling = matrix[np.ix_(free, is_open)]
+        solved = factor.solve(np.column_stack([rest, coupling]))
+        at_rest, response = solved[:, 0], solved[:, 1:]
+        stiffness = matrix[np.ix_(is_open, is_open)] - multiply(coupling.T, response)
+        load = local_force[is_open] - matrix[np.ix_(is_open, fixed)] @ prescribed - coupling.T @ at_rest
+
+        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            local = np.empty(2 * n)
+            local[fixed] = prescribed
+            local[is_open] = open_displacement
+            local[free] = at_rest - response @ open_displacement
+            displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(n, 2))
+            return displacement, (self.matrix() @ displacement.ravel()).reshape(n, 2)
+
+        return CondensedMap(0.5 * (stiffness + stiffness.T), load, recover)
+
+    def tractions(self, displacement: FloatArray) -> FloatArray:
+        """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m]."""
+        factor, lower, _, _ = self._traction_solver
+        return factor.solve_upper(lower @ displacement.ravel()).reshape(-1, 2)
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
+        points, weights = gauss_legendre(self.traction_space.degree + 1)
+        mean = self.traction_space.basis(points) @ weights / 2.0
+        return np.einsum("p,epc->ec", mean, self.tractions(displacement)[self.traction_space.element_dofs])
+
+
+class CollocationMap:
+    """Direct collocation with constant elements at their midpoints, (1/2 + T) u = U t, with tractions in exact equilibrium.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+
+    Notes
+    -----
+    The paper's discretisation. Plain collocation satisfies the equilibrium of forces and moments, and the absence of tractions under a
+    rotation, only up to the discretisation error. Here a rigid motion c is added to the equations and the resultants of the tractions
+    are set to zero (c vanishes with the mesh size), and the double layer is projected so that it treats all rigid motions exactly. Both
+    corrections are of the order of the discretisation error.
+    """
+
+    def __init__(self, mesh: BoundaryMesh, material: Material) -> None:
+        self.mesh = mesh
+        self.material = material
+        self.displacement_space = ConstantSpace(mesh)
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        """Length of the element of each dof."""
+        return np.repeat(self.mesh.lengths, 2)
+
+    @cached_property
+    def _motions(self) -> FloatArray:
+        return rigid_motions(self.mesh.centres, self.mesh.centre, self.mesh.diameter).reshape(-1, 3)
+
+    @cached_property
+    def _matrices(self) -> tuple[FloatArray, FloatArray]:
+        """The single layer U, and 1/2 + T made exact on rigid motions."""
+        single, double = collocation_matrices(self.mesh, self.material)
+        double[np.diag_indices_from(double)] += 0.5
+        weighted = self._weights[:, None] * self._motions
+        gram = self._motions.T @ weighted
+        double -= multiply(multiply(double, self._motions), np.linalg.solve(gram, weighted.T))
+        return single, double
+
+    @cached_property
+    def _matrix(self) -> FloatArray:
+        single, double = self._matrices
+        factor = DenseLU(self._bordered(single, np.ones(single.shape[1], bool), self._motions), "the single layer operator")
+        tractions = factor.solve(np.vstack([double, np.zeros((3, double.shape[1]))]))[:-3]
+        matrix: FloatArray = self._weights[:, None] * tractions
+        read_only(matrix)
+        return matrix
+
+    def matrix(self) -> FloatArray:
+        """Return the weak (n_dofs, n_dofs) matrix [Pa]; it is not symmetric."""
+        return self._matrix
+
+    def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
+        """Return the resultants of a traction field on the elements."""
+        return _integrate(self.displacement_space, elements, traction)
+
+    def _bordered(self, columns: FloatArray, is_traction: np.ndarray, motions: FloatArray) -> FloatArray:  # type: ignore[type-arg]
+        """Border a system with the rigid motion c and the resultants of its traction unknowns (all scaled by the mean length)."""
+        n = columns.shape[0]
+        bordered = np.zeros((n + 3, n + 3), order="F")
+        bordered[:n, :n] = columns
+        bordered[:n, n:] = self._motions
+        scale = self._weights / self._weights.mean()
+        bordered[n:, :n] = np.where(is_traction, (scale[:, None] * motions).T, 0.0)
+        return bordered
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Exchange columns so that the unknowns of the free, fixed and open directions stand on the left, and solve once."""
+        n = force.shape[0]
+        single, double = (_rotate_columns(matrix, conditions.frame) for matrix in self._matrices)
+        motions = _rotate_columns(self._motions.T, conditions.frame).T
+        traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / self._weights
+        free, is_open, fixed = (np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed))
+        prescribed = conditions.displacement.ravel()[fixed]
+        is_traction = ~conditions.is_free.ravel()
+        factor = DenseLU(
+            self._bordered(np.where(is_traction, -single, double), is_traction, motions),
+            "the body held by its supports and its contact boundary",
+        )
+        right = np.zeros((2 * n + 3, 1 + is_open.size), order="F")
+        right[:-3, 0] = single[:, free] @ traction[free] - double[:, fixed] @ prescribed
+        scale = self._weights / self._weights.mean()
+        right[-3:, 0] = -(scale[free, None] * motions[free]).T @ traction[free]
+        right[:-3, 1:] = -double[:, is_open]
+        solved = factor.solve(right)
+        at_rest, response = solved[:-3, 0], solved[:-3, 1:]
+        weights = self._weights[is_open]
+        stiffness = weights[:, None] * response[is_open]
+        load = weights * (traction[is_open] - at_rest[is_open])
+
+        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            unknowns = at_rest + response @ open_displacement
+            local = np.where(is_traction, 0.0, unknowns)
+            local[fixed] = prescribed
+            local[is_open] = open_displacement
+            local_force = self._weights * np.where(is_traction, unknowns, traction)
+            to_plane = conditions.frame
+            displacement = np.einsum("nkc,nk->nc", to_plane, local.reshape(n, 2))
+            return displacement, np.einsum("nkc,nk->nc", to_plane, local_force.reshape(n, 2))
+
+        return CondensedMap(stiffness, load, recover)
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the (n_elements, 2) tractions."""
+        return force / self.mesh.lengths[:, None]
+
+
+def _integrate(space: BoundarySpace, elements: IntArray, field: Field) -> FloatArray:
+    """Integrate a vector field against the scalar basis functions of a space over some elements."""
+    points, weights = gauss_legendre(space.degree + 5)  # exact for tractions up to the ninth power of the coordinates
+    places = space.mesh.points(elements, points)
+    values = field(places.reshape(-1, 2)).reshape(places.shape)
+    measure = space.mesh.jacobian(elements, points) * weights
+    local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
+    result = np.zeros((space.n_dofs // 2, 2))
+    np.add.at(result, space.element_dofs[elements], local)
+    return result
+
+
+def _rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
+    """Express the columns (2 * node + component) in the frames of the nodes."""
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    if not turned.size:
+        return matrix
+    result = matrix.copy()
+    blocks = result.reshape(matrix.shape[0], -1, 2)
+    blocks[:, turned] = np.einsum("mnc,nkc->mnk", matrix.reshape(blocks.shape)[:, turned], frame[turned])
+    return result
+
+
+def _rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
+    """Express the rows (2 * node + component) in the frames of the nodes."""
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    if not turned.size:
+        return matrix
+    result = matrix.copy()
+    blocks = result.reshape(-1, 2, matrix.shape[1])
+    blocks[turned] = np.einsum("ncm,nkc->nkm", matrix.reshape(blocks.shape)[turned], frame[turned])
+    return result
+
+
+__all__ = ["CollocationMap", "CondensedMap", "GalerkinMap", "SteklovPoincare", "dof_weights"]

@@ -1,0 +1,126 @@
+"""Where the command line sends a solution: result file, JSON, CSV and figures."""
+
+from __future__ import annotations
+
+import io
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.solution import Solution
+from bemkit.tables import CSV_STARTS, to_json, write_csv
+
+STDOUT = "-"
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The wishes for output; each may be left out.
+
+    Parameters
+    ----------
+    result : Path or None
+        HDF5 file.
+    json, csv : str or None
+        File names, or ``"-"`` for standard output.
+    table : str
+        Which table the CSV holds, see `bemkit.tables.write_csv`.
+    plots : Path or None
+        Folder for figures.
+    """
+
+    result: Path | None = None
+    json: str | None = None
+    csv: str | None = None
+    table: str = "contact"
+    plots: Path | None = None
+
+    @property
+    def uses_stdout(self) -> bool:
+        """Whether standard output is taken by data, so that nothing else may be printed there."""
+        return STDOUT in (self.json, self.csv)
+
+    def check(self) -> None:
+        """Find out, before any work is done, whether everything can be written.
+
+        Raises
+        ------
+        OutputFileError
+            If a file or folder cannot be written, something of another kind stands in the way, two outputs go to one
+            place, or a package for figures is missing.
+        """
+        places = [str(place) for place in (self.result, self.json, self.csv) if place is not None]
+        if len(set(places)) < len(places):
+            raise OutputFileError(f"two outputs go to the same place ({', '.join(places)}): give each its own")
+        if self.result is not None:
+            from bemkit.io import check_result_target
+
+            check_result_target(self.result)
+        if self.json not in (None, STDOUT):
+            check_target(Path(str(self.json)), "JSON file", _is_json)
+        if self.csv not in (None, STDOUT):
+            check_target(Path(str(self.csv)), f"CSV file of the {self.table} table", self._is_csv)
+        if self.plots is not None:
+            self._check_plots(self.plots)
+
+    def write(self, solution: Solution) -> None:
+        """Write everything that is wanted.
+
+        Parameters
+        ----------
+        solution : Solution
+
+        Raises
+        ------
+        OutputFileError
+            If something cannot be written.
+        SceneError
+            If the scene cannot be part of a result file.
+        """
+        if self.result is not None:
+            from bemkit.io import write_result
+
+            write_result(self.result, solution)
+        if self.json is not None:
+            _write_text(self.json, to_json(solution) + "\n")
+        if self.csv is not None:
+            stream = io.StringIO()
+            write_csv(solution, self.table, stream)
+            _write_text(self.csv, stream.getvalue())
+        if self.plots is not None:
+            from bemkit.plotting import save_figures
+
+            save_figures(solution, self.plots)
+
+    def _is_csv(self, path: Path) -> bool:
+        return _begins_with(path, CSV_STARTS[self.table])
+
+    @staticmethod
+    def _check_plots(folder: Path) -> None:
+        if find_spec("matplotlib") is None:
+            raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
+        if folder.exists() and not folder.is_dir():
+            raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
+        # any file in the folder, existing or not, could be written if this one can
+        inside = folder / "deformation.png" if folder.exists() else folder
+        check_target(inside, "figure", lambda path: _begins_with(path, "\x89PNG"))
+
+
+def _is_json(path: Path) -> bool:
+    return _begins_with(path, "{")
+
+
+def _begins_with(path: Path, start: str) -> bool:
+    expected = start.encode("latin-1")
+    with path.open("rb") as stream:
+        return stream.read(len(expected)) == expected
+
+
+def _write_text(place: str, text: str) -> None:
+    if place == STDOUT:
+        sys.stdout.write(text)
+        return
+    with replacing(Path(place).resolve()) as temporary:
+        temporary.write_text(text, encoding="utf-8")

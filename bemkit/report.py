@@ -1,0 +1,146 @@
+"""What the command line prints for people: the summary, the plan and the convergence table."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bemkit.kinds import DISCRETISATIONS, SOLVERS
+from bemkit.plan import Plan
+from bemkit.solution import Solution
+from bemkit.solvers.base import StepRecord
+
+_MANY_TRANSITIONS = 12
+
+
+def print_summary(solution: Solution, console: Console | None = None) -> None:
+    """Print a solution as a compact table.
+
+    Parameters
+    ----------
+    solution : Solution
+    console : rich.console.Console, optional
+        Standard output by default.
+    """
+    console = Console(highlight=False) if console is None else console
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in _summary_rows(solution):
+        table.add_row(name, value)
+    console.print(Text(solution.scene.title, style="bold"))
+    console.print(table)
+
+
+def print_plan(title: str, plan: Plan) -> None:
+    """Print what a scene needs and what it leaves out."""
+    console = Console(highlight=False)
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table.add_column("")
+    table.add_column("item", overflow="fold")
+    table.add_column("why", overflow="fold")
+    table.add_column("memory", justify="right", no_wrap=True)
+    for item in plan.items:
+        style = "" if item.is_needed else "dim"
+        mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
+        size = format_size(item.size) if item.size else ""
+        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style), size)
+    console.print(Text(title, style="bold"))
+    console.print(table)
+    console.print(f"memory about {format_size(plan.memory)}")
+
+
+class ConvergenceTable:
+    """Prints one line per step of the solver as it happens; give it to `bemkit.run` as callback.
+
+    Parameters
+    ----------
+    console : rich.console.Console, optional
+        Standard error by default.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = Console(stderr=True, highlight=False) if console is None else console
+        self._has_header = False
+
+    def __call__(self, record: StepRecord) -> None:
+        """Print a line."""
+        if not self._has_header:
+            header = (
+                f"{'step':>4}  {'solves':>6}  {'separated':>9}  {'stick':>6}  {'slip':>6}  {'changed':>7}  {'worst':>8}"
+            )
+            self._console.print(Text(header, style="bold"))
+            self._has_header = True
+        line = (
+            f"{record.step:4d}  {record.linear_solves:6d}  {record.n_separated:9d}  {record.n_stick:6d}  "
+            f"{record.n_slip:6d}  {record.n_changed:7d}  {record.certificate.worst:8.1e}"
+        )
+        self._console.print(Text(f"{line}  {record.message}".rstrip()))
+
+
+def format_size(n_bytes: int) -> str:
+    """Return a memory size in words such as ``3.3 MB``."""
+    size = float(n_bytes)
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"
+
+
+def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
+    counts = Counter(solution.contact.status_words())
+    certificate = solution.certificate
+    worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
+    timings = ", ".join(f"{name} {value:.2f} s" for name, value in solution.timings.items() if name != "total")
+    status = Text(
+        solution.status.name.lower().replace("_", " "), style="bold green" if solution.is_converged else "bold red"
+    )
+    if not solution.is_converged:
+        status.append(f": {solution.message or solution.status.value}", style="not bold")
+    discretisation = DISCRETISATIONS.kind_of(solution.scene.discretisation)
+    rows = [
+        ("status", status),
+        ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
+        (
+            "contact nodes",
+            Text(
+                f"{solution.contact.n_contact}: {counts['separated']} separated, {counts['slip']} slip, "
+                f"{counts['stick']} stick"
+            ),
+        ),
+        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
+        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
+        ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
+        ("transitions", Text("\n".join(_transition_lines(solution)))),
+        ("linear solves", Text(f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})")),
+        ("certificate", Text(f"worst entry {certificate.worst:.1e} ({worst_name.replace('_', ' ')})")),
+        ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
+    ]
+    return rows
+
+
+def _nan_first(value: float) -> float:
+    return value if value == value else float("inf")
+
+
+def _solver_name(solution: Solution) -> str:
+    try:
+        return SOLVERS.kind_of(solution.scene.solver)
+    except ValueError:  # a class of one's own
+        return type(solution.scene.solver).__name__
+
+
+def _transition_lines(solution: Solution) -> list[str]:
+    lines = [
+        f"{item.part}: {item.from_status} to {item.to_status} at ({item.x:.6g}, {item.y:.6g}), s = {item.s:.6g}"
+        for item in solution.transitions[:_MANY_TRANSITIONS]
+    ]
+    n_more = len(solution.transitions) - len(lines)
+    if n_more > 0:
+        lines.append(f"and {n_more} more (--csv -)")
+    return lines or ["none"]

@@ -1,0 +1,306 @@
+"""What the user states: the body, its boundary parts, loads, obstacles, the friction law, mesh and solver.
+
+Everything here is a frozen value. A scene can be written in Python or as a TOML file (`bemkit.scenefile`), and either
+form can be turned into the other. All quantities are in one consistent set of units, for example m, N and Pa.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.laws import FrictionLaw, Frictionless
+from bemkit.contact.obstacle import Obstacle
+from bemkit.expression import Expression, ScalarField, check_field, closest, evaluate_field
+from bemkit.geometry.discretise import discretise
+from bemkit.geometry.grading import Grading, Uniform
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.shapes import Shape
+from bemkit.operators.material import Material
+from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.ssn import SemismoothNewton
+
+Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
+"""A condition on the coordinates, such as ``Expression("x > 0.5")``."""
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """Both displacement components are zero."""
+
+
+@dataclass(frozen=True)
+class Roller:
+    """The normal displacement and the tangential traction are zero (also the condition on a symmetry line)."""
+
+
+@dataclass(frozen=True)
+class PrescribedDisplacement:
+    """Displacement components are given; a component that is left out is free of traction.
+
+    Parameters
+    ----------
+    x, y : float, Expression, callable or None [m]
+
+    Raises
+    ------
+    ValueError
+        If both are left out, or one is not a finite number, a formula or a function.
+    """
+
+    x: ScalarField | None = None
+    y: ScalarField | None = None
+
+    def __post_init__(self) -> None:
+        if self.x is None and self.y is None:
+            raise ValueError("neither x nor y is given: give at least one displacement component, such as y = -0.01")
+        for name in ("x", "y"):
+            if getattr(self, name) is not None:
+                check_field(getattr(self, name), name)
+
+    @property
+    def is_prescribed(self) -> tuple[bool, bool]:
+        """Which of the components x and y are given."""
+        return self.x is not None, self.y is not None
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement at (n, 2) points [m] as an (n, 2) array [m]; free components are zero."""
+        components = [np.zeros(len(points)) if value is None else evaluate_field(value, points) for value in self._xy]
+        return np.stack(components, axis=1)
+
+    @property
+    def _xy(self) -> tuple[ScalarField | None, ScalarField | None]:
+        return self.x, self.y
+
+
+@dataclass(frozen=True)
+class Traction:
+    """A load per area in the directions x and y.
+
+    Parameters
+    ----------
+    x, y : float, Expression or callable [Pa]
+
+    Raises
+    ------
+    ValueError
+        If one is not a finite number, a formula or a function.
+    """
+
+    x: ScalarField = 0.0
+    y: ScalarField = 0.0
+
+    def __post_init__(self) -> None:
+        check_field(self.x, "x")
+        check_field(self.y, "y")
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the traction at (n, 2) points [m] as an (n, 2) array [Pa]; the normals do not matter."""
+        return np.stack([evaluate_field(self.x, points), evaluate_field(self.y, points)], axis=1)
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A load against the outward normal, and optionally along the boundary.
+
+    Parameters
+    ----------
+    pressure : float, Expression or callable [Pa]
+        Positive when it pushes the body inwards.
+    shear : float, Expression or callable [Pa]
+        Positive along the anticlockwise traversal of the boundary.
+
+    Raises
+    ------
+    ValueError
+        If one is not a finite number, a formula or a function.
+    """
+
+    pressure: ScalarField
+    shear: ScalarField = 0.0
+
+    def __post_init__(self) -> None:
+        check_field(self.pressure, "pressure")
+        check_field(self.shear, "shear")
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
+        tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+        pressure = evaluate_field(self.pressure, points)[:, None]
+        return evaluate_field(self.shear, points)[:, None] * tangents - pressure * normals
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The part may touch a rigid obstacle, with the friction law of the scene.
+
+    Parameters
+    ----------
+    obstacle : Obstacle
+    """
+
+    obstacle: Obstacle
+
+
+Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
+
+
+@dataclass(frozen=True)
+class Part:
+    """A named piece of the boundary with its condition.
+
+    Parameters
+    ----------
+    name : str
+    condition : Condition
+    sides : tuple of str
+        Names of sides of the shape; empty means all sides.
+    where : Expression, callable or None
+        Keeps only the points where it is true; the ends are found to round-off and become mesh nodes.
+
+    Raises
+    ------
+    ValueError
+        If the name is empty, or `where` is not a condition.
+    """
+
+    name: str
+    condition: Condition
+    sides: tuple[str, ...] = ()
+    where: Region | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name or not self.name.isprintable():
+            raise ValueError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
+        if isinstance(self.where, Expression) and not self.where.is_condition:
+            raise ValueError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
+
+    @property
+    def selection(self) -> Selection:
+        """The piece of the outline that the part covers."""
+        return Selection(sides=self.sides, where=self.where)
+
+
+@dataclass(frozen=True)
+class LinearGalerkin:
+    """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
+
+
+@dataclass(frozen=True)
+class ConstantCollocation:
+    """Direct collocation with displacements and tractions constant on each element, as in the source paper."""
+
+
+Discretisation: TypeAlias = LinearGalerkin | ConstantCollocation
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """How the boundary is divided.
+
+    Parameters
+    ----------
+    elements : int
+        Number of boundary elements in total.
+    grading : Grading
+        Distribution along each piece between corners and ends of parts.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than 3 elements or more than a million.
+    """
+
+    elements: int = 320
+    grading: Grading = field(default_factory=Uniform)
+
+    def __post_init__(self) -> None:
+        if not 3 <= self.elements <= 1_000_000:
+            raise ValueError(f"elements is {self.elements}: give a number from 3 to 1000000")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One contact problem: everything that determines its solution.
+
+    Boundary that belongs to no part is free of traction.
+
+    Parameters
+    ----------
+    title : str
+    shape : Shape
+    material : Material
+    parts : tuple of Part
+        At least one of them in contact. They must not overlap (checked when the boundary is divided).
+    law : FrictionLaw
+    discretisation : Discretisation
+    mesh : MeshOptions
+    solver : ContactSolver
+    description, reference : str
+        For the reader: what the scene shows and where it comes from.
+
+    Raises
+    ------
+    ValueError
+        If the title is empty, no part is in contact, two parts share a name, or a part names an unknown side.
+    GeometryError
+        If the outline of the shape is not a valid boundary.
+    """
+
+    title: str
+    shape: Shape
+    material: Material
+    parts: tuple[Part, ...]
+    law: FrictionLaw = field(default_factory=Frictionless)
+    discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    mesh: MeshOptions = field(default_factory=MeshOptions)
+    solver: ContactSolver = field(default_factory=SemismoothNewton)
+    description: str = ""
+    reference: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.title or not self.title.isprintable():
+            raise ValueError(f"title is {self.title!r}: give one line of printable text")
+        repeated = [name for name, count in Counter(part.name for part in self.parts).items() if count > 1]
+        if repeated:
+            raise ValueError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
+        if not self.contact_parts:
+            raise ValueError("parts: no part is in contact: give one part the condition 'contact' with an obstacle")
+        names = [side.name for loop in self.shape.outline().loops for side in loop]
+        for part in self.parts:
+            for side in part.sides:
+                if side not in names:
+                    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+                    raise ValueError(
+                        f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
+                    )
+
+    @property
+    def contact_parts(self) -> tuple[Part, ...]:
+        """The parts that may touch an obstacle."""
+        return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    def build_mesh(self) -> BoundaryMesh:
+        """Divide the boundary into elements, with one mesh part for each part of the scene.
+
+        Returns
+        -------
+        BoundaryMesh
+
+        Raises
+        ------
+        GeometryError
+            If parts overlap or are empty, or there are too few elements.
+        """
+        return discretise(
+            self.shape.outline(),
+            n_elements=self.mesh.elements,
+            parts={part.name: part.selection for part in self.parts},
+            grading=self.mesh.grading,
+        )

@@ -1,0 +1,294 @@
+"""The result of a scene: physical fields on the boundary, the summary, the plan and the timings.
+
+Everything is in the user's units and holds physical tractions only. Signs: outward normal n, tangent t along the
+anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 0, and u_n <= gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.contact.certificate import Certificate
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.plan import Plan
+from bemkit.scene import Scene
+from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.base import Status, StepRecord
+
+STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
+    {
+        NodeStatus.SEPARATED: "separated",
+        NodeStatus.STICK: "stick",
+        NodeStatus.SLIP_FORWARD: "slip",
+        NodeStatus.SLIP_BACKWARD: "slip",
+    }
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTable:
+    """One row per contact node, in order along each contact part.
+
+    Parameters
+    ----------
+    part : tuple of n_contact str
+        Name of the part each node belongs to.
+    x, y : (n_contact,) arrays [m]
+    s : (n_contact,) array [m]
+        Arc length from the start of the part.
+    u_n, u_t : (n_contact,) arrays [m]
+    sigma_n, sigma_t : (n_contact,) arrays [Pa]
+    gap : (n_contact,) array [m]
+        Initial distance to the obstacle along the normal; infinite where there is none in sight.
+    clearance : (n_contact,) array [m]
+        Distance left, ``gap - u_n``.
+    status : (n_contact,) array of `NodeStatus` values
+    weight : (n_contact,) array [m]
+        Length of boundary that the node stands for.
+
+    Raises
+    ------
+    ValueError
+        If the columns differ in length, or a status is not a `NodeStatus`.
+    """
+
+    part: tuple[str, ...]
+    x: FloatArray
+    y: FloatArray
+    s: FloatArray
+    u_n: FloatArray
+    u_t: FloatArray
+    sigma_n: FloatArray
+    sigma_t: FloatArray
+    gap: FloatArray
+    clearance: FloatArray
+    status: IntArray
+    weight: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, column in self.columns().items():
+            if column.shape != (len(self.part),):
+                raise ValueError(f"{name} has the shape {column.shape}: give ({len(self.part)},), one entry per node")
+            read_only(column)
+        wrong = np.flatnonzero(~np.isin(self.status, [int(status) for status in NodeStatus]))
+        if wrong.size:
+            raise ValueError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return len(self.part)
+
+    def columns(self) -> dict[str, FloatArray | IntArray]:
+        """Return the numerical columns by name."""
+        names = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
+        return {name: getattr(self, name) for name in names}
+
+    def status_words(self) -> list[str]:
+        """Return ``"separated"``, ``"slip"`` or ``"stick"`` for each node."""
+        return [STATUS_WORDS[NodeStatus(value)] for value in self.status.tolist()]
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryFields:
+    """Displacement and traction on the whole boundary.
+
+    Parameters
+    ----------
+    points : (n_points, 2) array [m]
+        Where the displacement is known, in mesh order: the mesh nodes (linear elements) or the element centres.
+    displacement : (n_points, 2) array [m]
+    centres : (n_elements, 2) array [m]
+    traction : (n_elements, 2) array [Pa]
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit together.
+    """
+
+    points: FloatArray
+    displacement: FloatArray
+    centres: FloatArray
+    traction: FloatArray
+
+    def __post_init__(self) -> None:
+        for place, value in (("points", "displacement"), ("centres", "traction")):
+            shape = (len(getattr(self, place)), 2)
+            for name in (place, value):
+                array = getattr(self, name)
+                if array.shape != shape:
+                    raise ValueError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
+                read_only(array)
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A point of a contact part where the contact status changes.
+
+    Parameters
+    ----------
+    part : str
+    x, y : float [m]
+    s : float [m]
+        Arc length from the start of the part.
+    from_status, to_status : str
+        ``"separated"``, ``"slip"`` or ``"stick"``, in the direction of growing s.
+    """
+
+    part: str
+    x: float
+    y: float
+    s: float
+    from_status: str
+    to_status: str
+
+    def as_dict(self) -> dict[str, str | float]:
+        """Return the entries under the names of the results file."""
+        return {
+            "part": self.part,
+            "x": self.x,
+            "y": self.y,
+            "s": self.s,
+            "from": self.from_status,
+            "to": self.to_status,
+        }
+
+
+def find_transitions(contact: ContactTable) -> tuple[Transition, ...]:
+    """Find where the status changes along each contact part.
+
+    Parameters
+    ----------
+    contact : ContactTable
+
+    Returns
+    -------
+    tuple of Transition
+        In order. A change of the direction of slip alone is not a transition.
+
+    Notes
+    -----
+    Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
+    end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
+    at the transition; on the paper's examples this is within a quarter of the node distance. Where that says nothing,
+    as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
+    """
+    words = contact.status_words()
+    found = []
+    for i in range(contact.n_contact - 1):
+        if words[i] != words[i + 1] and _are_neighbours(contact, i):
+            s = _transition_place(contact, words, i)
+            rows = [k for k, part in enumerate(contact.part) if part == contact.part[i]]
+            x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
+            found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
+    return tuple(found)
+
+
+def _are_neighbours(contact: ContactTable, i: int) -> bool:
+    """Tell whether the nodes i and i + 1 follow each other on one piece of one part."""
+    distance = np.hypot(contact.x[i + 1] - contact.x[i], contact.y[i + 1] - contact.y[i])
+    # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
+    reach = (1.0 + 1e-9) * (contact.weight[i] + contact.weight[i + 1])
+    return contact.part[i] == contact.part[i + 1] and bool(distance <= reach)
+
+
+def _transition_place(contact: ContactTable, words: list[str], i: int) -> float:
+    """Return the arc length of the transition between the nodes i and i + 1; see `find_transitions`."""
+    looser = ("separated", "slip", "stick")
+    is_forward = looser.index(words[i]) < looser.index(words[i + 1])
+    last, tighter, before = (i, i + 1, i - 1) if is_forward else (i + 1, i, i + 2)
+    middle = float(contact.s[i] + contact.s[i + 1]) / 2.0
+    if not 0 <= before < contact.n_contact:
+        return middle
+    is_run = words[before] == words[last] and contact.part[before] == contact.part[last]
+    field = contact.clearance if words[last] == "separated" else np.abs(contact.u_t)
+    near, far = (float(field[node]) for node in (last, before))
+    if not is_run or not 0.0 <= near < far < np.inf:
+        return middle
+    slope = (near ** (2.0 / 3.0) - far ** (2.0 / 3.0)) / (contact.s[last] - contact.s[before])
+    distance = -(near ** (2.0 / 3.0)) / slope
+    step = contact.s[tighter] - contact.s[last]
+    return float(contact.s[last] + np.clip(distance / step, 0.0, 2.0) * step)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What `bemkit.run` returns and a result file holds.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : BoundaryMesh
+    status : Status
+    certificate : Certificate
+    contact : ContactTable
+    boundary : BoundaryFields
+    history : tuple of StepRecord
+    linear_solves, outer_steps : int
+    force_normal : float [N/m]
+        The total pressing force, positive: minus the integral of sigma_n.
+    force_tangential : float [N/m]
+        The total friction force on the body along the boundary tangent: the integral of sigma_t.
+    energy : float [J/m]
+        Elastic energy 1/2 a(u, u).
+    transitions : tuple of Transition
+    timings : mapping of str to float [s]
+    plan : Plan
+    """
+
+    scene: Scene
+    mesh: BoundaryMesh
+    status: Status
+    certificate: Certificate
+    contact: ContactTable
+    boundary: BoundaryFields
+    history: tuple[StepRecord, ...]
+    linear_solves: int
+    outer_steps: int
+    force_normal: float
+    force_tangential: float
+    energy: float
+    transitions: tuple[Transition, ...]
+    timings: Mapping[str, float]
+    plan: Plan
+    message: str = ""
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the solver vouches for the result."""
+        return self.status is Status.CONVERGED
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result without its fields, under the stable names of the JSON output.
+
+        Returns
+        -------
+        dict
+            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
+            ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
+            ``energy`` [J/m], ``transitions``, ``certificate``, ``timings`` [s], ``plan``.
+        """
+        return {
+            "title": self.scene.title,
+            "status": self.status.name.lower(),
+            "message": self.message or self.status.value,
+            "converged": self.is_converged,
+            "n_elements": self.mesh.n_elements,
+            "n_contact": self.contact.n_contact,
+            "linear_solves": self.linear_solves,
+            "outer_steps": self.outer_steps,
+            "force_normal": self.force_normal,
+            "force_tangential": self.force_tangential,
+            "energy": self.energy,
+            "transitions": [transition.as_dict() for transition in self.transitions],
+            "certificate": self.certificate.as_dict(),
+            "timings": dict(self.timings),
+            "plan": self.plan.as_dict(),
+        }

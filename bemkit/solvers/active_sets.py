@@ -1,0 +1,155 @@
+"""Active sets: which nodes are closed, and which of them slip which way."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.contact.problem import ContactProblem, ContactState
+
+
+class NodeStatus(IntEnum):
+    """What a contact node does."""
+
+    SEPARATED = 0
+    STICK = 1
+    SLIP_FORWARD = 2
+    """Slips along the tangent, ``u_t > 0``."""
+    SLIP_BACKWARD = 3
+    """Slips against the tangent, ``u_t < 0``."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActiveSets:
+    """The sets of Algorithm 2, node by node.
+
+    Parameters
+    ----------
+    is_closed : (n_contact,) bool array
+    direction : (n_contact,) array
+        +1 or -1 for slip along or against the tangent, 0 for stick.
+    """
+
+    is_closed: BoolArray
+    direction: IntArray
+
+    @property
+    def node_status(self) -> IntArray:
+        """(n_contact,) array of `NodeStatus` values."""
+        slipping = np.where(self.direction > 0, NodeStatus.SLIP_FORWARD, NodeStatus.SLIP_BACKWARD)
+        closed = np.where(self.direction == 0, NodeStatus.STICK, slipping)
+        return np.where(self.is_closed, closed, NodeStatus.SEPARATED).astype(np.intp)
+
+    @property
+    def key(self) -> bytes:
+        """A value that is equal for equal sets and only then."""
+        return self.is_closed.tobytes() + self.direction.astype(np.int8).tobytes()
+
+    def n_changed(self, other: "ActiveSets") -> int:
+        """Return at how many nodes the sets differ."""
+        return int(np.count_nonzero((self.is_closed != other.is_closed) | (self.direction != other.direction)))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """The projections (15), (16) evaluated at a state.
+
+    Parameters
+    ----------
+    state : ContactState
+    sets : ActiveSets
+        By the signs of the projected quantities. Ties count as separated and as stick.
+    bound, slope : (n_contact,) arrays [Pa], [-]
+        Friction bound and its derivative at the predicted normal traction.
+    predicted_sigma_n : (n_contact,) array [Pa]
+        ``-[rho_n (u_n - g) - multiplier_n]_+``.
+    residual : (n_contact, 2) array [Pa]
+        Left-hand sides of (15) and (16).
+    """
+
+    state: ContactState
+    sets: ActiveSets
+    bound: FloatArray
+    slope: FloatArray
+    predicted_sigma_n: FloatArray
+    residual: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedConditions:
+    """Contact and friction as the projection equations (15), (16), ready for semismooth Newton.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    rho_n, rho_t : float [Pa/m]
+        Ratio of traction to displacement in the projections.
+    multiplier : (n_contact, 2) array [Pa], optional
+        Fixed multiplier sigma^(k) of Algorithm 1. Without it the present traction takes its place, and the equations
+        are the exact conditions.
+    given_bound : (n_contact,) array [Pa], optional
+        Friction bound held fixed (lagged). Without it the bound follows the predicted normal traction, and the
+        Newton matrix contains its derivative.
+    """
+
+    problem: ContactProblem
+    rho_n: float
+    rho_t: float
+    multiplier: FloatArray | None = None
+    given_bound: FloatArray | None = None
+
+    def evaluate(self, state: ContactState) -> Trial:
+        """Return sets and residual at `state`."""
+        problem = self.problem
+        multiplier = state.traction if self.multiplier is None else self.multiplier
+        towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
+        along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
+        is_closed = towards_obstacle > 0.0
+        predicted_sigma_n = -np.maximum(towards_obstacle, 0.0)
+        if self.given_bound is None:
+            bound = problem.friction_bound(predicted_sigma_n, is_closed)
+            slope = problem.friction_slope(predicted_sigma_n, is_closed)
+        else:
+            bound, slope = self.given_bound, np.zeros_like(self.given_bound)
+        direction = (along_obstacle > bound).astype(np.intp) - (along_obstacle < -bound)
+        residual = state.traction.copy()
+        residual[:, 0] -= predicted_sigma_n
+        residual[:, 1] += np.clip(along_obstacle, -bound, bound)
+        return Trial(state, ActiveSets(is_closed, direction), bound, slope, predicted_sigma_n, residual)
+
+    def linearised(self, trial: Trial, sets: ActiveSets) -> LinearConditions:
+        """Return the Newton equations at a trial for the given sets (its own, or these made more cautious).
+
+        Where neither a bound nor its derivative is present the node slides freely, whatever its direction.
+        """
+        problem = self.problem
+        if self.multiplier is None:
+            held = stick(problem.gap, problem.slip_origin)
+        else:
+            held = augmented(problem.gap, problem.slip_origin, self.multiplier, self.rho_n, self.rho_t)
+        intercept = trial.bound - trial.slope * trial.predicted_sigma_n
+        sliding = slip(problem.gap, sets.direction.astype(float), trial.slope, intercept)
+        is_free = (trial.bound == 0.0) & (trial.slope == 0.0)
+        slides = (sets.direction != 0) | is_free
+        conditions = separated(problem.n_contact)
+        conditions = conditions.replaced(np.stack([sets.is_closed, ~slides], axis=1), held)
+        return conditions.replaced(np.stack([np.zeros_like(slides), slides], axis=1), sliding)
+
+    def cautious(self, trial: Trial, previous: ActiveSets) -> ActiveSets:
+        """Return the sets of `trial` with every direct change of slip direction replaced by stick.
+
+        A node may slip the other way only after it has come to rest. Without this the active sets of stiff bodies
+        alternate between slip to the left and slip to the right for ever. Nodes without any bound are exempt.
+        """
+        sets = trial.sets
+        flips = (sets.direction * previous.direction < 0) & sets.is_closed & previous.is_closed
+        flips &= (trial.bound > 0.0) | (trial.slope != 0.0)
+        return ActiveSets(sets.is_closed, np.where(flips, 0, sets.direction))
+
+
+def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
+    """Return the active sets of a state under the exact conditions, rho being the stiffness scale of the body."""
+    rho = problem.body.stiffness_scale
+    return ProjectedConditions(problem, rho, rho).evaluate(state).sets

@@ -1,0 +1,214 @@
+"""Augmented Lagrangian method: Algorithm 1 of the paper, corrected."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.certificate import certificate_scales
+from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.newton import respond
+from bemkit.solvers.options import check_count, check_max_steps, check_rho
+from bemkit.solvers.outer import Progress
+
+_AUTOMATIC_RHO = 100.0
+"""In units of the body's stiffness scale. Large enough that the multipliers gain two digits a step, so that the rate of
+the outer iteration is that of the lagged friction bound; small enough not to cost digits."""
+
+
+@dataclass(frozen=True)
+class InnerNewton:
+    """Options of the semismooth Newton iteration inside each outer step.
+
+    Parameters
+    ----------
+    max_steps : int
+        Linear solves allowed in one outer step.
+    full_steps : int
+        Steps taken in full before the line search takes over. Full steps end after finitely many almost always, and
+        fastest; the line search makes the rest certain.
+    """
+
+    max_steps: int = 100
+    full_steps: int = 12
+
+    def __post_init__(self) -> None:
+        check_max_steps(self.max_steps)
+        check_count("full_steps", self.full_steps)
+
+
+@dataclass(frozen=True)
+class LaggedBound:
+    """Friction bound of each outer step from the multiplier of the last one, as printed in Algorithm 1."""
+
+
+@dataclass(frozen=True)
+class CurrentBound:
+    """Friction bound from the present normal traction, differentiated inside the inner Newton iteration.
+
+    The outer iteration then no longer waits for the bound, and converges at the rate of the augmentation alone.
+    """
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AugmentedIterate(Iterate):
+    """Iterate of `AugmentedLagrangian`; the multiplier is the traction of the state.
+
+    Parameters
+    ----------
+    progress : Progress
+        What the last outer steps achieved.
+    """
+
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class AugmentedLagrangian:
+    """Algorithm 1: solve with fixed multipliers, take the resulting tractions as the next multipliers.
+
+    Parameters
+    ----------
+    rho_n, rho_t : float, optional
+        rho_1 and rho_2 of the paper as ratios of traction to displacement [Pa/m]; a body in units of E' and L takes
+        them in units of E'/L. By default 100 times the stiffness scale of the body.
+    inner : InnerNewton
+    bound : LaggedBound or CurrentBound
+    max_steps : int
+        Outer steps allowed.
+
+    Notes
+    -----
+    Deviations from the print: the bound is ``s |sigma_n^(k)|``; slip tractions are ``-bound sign(rho u_t - sigma_t)``;
+    the multiplier stays fixed during the inner loop; a node changes its direction of slip only by way of stick; and
+    the first multiplier is the traction of the body with all nodes held, since zero multipliers would start from an
+    empty contact set. For Tresca's law each step reduces the distance of the multipliers to the solution (Theorem 1);
+    for Coulomb's law the lagged bound converges for moderate friction only.
+
+    References
+    ----------
+    Algorithms 1 and 2 of the paper; `docs/conventions.md` lists the corrections.
+    """
+
+    rho_n: float | None = None
+    rho_t: float | None = None
+    inner: InnerNewton = field(default_factory=InnerNewton)
+    bound: LaggedBound | CurrentBound = field(default_factory=LaggedBound)
+    max_steps: int = 500
+
+    def __post_init__(self) -> None:
+        check_rho("rho_n", self.rho_n)
+        check_rho("rho_t", self.rho_t)
+        check_max_steps(self.max_steps)
+
+    def init(self, problem: ContactProblem, start: ContactState) -> AugmentedIterate:
+        """Take the tractions of the start as multipliers."""
+        return AugmentedIterate(state=start, progress=Progress.begun(problem, start))
+
+    def step(self, problem: ContactProblem, iterate: Iterate) -> AugmentedIterate:
+        """Do one outer step."""
+        if not isinstance(iterate, AugmentedIterate):
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+        conditions = self._conditions(problem, iterate.state.traction)
+        inner = solve_projected(conditions, iterate.state, self.inner)
+        linear_solves = iterate.linear_solves + inner.linear_solves
+        if not inner.is_solved:
+            message = f"inner Newton iteration unfinished after {inner.linear_solves} linear solves"
+            return replace(
+                iterate, state=inner.state, linear_solves=linear_solves, ended=Status.INNER_FAILED, message=message
+            )
+        progress = iterate.progress.after(problem, inner.state)
+        return AugmentedIterate(
+            state=inner.state,
+            linear_solves=linear_solves,
+            progress=progress,
+            ended=progress.ended,
+            message=f"{inner.linear_solves} inner solves",
+        )
+
+    def _conditions(self, problem: ContactProblem, multiplier: FloatArray) -> ProjectedConditions:
+        automatic = _AUTOMATIC_RHO * problem.body.stiffness_scale
+        given_bound = None
+        if isinstance(self.bound, LaggedBound):
+            given_bound = problem.friction_bound(multiplier[:, 0], is_closed=multiplier[:, 0] < 0.0)
+        return ProjectedConditions(
+            problem,
+            rho_n=automatic if self.rho_n is None else self.rho_n,
+            rho_t=automatic if self.rho_t is None else self.rho_t,
+            multiplier=multiplier,
+            given_bound=given_bound,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class InnerResult:
+    """Outcome of `solve_projected`."""
+
+    state: ContactState
+    linear_solves: int
+    is_solved: bool
+
+
+def solve_projected(conditions: ProjectedConditions, start: ContactState, options: InnerNewton) -> InnerResult:
+    """Solve projection equations with fixed multipliers by semismooth Newton.
+
+    Parameters
+    ----------
+    conditions : ProjectedConditions
+        With a multiplier.
+    start : ContactState
+        A response of the body.
+    options : InnerNewton
+
+    Returns
+    -------
+    InnerResult
+
+    Notes
+    -----
+    With a given bound the residual along a Newton direction d, weighted, ``sum w residual . d``, is the slope of a
+    convex function if the body is symmetric (the augmented energy), so going to its zero makes the iteration descend
+    from any start.
+    """
+    trial = conditions.evaluate(start)
+    sets, linear_solves = trial.sets, 0
+    for step in range(options.max_steps):
+        response = respond(conditions, trial, sets)
+        linear_solves += response.linear_solves
+        state = response.state
+        if step >= options.full_steps:
+            state = _descended(conditions, trial, state)
+        new_trial = conditions.evaluate(state)
+        if _is_solved(conditions, new_trial, sets, is_newton_point=state is response.state and not response.is_sprung):
+            return InnerResult(state, linear_solves, is_solved=True)
+        sets = new_trial.sets if step >= options.full_steps else conditions.cautious(new_trial, sets)
+        trial = new_trial
+    return InnerResult(trial.state, linear_solves, is_solved=False)
+
+
+def _is_solved(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, *, is_newton_point: bool) -> bool:
+    """Whether the Newton point reproduced its own sets, and with them the residual vanished."""
+    if is_newton_point and conditions.given_bound is not None and trial.sets.key == sets.key:
+        return True  # piecewise linear equations: solved exactly, whatever round-off says
+    stress, _ = certificate_scales(conditions.problem, trial.state)
+    return bool(np.abs(trial.residual).max() <= 1e-12 * stress)
+
+
+def _descended(conditions: ProjectedConditions, trial: Trial, target: ContactState) -> ContactState:
+    """Return the point towards `target` where the augmented energy is least (the target if it falls all the way)."""
+    weights = conditions.problem.body.weights[:, None]
+    direction = target.displacement - trial.state.displacement
+
+    def slope(fraction: float) -> float:
+        residual = conditions.evaluate(trial.state.blended(target, fraction)).residual
+        return float((weights * residual * direction).sum())
+
+    if slope(1.0) <= 0.0:
+        return target
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if slope(middle) < 0.0 else (low, middle)
+    return trial.state.blended(target, low)

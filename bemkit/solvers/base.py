@@ -1,0 +1,327 @@
+"""The one loop that all drivers share: steps, certificate, status, history."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.contact.admissibility import find_unsolvable_load
+from bemkit.contact.certificate import Certificate, certify
+from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.solvers.active_sets import NodeStatus, contact_sets
+from bemkit.solvers.newton import consistent_state
+
+
+class Status(Enum):
+    """How a solve ended; the value is a sentence of advice."""
+
+    CONVERGED = "The state satisfies contact and friction to the tolerance asked for."
+    MAX_STEPS = "The steps ran out before the certificate was met; raise max_steps or start from a nearby solution."
+    STALLED = (
+        "The certificate no longer improves; try another driver, a larger rho, a nearby start or a looser tolerance."
+    )
+    CYCLING = (
+        "The iterates repeat themselves; allow the line search and the continuation, or try another driver: "
+        "the problem may have no solution, or several."
+    )
+    SINGULAR = "The body can move freely whatever its contact nodes do; hold it by its boundary conditions."
+    UNSOLVABLE_LOAD = "No contact tractions can balance this load; change the load or hold the body."
+    INNER_FAILED = "An inner solve failed, for the reason given in the message; change the options of the inner solver."
+    NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Iterate:
+    """Where a driver stands; drivers derive their own iterates from it.
+
+    Parameters
+    ----------
+    state : ContactState
+        A response of the body.
+    linear_solves : int
+        Linear systems spent since `init`.
+    ended : Status or None
+        Set by a driver that cannot go on.
+    message : str
+        Why it ended, or a note on the step for the history.
+    """
+
+    state: ContactState
+    linear_solves: int = 0
+    ended: Status | None = None
+    message: str = ""
+
+
+class ContactSolver(Protocol):
+    """A driver: frozen options and two pure functions.
+
+    A driver never decides that it has converged; `solve` does, by the certificate.
+    """
+
+    @property
+    def max_steps(self) -> int:
+        """Steps allowed unless `solve` is told otherwise."""
+        ...
+
+    def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
+        """Return the first iterate.
+
+        Parameters
+        ----------
+        problem : ContactProblem
+        start : ContactState
+            A response of the body.
+
+        Returns
+        -------
+        Iterate
+        """
+        ...
+
+    def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
+        """Return the next iterate.
+
+        Parameters
+        ----------
+        problem : ContactProblem
+        iterate : Iterate
+            What `init` or `step` of the same driver returned.
+
+        Returns
+        -------
+        Iterate
+
+        Raises
+        ------
+        SingularResponse
+            If the body does not respond; `solve` turns it into a status.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """One line of the convergence table.
+
+    Parameters
+    ----------
+    step : int
+        Zero is the start.
+    linear_solves : int
+        Linear systems spent so far.
+    certificate : Certificate
+    relative_change : float
+        ``max|u - u_previous| / max|u|``, the paper's stopping quantity (infinite at the start).
+    n_separated, n_stick, n_slip : int
+    n_changed : int
+        Nodes whose status changed in this step.
+    message : str
+        The driver's remark on the step.
+    """
+
+    step: int
+    linear_solves: int
+    certificate: Certificate
+    relative_change: float
+    n_separated: int
+    n_stick: int
+    n_slip: int
+    n_changed: int
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSolution:
+    """What a solve returns.
+
+    Parameters
+    ----------
+    state : ContactState
+        Physical displacements and tractions.
+    status : Status
+    certificate : Certificate
+        Of this very state.
+    node_status : (n_contact,) array of `NodeStatus` values
+    steps, linear_solves : int
+    message : str
+        One sentence on how the solve ended.
+    history : tuple of StepRecord
+    """
+
+    state: ContactState
+    status: Status
+    certificate: Certificate
+    node_status: IntArray
+    steps: int
+    linear_solves: int
+    message: str
+    history: tuple[StepRecord, ...] = field(repr=False)
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the status is CONVERGED."""
+        return self.status is Status.CONVERGED
+
+
+class ContactFailure(RuntimeError):  # noqa: N818 - an outcome of the mathematics, not an error of the program
+    """A solve ended without a certified solution; `solution` holds what it reached."""
+
+    def __init__(self, solution: ContactSolution) -> None:
+        super().__init__(f"{solution.status.name}: {solution.message}")
+        self.solution = solution
+
+
+def solve(
+    problem: ContactProblem,
+    solver: ContactSolver,
+    *,
+    start: ContactState | None = None,
+    max_steps: int | None = None,
+    tolerance: float = 1e-9,
+    throw: bool = True,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> ContactSolution:
+    """Run a driver until the certificate is below the tolerance, or until it cannot go on.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    solver : ContactSolver
+    start : ContactState, optional
+        Guess, in equilibrium or not. The cold start has every node in contact and sticking.
+    max_steps : int, optional
+        By default what the driver allows.
+    tolerance : float
+        Bound on every entry of the certificate.
+    throw : bool
+        Raise if the solve does not converge.
+    callback : callable, optional
+        Receives each `StepRecord` as soon as it exists.
+
+    Returns
+    -------
+    ContactSolution
+
+    Raises
+    ------
+    ContactFailure
+        If `throw` and the status is not CONVERGED; its `solution` is what would have been returned.
+    LawError
+        If the friction law fails.
+    ValueError
+        If an argument is out of range.
+    """
+    limit = solver.max_steps if max_steps is None else max_steps
+    if limit < 0:
+        raise ValueError(f"max_steps = {limit}; give zero or a positive number")
+    if not tolerance >= 0.0:
+        raise ValueError(f"tolerance = {tolerance}; give zero or a positive number")
+    solution = _Run(problem, solver, limit, tolerance, callback).finish(start)
+    if throw and not solution.is_converged:
+        raise ContactFailure(solution)
+    return solution
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One call of `solve`."""
+
+    problem: ContactProblem
+    solver: ContactSolver
+    max_steps: int
+    tolerance: float
+    callback: Callable[[StepRecord], None] | None
+
+    def finish(self, start: ContactState | None) -> ContactSolution:
+        """Step until a status is reached."""
+        # Overflow is not warned about: it ends in the status NOT_FINITE.
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            try:
+                escape = find_unsolvable_load(self.problem)
+                if escape is not None:
+                    return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
+                iterate = self._first(start)
+            except SingularResponse as error:
+                return self._nothing_done(Status.SINGULAR, str(error))
+            history = [self._record(iterate, None)]
+            while (status := self._verdict(iterate, history)) is None:
+                try:
+                    following = self.solver.step(self.problem, iterate)
+                except SingularResponse as error:
+                    following = replace(iterate, ended=Status.SINGULAR, message=str(error))
+                history.append(self._record(following, iterate, step=len(history)))
+                iterate = following
+        return self._solution(iterate, status, history)
+
+    def _first(self, start: ContactState | None) -> Iterate:
+        if start is None:
+            state, linear_solves = self.problem.glued_state, 1
+        else:
+            state, linear_solves = consistent_state(self.problem, start)
+        iterate = self.solver.init(self.problem, state)
+        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves)
+
+    def _record(self, iterate: Iterate, previous: Iterate | None, step: int = 0) -> StepRecord:
+        sets = contact_sets(self.problem, iterate.state)
+        n_changed, relative_change = 0, float("inf")
+        if previous is not None:
+            n_changed = sets.n_changed(contact_sets(self.problem, previous.state))
+            size = float(np.abs(iterate.state.displacement).max())
+            change = float(np.abs(iterate.state.displacement - previous.state.displacement).max())
+            relative_change = change / size if size > 0.0 else float(change > 0.0)
+        slips = sets.is_closed & (sets.direction != 0)
+        record = StepRecord(
+            step=step,
+            linear_solves=iterate.linear_solves,
+            certificate=certify(self.problem, iterate.state),
+            relative_change=relative_change,
+            n_separated=int(np.count_nonzero(~sets.is_closed)),
+            n_stick=int(np.count_nonzero(sets.is_closed & ~slips)),
+            n_slip=int(np.count_nonzero(slips)),
+            n_changed=n_changed,
+            message=iterate.message,
+        )
+        if self.callback is not None:
+            self.callback(record)
+        return record
+
+    def _verdict(self, iterate: Iterate, history: list[StepRecord]) -> Status | None:
+        if not iterate.state.is_finite:
+            return Status.NOT_FINITE
+        if history[-1].certificate.is_below(self.tolerance):
+            return Status.CONVERGED
+        if iterate.ended is not None:
+            return iterate.ended
+        return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
+
+    def _solution(self, iterate: Iterate, status: Status, history: list[StepRecord]) -> ContactSolution:
+        last = history[-1]
+        worst = f"worst certificate entry {last.certificate.worst:.1e} after {last.step} steps"
+        remark = f" ({iterate.message})" if iterate.message else ""
+        return ContactSolution(
+            state=iterate.state,
+            status=status,
+            certificate=last.certificate,
+            node_status=contact_sets(self.problem, iterate.state).node_status,
+            steps=last.step,
+            linear_solves=iterate.linear_solves,
+            message=f"{status.value} [{worst}]{remark}",
+            history=tuple(history),
+        )
+
+    def _nothing_done(self, status: Status, message: str) -> ContactSolution:
+        n_contact = self.problem.n_contact
+        unknown = np.full((n_contact, 2), np.nan)
+        return ContactSolution(
+            state=ContactState(unknown, unknown),
+            status=status,
+            certificate=Certificate(*[float("nan")] * len(fields(Certificate))),
+            node_status=np.full(n_contact, NodeStatus.SEPARATED, dtype=np.intp),
+            steps=0,
+            linear_solves=0,
+            message=f"{status.value} {message}",
+            history=(),
+        )

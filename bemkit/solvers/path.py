@@ -1,0 +1,196 @@
+"""Follow the path of exact solutions while an extra pressure and an extra friction are taken off.
+
+Pressed hard enough by extra forces at the contact nodes and held by enough extra friction, every body touches
+everywhere and sticks everywhere. Between two changes of a node's status the response is linear in the amount of the
+extras, so the path from there to the problem proper consists of straight pieces: at each joint one node changes its
+status, and the amount goes on falling, or rises again for a while where the path folds. Folds are where Newton's method
+and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting, carried out on a body
+instead of a matrix.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.conditions import LinearConditions, separated, slip, stick
+from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+
+
+class _Kind(IntEnum):
+    """The inequality that a node has to keep, by the piece it is on."""
+
+    PRESSURE = 0  # closed: -sigma_n >= 0
+    CLEARANCE = 1  # open: g - u_n >= 0
+    FORWARD = 2  # stick: bound + sigma_t >= 0, slips forward when it fails
+    BACKWARD = 3  # stick: bound - sigma_t >= 0, slips backward when it fails
+    SLIP = 4  # slip: direction * slip >= 0
+
+
+@dataclass(frozen=True, eq=False)
+class AffineBound:
+    """Friction bound ``slope * sigma_n + intercept``; exact for Coulomb and Tresca, a tangent for other laws.
+
+    Parameters
+    ----------
+    slope : (n_contact,) array [-]
+    intercept : (n_contact,) array [Pa]
+    """
+
+    slope: FloatArray
+    intercept: FloatArray
+
+    @classmethod
+    def tangent(cls, problem: ContactProblem, sigma_n: FloatArray) -> "AffineBound":
+        """Return the tangent of the problem's law at the given normal tractions (tension is read as zero)."""
+        sigma_n = np.minimum(sigma_n, 0.0)
+        slope = problem.friction_slope(sigma_n)
+        return cls(slope, problem.friction_bound(sigma_n) - slope * sigma_n)
+
+
+class PathEnd(NamedTuple):
+    """Outcome of `follow_path`; `state` is None if the path does not lead to a solution, for the reason given."""
+
+    state: ContactState | None
+    linear_solves: int
+    n_pieces: int
+    reason: str
+
+
+class _Piece(NamedTuple):
+    """Where the path runs straight: tractions and displacements are ``origin + amount * rate``."""
+
+    origin: ContactState
+    rate: ContactState
+    is_kept: BoolArray  # (5, n_contact): which inequalities matter
+    slack: FloatArray  # (5, n_contact) at amount zero
+    slack_rate: FloatArray  # (5, n_contact)
+
+
+def path_exists(problem: ContactProblem) -> bool:
+    """Return whether the law is continuous where nodes open, which following the path takes for granted."""
+    return problem.law.acts_across_gap or not problem.friction_bound(np.zeros(problem.n_contact)).any()
+
+
+def follow_path(problem: ContactProblem, bound: AffineBound, max_pieces: int | None = None) -> PathEnd:
+    """Return the first solution on the path that starts with all nodes pressed and sticking.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        Its law is not asked; `bound` stands for it.
+    bound : AffineBound
+    max_pieces : int, optional
+        By default ``20 n_contact + 100``; about 1.5 pieces a node are usual.
+
+    Returns
+    -------
+    PathEnd
+        Two linear solves a piece. Tractions and displacements are exact up to round-off.
+    """
+    path = _Path(problem, bound)
+    is_closed = np.isfinite(problem.gap)
+    direction = np.zeros(problem.n_contact, dtype=np.intp)
+    limit = 20 * problem.n_contact + 100 if max_pieces is None else max_pieces
+    amount, falling, entered = np.inf, -1.0, None
+    for n_pieces in range(1, limit + 1):
+        try:
+            piece = path.piece(is_closed, direction)
+        except SingularResponse as error:
+            return PathEnd(None, 2 * n_pieces, n_pieces, f"the path meets a singular response: {error}")
+        if entered is None:
+            amount = _first_amount(piece)
+        else:
+            falling = float(np.sign(piece.slack_rate[entered]))
+            piece.is_kept[entered] = False  # it has just become active and grows from zero
+        step, kind, node = _next_joint(piece, amount, falling)
+        if falling < 0.0 and step >= amount:
+            return PathEnd(piece.origin, 2 * n_pieces, n_pieces, "")
+        if falling == 0.0 or not np.isfinite(step):
+            return PathEnd(None, 2 * n_pieces, n_pieces, "the path does not return to the problem proper")
+        amount += falling * step
+        is_closed, direction, entered = _pivoted(is_closed, direction, kind, node)
+    return PathEnd(None, 2 * limit, limit, f"the path has more than {limit} pieces")
+
+
+class _Path:
+    """The problem with extras."""
+
+    def __init__(self, problem: ContactProblem, bound: AffineBound) -> None:
+        self.problem = problem
+        self.bound = bound
+        stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+        # Unequal extras keep symmetric nodes from changing at once. Golden-ratio fractions are as unequal as can be.
+        spread = np.modf(np.arange(1, 2 * problem.n_contact + 1) * 0.6180339887498949)[0]
+        extras = stress * (1.0 + 0.5 * spread)
+        self.pressure, self.friction = extras[::2], extras[1::2]
+
+    def piece(self, is_closed: BoolArray, direction: IntArray) -> _Piece:
+        """Respond to fixed statuses, at amount zero and at amount one."""
+        problem, bound = self.problem, self.bound
+        slips = direction != 0
+        conditions = separated(problem.n_contact)
+        held = stick(problem.gap, problem.slip_origin)
+        conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)
+        sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
+        conditions = conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
+
+        # The body carries contact traction plus extra pressure; the conditions speak of contact tractions alone.
+        extra_value = conditions.on_traction[:, :, 0] * self.pressure[:, None]
+        extra_value[:, 1] -= direction * self.friction
+        with_extras = LinearConditions(
+            conditions.on_displacement, conditions.on_traction, conditions.value + extra_value
+        )
+        origin, shifted = problem.body.respond(conditions), problem.body.respond(with_extras)
+        traction_rate = shifted.traction - origin.traction
+        traction_rate[:, 0] -= self.pressure
+        rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
+
+        origin_slip = origin.u_t - problem.slip_origin
+        room = bound.slope * origin.sigma_n + bound.intercept
+        room_rate = bound.slope * rate.sigma_n + self.friction
+        slack = [-origin.sigma_n, problem.gap - origin.u_n, room + origin.sigma_t, room - origin.sigma_t]
+        slack_rate = [-rate.sigma_n, -rate.u_n, room_rate + rate.sigma_t, room_rate - rate.sigma_t]
+        return _Piece(
+            origin,
+            rate,
+            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), ~slips, ~slips, slips]),
+            np.stack([*slack, direction * origin_slip]),
+            np.stack([*slack_rate, direction * rate.u_t]),
+        )
+
+
+def _first_amount(piece: _Piece) -> float:
+    """Return an amount of extras from which on upwards all inequalities hold."""
+    grows = piece.is_kept & (piece.slack_rate > 0.0)
+    return max(0.0, float(np.max(-piece.slack[grows] / piece.slack_rate[grows], initial=0.0))) * 1.01
+
+
+def _next_joint(piece: _Piece, amount: float, falling: float) -> tuple[float, _Kind, int]:
+    """Return how far the piece reaches, and the inequality and node that end it."""
+    rate = falling * piece.slack_rate
+    ends = piece.is_kept & (rate < 0.0)
+    reach = np.full(rate.shape, np.inf)
+    here = piece.slack[ends] + amount * piece.slack_rate[ends]
+    reach[ends] = np.maximum(here, 0.0) / -rate[ends]
+    kind, node = np.unravel_index(np.argmin(reach), reach.shape)
+    return float(reach[kind, node]), _Kind(int(kind)), int(node)
+
+
+def _pivoted(
+    is_closed: BoolArray, direction: IntArray, kind: _Kind, node: int
+) -> tuple[BoolArray, IntArray, tuple[_Kind, int]]:
+    """Return the statuses after the joint and the inequality that takes over from the one that ended the piece."""
+    is_closed, direction = is_closed.copy(), direction.copy()
+    if kind in (_Kind.PRESSURE, _Kind.CLEARANCE):
+        is_closed[node] = not is_closed[node]
+        entered = _Kind.CLEARANCE if kind is _Kind.PRESSURE else _Kind.PRESSURE
+    elif kind is _Kind.SLIP:
+        entered = _Kind.FORWARD if direction[node] > 0 else _Kind.BACKWARD
+        direction[node] = 0
+    else:
+        direction[node] = 1 if kind is _Kind.FORWARD else -1
+        entered = _Kind.SLIP
+    return is_closed, direction, (entered, node)

@@ -1,0 +1,95 @@
+"""Look for several solutions of one problem."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.contact.certificate import certificate_scales
+from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.solvers.base import ContactSolution, ContactSolver, solve
+
+
+def probe(
+    problem: ContactProblem,
+    solver: ContactSolver,
+    *,
+    n_starts: int = 8,
+    starts: Sequence[ContactState] = (),
+    seed: int = 0,
+    tolerance: float = 1e-9,
+) -> tuple[ContactSolution, ...]:
+    """Solve from several starts and return the distinct certified solutions.
+
+    With Coulomb friction a problem may have several solutions; the start chooses among them.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    solver : ContactSolver
+    n_starts : int
+        Starts made here: all nodes sticking, open, slipping forward, slipping backward, then random choices.
+    starts : sequence of ContactState
+        Further starts, tried first.
+    seed : int
+        Of the random choices.
+    tolerance : float
+        Bound on the certificate of every solution.
+
+    Returns
+    -------
+    tuple of ContactSolution
+        In the order found; empty if no start leads to a solution. One entry does not prove uniqueness.
+
+    Raises
+    ------
+    ValueError
+        If `n_starts` is negative.
+    """
+    if n_starts < 0:
+        raise ValueError(f"n_starts = {n_starts}; give zero or a positive number")
+    random = np.random.default_rng(seed)
+    uniform = [1, 0, 2, 3]
+    choices = [np.full(problem.n_contact, status) for status in uniform[:n_starts]]
+    choices += [random.integers(0, 4, problem.n_contact) for _ in range(n_starts - len(choices))]
+    found: list[ContactSolution] = []
+    for start in [*starts, *(start_with(problem, choice) for choice in choices)]:
+        solution = solve(problem, solver, start=start, tolerance=tolerance, throw=False)
+        if solution.is_converged and not any(_is_same(problem, solution.state, other.state) for other in found):
+            found.append(solution)
+    return tuple(found)
+
+
+def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -> ContactState:
+    """Return a guess whose nodes have the given statuses, to start a solve on a chosen branch.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    node_status : (n_contact,) sequence of `NodeStatus` values
+
+    Returns
+    -------
+    ContactState
+        Not in equilibrium; `solve` takes its statuses only.
+    """
+    status = np.asarray(node_status)
+    stress, length = certificate_scales(problem, problem.glued_state)
+    is_closed = (status != 0) & np.isfinite(problem.gap)
+    direction = np.where(status == 2, 1.0, 0.0) - np.where(status == 3, 1.0, 0.0)
+    sigma_n = np.where(is_closed, -stress, 0.0)
+    slip = direction * (2.0 * problem.friction_bound(sigma_n) / problem.body.stiffness_scale + length)
+    resting = np.where(np.isfinite(problem.gap), problem.gap, 0.0)
+    u_n = np.where(is_closed, resting, resting - length)
+    return ContactState(
+        np.stack([u_n, problem.slip_origin + slip], axis=1), np.stack([sigma_n, np.zeros_like(sigma_n)], axis=1)
+    )
+
+
+def _is_same(problem: ContactProblem, state: ContactState, other: ContactState) -> bool:
+    stress, length = certificate_scales(problem, state)
+    length = max(length, float(np.abs(state.displacement).max()))
+    return bool(
+        np.abs(state.displacement - other.displacement).max() < 1e-6 * length
+        and np.abs(state.traction - other.traction).max() < 1e-6 * stress
+    )

@@ -1,0 +1,207 @@
+"""Semismooth Newton on contact and friction together."""
+
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+
+from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.newton import merit, respond
+from bemkit.solvers.options import check_count, check_max_steps, check_rho
+from bemkit.solvers.path import AffineBound, follow_path, path_exists
+
+_MOST_PATHS = 5
+"""Paths followed before giving up. One is enough for bounds that are affine in the pressure; for others each path
+starts from the tangent at the end of the last."""
+
+
+class Phase(Enum):
+    """What the next step does."""
+
+    FULL = auto()
+    """Full Newton steps, as long as the active sets are new ones."""
+    DAMPED = auto()
+    """Newton steps shortened until the residual falls."""
+    PATH = auto()
+    """The whole path of solutions under a decreasing extra pressure."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NewtonIterate(Iterate):
+    """Iterate of `SemismoothNewton`.
+
+    Parameters
+    ----------
+    trial : Trial
+        The projections at the state.
+    sets : ActiveSets
+        Sets of the next Newton matrix.
+    merit : float
+        Size of the residual at the state.
+    best : tuple of float and Trial
+        The smallest residual met since the phase FULL began, and where.
+    visited : frozenset of bytes
+        Keys of all sets tried since then.
+    phase : Phase
+    n_in_phase : int
+        Steps taken in this phase.
+    n_paths : int
+        Paths followed so far.
+    """
+
+    trial: Trial
+    sets: ActiveSets
+    merit: float
+    best: tuple[float, Trial]
+    visited: frozenset[bytes]
+    phase: Phase = Phase.FULL
+    n_in_phase: int = 0
+    n_paths: int = 0
+
+
+@dataclass(frozen=True)
+class SemismoothNewton:
+    """Newton's method on the projection equations (15), (16), the friction bound differentiated with them.
+
+    Parameters
+    ----------
+    rho : float, optional
+        Ratio of traction to displacement in the projections [Pa/m]. By default the stiffness scale of the body. After
+        a full step it matters only at nodes that change from slip to slip, or from open to closed.
+    max_steps : int
+        Steps allowed; a path counts as one.
+    full_steps : int
+        Full steps allowed before the line search begins; it begins earlier if active sets come back.
+    damped_steps : int
+        Steps with line search allowed before the path is followed; zero leaves the line search out.
+    follows_path : bool
+        Whether to follow the path of solutions when all else fails; see `bemkit.solvers.path`.
+
+    Notes
+    -----
+    With linear slip rows ``sigma_t - s sign sigma_n = 0`` the equations are piecewise linear for Coulomb's law, so a
+    full step that reproduces its active sets has found an exact solution. Full steps suffice nearly always (5 to 10,
+    whatever the friction); a node changes its direction of slip only by way of stick. If the sets return, the
+    residual is made to fall by a line search from the best state so far; if that stalls, the path of solutions is
+    followed, which takes a few linear solves per contact node and arrives where Newton's method cycles.
+    Sets that do not hold the body are helped by weak springs for that step.
+    """
+
+    rho: float | None = None
+    max_steps: int = 100
+    full_steps: int = 30
+    damped_steps: int = 15
+    follows_path: bool = True
+
+    def __post_init__(self) -> None:
+        check_rho("rho", self.rho)
+        check_max_steps(self.max_steps)
+        check_count("full_steps", self.full_steps)
+        check_count("damped_steps", self.damped_steps)
+
+    def init(self, problem: ContactProblem, start: ContactState) -> NewtonIterate:
+        """Start from the active sets of a response."""
+        return self._begun(problem, start)
+
+    def step(self, problem: ContactProblem, iterate: Iterate) -> NewtonIterate:
+        """Take one step of the phase that the iterate is in."""
+        if not isinstance(iterate, NewtonIterate):
+            raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
+        if iterate.phase is Phase.FULL:
+            return self._full_step(problem, iterate)
+        if iterate.phase is Phase.DAMPED:
+            return self._damped_step(problem, iterate)
+        return self._path_step(problem, iterate)
+
+    def _conditions(self, problem: ContactProblem) -> ProjectedConditions:
+        rho = problem.body.stiffness_scale if self.rho is None else self.rho
+        return ProjectedConditions(problem, rho, rho)
+
+    def _begun(self, problem: ContactProblem, state: ContactState) -> NewtonIterate:
+        trial = self._conditions(problem).evaluate(state)
+        size = merit(problem, trial)
+        return NewtonIterate(
+            state=state,
+            trial=trial,
+            sets=trial.sets,
+            merit=size,
+            best=(size, trial),
+            visited=frozenset([trial.sets.key]),
+        )
+
+    def _full_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
+        conditions = self._conditions(problem)
+        response = respond(conditions, iterate.trial, iterate.sets)
+        trial = conditions.evaluate(response.state)
+        sets = conditions.cautious(trial, iterate.sets)
+        size = merit(problem, trial)
+        following = replace(
+            iterate,
+            state=trial.state,
+            linear_solves=iterate.linear_solves + response.linear_solves,
+            message="held by springs" if response.is_sprung else "",
+            trial=trial,
+            sets=sets,
+            merit=size,
+            best=(size, trial) if size < iterate.best[0] else iterate.best,
+            visited=iterate.visited | {sets.key},
+            n_in_phase=iterate.n_in_phase + 1,
+        )
+        # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
+        is_new = sets.key not in iterate.visited
+        repeats = not is_new and not response.is_sprung and following.merit >= 0.5 * iterate.merit
+        if repeats or following.n_in_phase >= self.full_steps:
+            return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
+        return following
+
+    def _damped_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
+        conditions = self._conditions(problem)
+        response = respond(conditions, iterate.trial, iterate.trial.sets)
+        trials = [
+            conditions.evaluate(iterate.state.blended(response.state, 0.5**halvings)) for halvings in range(9)
+        ]
+        size, trial = min(((merit(problem, trial), trial) for trial in trials), key=lambda pair: pair[0])
+        following = replace(
+            iterate,
+            linear_solves=iterate.linear_solves + response.linear_solves,
+            message="line search",
+            n_in_phase=iterate.n_in_phase + 1,
+        )
+        if size > (1.0 - 1e-3) * iterate.merit:
+            return self._rescued(problem, following, Status.STALLED, "no Newton step reduces the residual")
+        following = replace(following, state=trial.state, trial=trial, sets=trial.sets, merit=size)
+        if following.n_in_phase >= self.damped_steps:
+            return self._rescued(problem, following, Status.STALLED, "the line search takes too many steps")
+        return following
+
+    def _rescued(
+        self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str
+    ) -> NewtonIterate:
+        """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
+        if iterate.phase is Phase.FULL and self.damped_steps > 0:
+            size, trial = iterate.best
+            return replace(
+                iterate,
+                state=trial.state,
+                trial=trial,
+                sets=trial.sets,
+                merit=size,
+                phase=Phase.DAMPED,
+                n_in_phase=0,
+                message=f"{reason}; line search begins",
+            )
+        if self.follows_path and iterate.n_paths < _MOST_PATHS and path_exists(problem):
+            return replace(iterate, phase=Phase.PATH, n_in_phase=0, message=f"{reason}; the path is followed next")
+        return replace(iterate, ended=status, message=reason)
+
+    def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
+        end = follow_path(problem, AffineBound.tangent(problem, iterate.state.sigma_n))
+        linear_solves = iterate.linear_solves + end.linear_solves
+        if end.state is None:
+            return replace(iterate, linear_solves=linear_solves, ended=Status.STALLED, message=end.reason)
+        return replace(
+            self._begun(problem, end.state),
+            linear_solves=linear_solves,
+            n_paths=iterate.n_paths + 1,
+            message=f"path of {end.n_pieces} pieces",
+        )
