@@ -253,8 +253,8 @@ class _Checker:
             case ast.BoolOp(values=values):
                 return self.check_conditions(node, values, depth)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
-                for op in ops:
-                    self.check_operator(node, op)
+                for comparison in ops:
+                    self.check_operator(node, comparison)
                 self.check_numbers(node, [left, *comparators], depth)
                 return True
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
@@ -334,7 +334,7 @@ class _Points:
             case ast.BinOp(left=left, op=op, right=right):
                 return self._array(_OPERATORS[type(op)](self.evaluate(left), self.evaluate(right)))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return np.logical_not(self.evaluate(operand))
+                return self._array(np.logical_not(self.evaluate(operand)))
             case ast.UnaryOp(op=op, operand=operand):
                 return self._array(_OPERATORS[type(op)](self.evaluate(operand)))
             case ast.BoolOp(op=op, values=[first, *rest]):

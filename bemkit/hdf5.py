@@ -105,7 +105,7 @@ class Reader:
     def __init__(self, name: str, size: int, file: h5py.File) -> None:
         self._name = name
         self._size = size
-        self._file = file
+        self._file: Any = file
 
     def error(self, problem: str) -> ResultFileError:
         """Return an error that names the file."""
@@ -122,7 +122,7 @@ class Reader:
                 raise self.error(f"too many attributes in {group}")
             for name in attributes:
                 stored = attributes.get_id(name)
-                is_text = h5py.check_string_dtype(stored.dtype) is not None
+                is_text = h5py.check_string_dtype(stored.dtype) is not None  # type: ignore[attr-defined]  # stubs
                 if stored.shape != () or not (is_text or stored.dtype.kind in "if"):
                     raise self.error(f"attribute {name!r} of {group} is not a single text or number")
             values = dict(attributes.items())
@@ -183,9 +183,10 @@ class Reader:
     def _array(self, path: str, kind: str) -> npt.NDArray[Any]:
         import h5py
 
-        found = self._follow(path)
+        found: Any = self._follow(path)
         try:
-            if not isinstance(found, h5py.Dataset) or found.shape is None:
+            is_dataset = isinstance(found, h5py.Dataset)
+            if not is_dataset or found.shape is None:
                 raise self.error(f"{path} is not an array")
             is_plain = found.chunks is None and found.external is None and not found.is_virtual
             if not is_plain or found.nbytes > min(self._size, found.id.get_storage_size()):
@@ -203,7 +204,8 @@ class Reader:
         found: Any = self._file
         try:
             for name in filter(None, path.split("/")):
-                if not isinstance(found, h5py.Group) or not isinstance(found.get(name, getlink=True), h5py.HardLink):
+                is_group = isinstance(found, h5py.Group)
+                if not is_group or type(found.get(name, getlink=True)).__name__ != "HardLink":
                     raise self.error(f"{path} is missing")
                 found = found[name]
         except (OSError, RuntimeError, KeyError) as error:

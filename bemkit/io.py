@@ -18,6 +18,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -134,15 +135,10 @@ def read_result(path: str | Path) -> Solution:
 
 def provenance() -> dict[str, str]:
     """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
-    import h5py
-    import scipy
-
     return {
         "bemkit": bemkit.__version__,
         "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "h5py": h5py.__version__,
+        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
         "platform": f"{platform.system()} {platform.machine()}",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
     }

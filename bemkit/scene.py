@@ -7,7 +7,7 @@ form can be turned into the other. All quantities are in one consistent set of u
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -210,6 +210,8 @@ class MeshOptions:
         Number of boundary elements in total.
     grading : Grading
         Distribution along each piece between corners and ends of parts.
+    density : mapping of str to float
+        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
 
     Raises
     ------
@@ -219,6 +221,7 @@ class MeshOptions:
 
     elements: int = 320
     grading: Grading = field(default_factory=Uniform)
+    density: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 3 <= self.elements <= 1_000_000:
@@ -303,4 +306,5 @@ class Scene:
             n_elements=self.mesh.elements,
             parts={part.name: part.selection for part in self.parts},
             grading=self.mesh.grading,
+            density=self.mesh.density,
         )

@@ -349,8 +349,8 @@ def _explain(error: BaseException, path: str) -> str:
             return f"{path}: missing: {remedy}"
     if isinstance(error, BaseValidationError):
         # an unknown key comes first: it is often the reason why another one is missing
-        unknown = [inner for inner in error.exceptions if isinstance(inner, ForbiddenExtraKeysError)]
-        return _explain((unknown or list(error.exceptions))[0], path)
+        found = sorted(error.exceptions, key=lambda inner: not isinstance(inner, ForbiddenExtraKeysError))
+        return _explain(found[0], path)
     if isinstance(error, _LocatedError):
         return _explain(error.cause, _join(path, error.key))
     if isinstance(error, ForbiddenExtraKeysError):

@@ -9,8 +9,9 @@ from bemkit.arrays import FloatArray, read_only
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 
-_SMALLEST_RCOND = 4.0 * np.finfo(float).eps
-"""Below this reciprocal condition number the solution of a row-scaled system is noise."""
+_SMALLEST_RCOND = 1e-13
+"""Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
+of a floating body leaves 1e-15 of its free motions; drivers that are refused without need only take a detour."""
 
 _FREE_MOTION = 1e-9
 """A rigid motion that changes no condition by more than this (of unit motion) is not held by them. Boundary element

@@ -59,7 +59,7 @@ def clip_to_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
     bound = _checked_bound(x, bound)
     if x.ndim == 1:
         return np.clip(x, -bound, bound)
-    length = np.linalg.norm(x, axis=1)
+    length = np.hypot.reduce(x, axis=1)
     is_outside = length > bound
     factor = np.where(is_outside, bound / np.where(is_outside, length, 1.0), 1.0)
     return x * factor[:, None]
@@ -90,7 +90,7 @@ def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[
     if x.ndim == 1:
         is_outside = np.abs(x) > bound
         return np.where(is_outside, 0.0, 1.0), np.where(is_outside, np.copysign(1.0, x), 0.0)
-    length = np.linalg.norm(x, axis=1)
+    length = np.hypot.reduce(x, axis=1)
     is_outside = length > bound
     safe_length = np.where(is_outside, length, 1.0)
     direction = np.where(is_outside[:, None], x / safe_length[:, None], 0.0)

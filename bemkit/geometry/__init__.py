@@ -12,6 +12,8 @@ from bemkit.geometry.grading import Geometric as Geometric
 from bemkit.geometry.grading import Grading as Grading
 from bemkit.geometry.grading import Uniform as Uniform
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+from bemkit.geometry.meshfile import read_mesh as read_mesh
+from bemkit.geometry.meshfile import write_mesh as write_mesh
 from bemkit.geometry.outline import Outline as Outline
 from bemkit.geometry.outline import Side as Side
 from bemkit.geometry.selection import Selection as Selection

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import norms
 
 _N_CHECK_INTERVALS = 8
 _N_CHECK_POINTS = 8
@@ -85,8 +86,9 @@ class Segment:
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve; both ends are met to the last digit."""
-        s = np.asarray(s)[:, None]
-        return (1.0 - s) * np.array(self.start) + s * np.array(self.end)
+        s = np.asarray(s, dtype=float)[:, None]
+        points: FloatArray = (1.0 - s) * np.array(self.start) + s * np.array(self.end)
+        return points
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Return the constant vector from start to end."""
@@ -139,8 +141,8 @@ class Arc:
         return speed * np.column_stack([-np.sin(angle), np.cos(angle)])
 
     def _angle(self, s: FloatArray) -> FloatArray:
-        s = np.asarray(s)
-        return (1.0 - s) * self.start_angle + s * self.end_angle
+        angle: FloatArray = (1.0 - s) * self.start_angle + s * self.end_angle
+        return angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +172,7 @@ class ParametricCurve:
         half = 0.5 / _N_CHECK_INTERVALS
         s = ((ends[:-1, None] + half) + half * nodes).ravel()
         velocity = self.derivative(s)
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        speed = norms(velocity)
         if not speed.min() > 0.0:
             raise GeometryError(
                 f"ParametricCurve: derivative_function vanishes at s={s[speed.argmin()]:.6g}: "
@@ -178,7 +180,7 @@ class ParametricCurve:
             )
         steps = np.diff(self.point(ends), axis=0)
         integrals = half * np.einsum("q,iqk->ik", weights, velocity.reshape(_N_CHECK_INTERVALS, _N_CHECK_POINTS, 2))
-        mismatch = np.linalg.norm(steps - integrals, axis=1)
+        mismatch = norms(steps - integrals)
         worst = int(mismatch.argmax())
         if mismatch[worst] > _DERIVATIVE_TOLERANCE * speed.mean() / _N_CHECK_INTERVALS:
             raise GeometryError(
@@ -217,13 +219,15 @@ class MovedCurve:
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve."""
-        return (self.curve.point(1.0 - s if self.is_reversed else s) - np.array(self.shift)) * self.factor
+        points: FloatArray = (self.curve.point(self._parameter(s)) - np.array(self.shift)) * self.factor
+        return points
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Differentiate the curve with respect to s."""
-        if self.is_reversed:
-            return -self.factor * self.curve.derivative(1.0 - s)
-        return self.factor * self.curve.derivative(s)
+        return (-self.factor if self.is_reversed else self.factor) * self.curve.derivative(self._parameter(s))
+
+    def _parameter(self, s: FloatArray) -> FloatArray:
+        return 1.0 - s if self.is_reversed else s
 
 
 def reverse_curve(curve: Curve) -> Curve:

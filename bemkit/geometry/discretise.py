@@ -9,23 +9,23 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.grading import Grading, Uniform
+from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.selection import N_SAMPLES, Selection, breakpoints, merge_breakpoints
+from bemkit.geometry.vectors import norms
 
 _N_PANELS = 256
 _N_PANEL_POINTS = 4
 _SPEED_TOLERANCE = 1e-12  # a speed that varies by less is constant up to round-off
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class _Piece:
-    """A piece of a side that lies in one part at most, with the numbers of its loop and of its side."""
+    """A piece of a side, from one parameter to another, that lies in one part or in none."""
 
-    side: Side
-    side_number: int
-    loop: int
+    side: int
     span: tuple[float, float]
     part: str | None
 
@@ -36,6 +36,7 @@ def discretise(
     n_elements: int,
     parts: Mapping[str, Selection] | None = None,
     grading: Grading | None = None,
+    density: Mapping[str, float] | None = None,
 ) -> BoundaryMesh:
     """Cut an outline into elements.
 
@@ -50,6 +51,8 @@ def discretise(
         Boundary parts by name; they must not overlap, and need not cover the boundary.
     grading : Grading, optional
         Spacing of the elements on every piece; uniform if left out.
+    density : mapping of str to float, optional
+        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
 
     Returns
     -------
@@ -59,24 +62,26 @@ def discretise(
     Raises
     ------
     GeometryError
-        If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces.
+        If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces, or a density
+        is not positive or names an unknown side.
     """
+    density = {} if density is None else density
+    _check_density(density, outline)
     parts = {} if parts is None else parts
     grading = Uniform() if grading is None else grading
     _check_sides(outline, parts)
-    pieces = [
-        _Piece(side, number, loop, span, part)
-        for loop, sides in enumerate(outline.loops)
-        for number, side in enumerate(sides)
-        for span, part in _cut(side, parts)
-    ]
+    pieces = [piece for number, side in enumerate(outline.sides) for piece in _cut(number, side, parts)]
     for name, selection in parts.items():
         if not any(piece.part == name for piece in pieces):
             raise GeometryError(_empty_part_message(name, selection, outline))
-    rulers = {side.name: _Ruler(side.curve) for side in outline.sides}
-    lengths = np.array([rulers[piece.side.name].length(*piece.span) for piece in pieces])
-    counts = share_elements(n_elements, lengths)
-    return _mesh_pieces(outline, pieces, counts, rulers, tuple(parts), grading)
+    rulers = [_Ruler(side.curve) for side in outline.sides]
+    weights = [
+        density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span) for piece in pieces
+    ]
+    counts = share_elements(n_elements, np.array(weights))
+    positions = [_checked_positions(grading, int(count)) for count in counts]
+    parameters = [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(pieces, positions, strict=True)]
+    return _join(outline, pieces, parameters, tuple(parts))
 
 
 def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
@@ -89,10 +94,10 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
     """
     if n_elements != int(n_elements) or n_elements < len(lengths):
         raise GeometryError(
-            f"discretise: n_elements is {n_elements}, but the outline has {len(lengths)} pieces (sides, cut where parts end): "
-            f"give a whole number of at least {len(lengths)}"
+            f"discretise: n_elements is {n_elements}, but the outline has {len(lengths)} pieces (sides, cut "
+            f"where parts end): give a whole number of at least {len(lengths)}"
         )
-    quota = n_elements * lengths / lengths.sum()
+    quota: FloatArray = n_elements * lengths / lengths.sum()
     # pieces too short for a whole element get one, and leave the others to share the rest
     is_short = np.zeros(len(lengths), dtype=bool)
     while (quota[~is_short] < 1.0).any():
@@ -101,7 +106,7 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
         quota[~is_short] = (n_elements - np.count_nonzero(is_short)) * rest / rest.sum()
     quota[is_short] = 1.0
     quota = np.round(quota, 9)  # halves that differ by round-off are ties, settled by the order of pieces
-    counts = np.floor(quota).astype(np.intp)
+    counts: IntArray = np.floor(quota).astype(np.intp)
     by_remainder = np.argsort(counts - quota, kind="stable")
     counts[by_remainder[: int(n_elements) - int(counts.sum())]] += 1
     return counts
@@ -114,7 +119,7 @@ class _Ruler:
         self._ends = np.linspace(0.0, 1.0, _N_PANELS + 1)
         xi, weights = gauss_legendre(_N_PANEL_POINTS)
         s = self._ends[:-1, None] + 0.5 / _N_PANELS * (1.0 + xi)
-        speed = np.hypot(*curve.derivative(s.ravel()).T)
+        speed = norms(curve.derivative(s.ravel()))
         self._arc_length = np.concatenate([[0.0], np.cumsum(0.5 / _N_PANELS * (speed.reshape(s.shape) @ weights))])
         self._is_even = bool(np.ptp(speed) <= _SPEED_TOLERANCE * speed.max())
 
@@ -127,14 +132,14 @@ class _Ruler:
         if not self._is_even:
             whole = np.interp(span, self._ends, self._arc_length)
             lengths = whole[0] * (1.0 - positions) + whole[1] * positions
-            s = np.interp(lengths, self._arc_length, self._ends)
+            s: FloatArray = np.interp(lengths, self._arc_length, self._ends)
             s[0], s[-1] = span
             return s
-        return span[0] * (1.0 - positions) + span[1] * positions
+        return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
 
 
-def _cut(side: Side, parts: Mapping[str, Selection]) -> list[tuple[tuple[float, float], str | None]]:
-    """Cut a side where parts end; return for each piece its parameters and the name of its part."""
+def _cut(number: int, side: Side, parts: Mapping[str, Selection]) -> list[_Piece]:
+    """Cut a side where parts end."""
     predicates = [
         selection.where
         for selection in parts.values()
@@ -152,45 +157,33 @@ def _cut(side: Side, parts: Mapping[str, Selection]) -> list[tuple[tuple[float, 
                     f"{format_point(middles[k])}: restrict one of them"
                 )
             names[k] = name
-    return [((float(start), float(end)), name) for start, end, name in zip(ends[:-1], ends[1:], names, strict=True)]
+    spans = zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
+    return [_Piece(number, span, name) for span, name in zip(spans, names, strict=True)]
 
 
-def _mesh_pieces(
-    outline: Outline,
-    pieces: list[_Piece],
-    counts: IntArray,
-    rulers: Mapping[str, _Ruler],
-    part_names: tuple[str, ...],
-    grading: Grading,
+def _join(
+    outline: Outline, pieces: list[_Piece], parameters: list[FloatArray], part_names: tuple[str, ...]
 ) -> BoundaryMesh:
-    curves = tuple(side.curve for side in outline.sides if not side.curve.is_straight)
-    index_of_side = {id(side): -1 for side in outline.sides}
-    index_of_side |= {
-        id(side): k for k, side in enumerate(side for side in outline.sides if not side.curve.is_straight)
-    }
-    nodes, spans = [], []
-    for piece, count in zip(pieces, counts, strict=True):
-        positions = _checked_positions(grading, int(count))
-        s = rulers[piece.side.name].parameters(piece.span, positions)
-        points = piece.side.curve.point(s[:-1])
+    """Make the mesh whose elements lie between consecutive parameters of each piece."""
+    corners = np.concatenate(outline.corners)
+    nodes = []
+    for piece, s in zip(pieces, parameters, strict=True):
+        points = outline.sides[piece.side].curve.point(s[:-1])
         if piece.span[0] == 0.0:
-            points[0] = outline.corners[piece.loop][piece.side_number]
+            points[0] = corners[piece.side]  # where the side before ends too, to the last digit
         nodes.append(points)
-        spans.append(np.column_stack([s[:-1], s[1:]]))
-    piece_of_element = np.repeat(np.arange(len(pieces)), counts)
-    loop_of_element = np.array([piece.loop for piece in pieces])[piece_of_element]
-    following = np.arange(1, len(piece_of_element) + 1)
-    last = np.flatnonzero(np.diff(loop_of_element, append=-1))
-    following[last] = np.concatenate([[0], last[:-1] + 1])
-    part_of_element = np.array([piece.part or "" for piece in pieces])[piece_of_element]
-    element_curve = np.array([index_of_side[id(piece.side)] for piece in pieces])[piece_of_element]
+    counts = [len(points) for points in nodes]
+    side = np.repeat([piece.side for piece in pieces], counts)
+    part = np.repeat([piece.part or "" for piece in pieces], counts)
+    loop = np.repeat(np.arange(len(outline.loops)), [len(sides) for sides in outline.loops])[side]
+    is_curved = np.array([not side.curve.is_straight for side in outline.sides])
     return BoundaryMesh(
         np.concatenate(nodes),
-        np.column_stack([np.arange(len(following)), following]),
-        {name: np.flatnonzero(part_of_element == name) for name in part_names},
-        curves,
-        element_curve if curves else None,
-        np.concatenate(spans) if curves else None,
+        np.column_stack([np.arange(len(loop)), following_in_loops(np.bincount(loop))]),
+        {name: np.flatnonzero(part == name) for name in part_names},
+        tuple(side.curve for side in outline.sides if not side.curve.is_straight),
+        np.where(is_curved, np.cumsum(is_curved) - 1, -1)[side] if is_curved.any() else None,
+        np.concatenate([np.column_stack([s[:-1], s[1:]]) for s in parameters]) if is_curved.any() else None,
         outline.is_exterior,
     )
 
@@ -207,6 +200,16 @@ def _checked_positions(grading: Grading, n: int) -> FloatArray:
     return positions
 
 
+def _check_density(density: Mapping[str, float], outline: Outline) -> None:
+    for side, value in density.items():
+        if side not in outline.side_names:
+            raise GeometryError(
+                f"discretise: density names the side {side!r}: the sides are {', '.join(outline.side_names)}"
+            )
+        if not 0.0 < value < np.inf:
+            raise GeometryError(f"discretise: the density of side {side!r} is {value}: give a positive, finite number")
+
+
 def _check_sides(outline: Outline, parts: Mapping[str, Selection]) -> None:
     for name, selection in parts.items():
         for side in selection.sides:
@@ -220,6 +223,6 @@ def _check_sides(outline: Outline, parts: Mapping[str, Selection]) -> None:
 def _empty_part_message(name: str, selection: Selection, outline: Outline) -> str:
     sides = ", ".join(repr(side) for side in selection.sides or outline.side_names)
     return (
-        f"discretise: part {name!r} is empty: its predicate holds at none of {N_SAMPLES} points along each of the sides "
-        f"{sides}; widen it or name other sides"
+        f"discretise: part {name!r} is empty: its predicate holds at none of {N_SAMPLES} points along each of "
+        f"the sides {sides}; widen it or name other sides"
     )

@@ -1,4 +1,4 @@
-"""Closed loops of pieces: is this the boundary of a body that lies on its left?"""
+"""Closed loops of pieces: do they bound a body on their left."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.pieces import (
     Pieces,
-    angles_between,
     concatenate,
     derivative_on,
     evaluate_curves,
@@ -17,6 +16,7 @@ from bemkit.geometry.pieces import (
 )
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.separation import find_meeting, point_distances
+from bemkit.geometry.vectors import angles_between, cross
 
 _N_AREA_POINTS = 10  # round-off on pieces that turn by less than LARGEST_TURNING
 
@@ -52,13 +52,10 @@ def check_loops(
     loop_sizes = np.bincount(loop_of_owner)
     flat = split_until_flat(pieces, describe, max(least_splits, int(loop_sizes.min() < 3)))
     loop = loop_of_owner[flat.owner]
-    last = np.flatnonzero(np.diff(loop, append=-1))  # the last piece of each loop
-    following = np.arange(1, len(flat) + 1)
-    following[last] = np.concatenate([[0], last[:-1] + 1])
-    meeting = find_meeting(flat, following)
+    meeting = find_meeting(flat, following_in_loops(np.bincount(loop)))
     if meeting is not None:
         raise GeometryError(_meeting_message(*meeting, describe))
-    areas = np.bincount(loop, weights=swept_areas(flat))
+    areas: FloatArray = np.bincount(loop, weights=swept_areas(flat)).astype(float)
     members = [flat.take(np.flatnonzero(loop == k)) for k in range(len(loop_sizes))]
     if is_exterior:
         _check_cavities(areas, describe_loop)
@@ -68,14 +65,21 @@ def check_loops(
     _check_holes_apart(holes, members, describe_loop)
 
 
+def following_in_loops(loop_sizes: IntArray) -> IntArray:
+    """Return for each piece the index of the next one, where the pieces of each loop stand together and in order."""
+    after = np.cumsum(loop_sizes)
+    following = np.arange(1, after[-1] + 1)
+    following[after - 1] = after - loop_sizes
+    return following
+
+
 def swept_areas(pieces: Pieces) -> FloatArray:
     """Return the area [m^2] that the ray from the middle of the body to each piece sweeps, anticlockwise positive.
 
     Over a closed loop they add up to its signed area.
     """
     middle = 0.5 * (pieces.start.min(axis=0) + pieces.start.max(axis=0))  # keeps the digits of a body far away
-    a, b = pieces.start - middle, pieces.end - middle
-    areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    areas = 0.5 * cross(pieces.start - middle, pieces.end - middle)
     rows = np.flatnonzero(pieces.curve >= 0)
     if len(rows):
         xi, weights = gauss_legendre(_N_AREA_POINTS)
@@ -83,7 +87,7 @@ def swept_areas(pieces: Pieces) -> FloatArray:
         s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
         x = evaluate_curves(pieces.curves, pieces.curve[rows], s, point_on) - middle
         dx = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
-        areas[rows] = 0.25 * (span[:, 1] - span[:, 0]) * ((x[..., 0] * dx[..., 1] - x[..., 1] * dx[..., 0]) @ weights)
+        areas[rows] = 0.25 * (span[:, 1] - span[:, 0]) * (cross(x, dx) @ weights)
     return areas
 
 

@@ -22,6 +22,7 @@ from bemkit.geometry.mesh_checks import (
 )
 from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import norms, turned_right
 
 _N_LENGTH_POINTS = 16
 _Array = TypeVar("_Array", FloatArray, IntArray, BoolArray)
@@ -31,8 +32,8 @@ _Array = TypeVar("_Array", FloatArray, IntArray, BoolArray)
 class BoundaryMesh:
     """The boundary of one body, cut into elements.
 
-    Every loop is traversed with the body on its left: the outer loop anticlockwise, holes clockwise. The tangent t points
-    along the traversal, the normal n = (t_y, -t_x) out of the body.
+    Every loop is traversed with the body on its left: the outer loop anticlockwise, holes clockwise. The tangent t
+    points along the traversal, the normal n = (t_y, -t_x) out of the body.
 
     Parameters
     ----------
@@ -139,12 +140,12 @@ class BoundaryMesh:
     def tangents(self) -> FloatArray:
         """(n_elements, 2) array: unit vectors along the chords."""
         chord = self.end - self.start
-        return _frozen(chord / np.hypot(*chord.T)[:, None])
+        return _frozen(chord / norms(chord)[:, None])
 
     @cached_property
     def normals(self) -> FloatArray:
         """(n_elements, 2) array: unit normals of the chords, out of the body."""
-        return _frozen(_turned_right(self.tangents))
+        return _frozen(turned_right(self.tangents))
 
     @cached_property
     def node_elements(self) -> IntArray:
@@ -236,13 +237,12 @@ class BoundaryMesh:
 
     def jacobian(self, elements: IntArray, xi: FloatArray) -> FloatArray:
         """Return |dx/dxi| [m], (m, q), for (m,) elements at (q,) local coordinates."""
-        derivative = self.derivatives(elements, xi)
-        return np.hypot(derivative[..., 0], derivative[..., 1])
+        return norms(self.derivatives(elements, xi))
 
     def normals_at(self, elements: IntArray, xi: FloatArray) -> FloatArray:
         """Return unit normals out of the body, (m, q, 2), for (m,) elements at (q,) local coordinates."""
         derivative = self.derivatives(elements, xi)
-        return _turned_right(derivative / np.hypot(derivative[..., 0], derivative[..., 1])[..., None])
+        return turned_right(derivative / norms(derivative)[..., None])
 
     def refined(self, marked: IntArray) -> "BoundaryMesh":
         """Bisect elements.
@@ -266,7 +266,9 @@ class BoundaryMesh:
             )
         is_halved = np.zeros(self.n_elements, dtype=bool)
         is_halved[marked] = True
-        first = np.arange(self.n_elements) + np.cumsum(is_halved) - is_halved  # new number of the (first half of the) element
+        first = (
+            np.arange(self.n_elements) + np.cumsum(is_halved) - is_halved
+        )  # new number of the (first half of the) element
         halved = np.flatnonzero(is_halved)
         source = np.repeat(np.arange(self.n_elements), 1 + is_halved)
 
@@ -350,11 +352,6 @@ class BoundaryMesh:
             s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
             straight[curve >= 0] = evaluate_curves(self.curves, curve, s, evaluate)[curve >= 0]
         return straight
-
-
-def _turned_right(vectors: FloatArray) -> FloatArray:
-    """Turn vectors (..., 2) clockwise by a right angle: tangents to outward normals."""
-    return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)
 
 
 def _frozen(array: _Array) -> _Array:

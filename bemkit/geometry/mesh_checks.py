@@ -9,7 +9,8 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
-from bemkit.geometry.pieces import RESOLUTION, Pieces, evaluate_curves, point_on
+from bemkit.geometry.pieces import Pieces, evaluate_curves, point_on, resolution
+from bemkit.geometry.vectors import norms
 
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away
 
@@ -31,8 +32,8 @@ def check_chains(nodes: FloatArray, elements: IntArray) -> None:
         raise GeometryError(f"BoundaryMesh: node {node} is {format_point(nodes[node])}: coordinates must be finite")
     for element in np.flatnonzero(((elements < 0) | (elements >= len(nodes))).any(axis=1)):
         raise GeometryError(
-            f"BoundaryMesh: element {element} joins nodes {elements[element].tolist()}, but there are {len(nodes)} nodes: "
-            f"use numbers from 0 to {len(nodes) - 1}"
+            f"BoundaryMesh: element {element} joins nodes {elements[element].tolist()}, but there are {len(nodes)} "
+            f"nodes: use numbers from 0 to {len(nodes) - 1}"
         )
     n_starting, n_ending = (np.bincount(elements[:, column], minlength=len(nodes)) for column in (0, 1))
     for node in np.flatnonzero((n_starting != 1) | (n_ending != 1)):
@@ -40,11 +41,11 @@ def check_chains(nodes: FloatArray, elements: IntArray) -> None:
             f"BoundaryMesh: node {node} at {format_point(nodes[node])} starts {n_starting[node]} and ends "
             f"{n_ending[node]} elements: each node must start one and end one, so that the boundary is closed"
         )
-    chord = np.hypot(*(nodes[elements[:, 1]] - nodes[elements[:, 0]]).T)
-    for element in np.flatnonzero(chord <= RESOLUTION * np.abs(nodes[elements]).max(axis=(1, 2))):
+    chord = norms(nodes[elements[:, 1]] - nodes[elements[:, 0]])
+    for element in np.flatnonzero(chord <= resolution(nodes[elements[:, 0]], nodes[elements[:, 1]])):
         raise GeometryError(
-            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has length {chord[element]:.3g}, no more than "
-            "the round-off of its coordinates: join its nodes, grade less, or move the body towards the origin"
+            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has length {chord[element]:.3g}, no "
+            "more than the round-off of its coordinates: join its nodes, grade less, or move the body to the origin"
         )
     order = np.lexsort(nodes.T)
     for k in np.flatnonzero((nodes[order[1:]] == nodes[order[:-1]]).all(axis=1)):
@@ -62,8 +63,8 @@ def check_curves(
     n = len(elements)
     if element_curve.shape != (n,) or span.shape != (n, 2):
         raise GeometryError(
-            f"BoundaryMesh: element_curve has shape {element_curve.shape} and element_span {span.shape} for {n} elements: "
-            f"give shapes ({n},) and ({n}, 2)"
+            f"BoundaryMesh: element_curve has shape {element_curve.shape} and element_span {span.shape} for {n} "
+            f"elements: give shapes ({n},) and ({n}, 2)"
         )
     for element in np.flatnonzero((element_curve < -1) | (element_curve >= len(curves))):
         raise GeometryError(
@@ -77,13 +78,12 @@ def check_curves(
             "give an increasing pair of parameters in [0, 1]"
         )
     ends = nodes[elements]
-    chord = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
-    distance = np.linalg.norm(evaluate_curves(curves, element_curve, span, point_on) - ends, axis=2).max(axis=1)
-    tolerance = _CURVE_TOLERANCE * chord + RESOLUTION * np.abs(ends).max(axis=(1, 2))
+    distance = norms(evaluate_curves(curves, element_curve, span, point_on) - ends).max(axis=1)
+    tolerance = _CURVE_TOLERANCE * norms(ends[:, 1] - ends[:, 0]) + resolution(ends[:, 0], ends[:, 1])
     for element in np.flatnonzero(is_curved & ~(distance <= tolerance)):
         raise GeometryError(
-            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has ends {distance[element]:.3g} away from "
-            f"the points of its curve at {span[element].tolist()}: correct its nodes, curve or span"
+            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has ends {distance[element]:.3g} away "
+            f"from the points of its curve at {span[element].tolist()}: correct its nodes, curve or span"
         )
 
 

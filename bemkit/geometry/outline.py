@@ -9,7 +9,8 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
-from bemkit.geometry.pieces import RESOLUTION, make_pieces
+from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
+from bemkit.geometry.vectors import norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
 _LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
@@ -50,8 +51,8 @@ class Outline:
     Raises
     ------
     GeometryError
-        If a loop is not closed or runs the wrong way, sides cross, touch or fold back, a side has a kink or no length, a
-        hole is not in the body, or two sides have the same name.
+        If a loop is not closed or runs the wrong way, sides cross, touch or fold back, a side has a kink or no length,
+        a hole is not in the body, or two sides have the same name.
     """
 
     loops: tuple[tuple[Side, ...], ...]
@@ -98,17 +99,17 @@ class Outline:
             raise GeometryError(f"Outline: {self._describe(bad)} has an end that is not finite: correct its curve")
         tolerance = _JOINT_TOLERANCE * np.abs(start).max()
         followers = [name for loop in self.loops for name in [*[side.name for side in loop[1:]], loop[0].name]]
-        for k in np.flatnonzero(np.hypot(*(own_end - end).T) > tolerance):
+        for k in np.flatnonzero(norms(own_end - end) > tolerance).tolist():
             raise GeometryError(
-                f"Outline: {self._describe(int(k))} ends at {format_point(own_end[k])}, but side {followers[k]!r} starts "
-                f"at {format_point(end[k])}: make every side start where the one before it ends"
+                f"Outline: {self._describe(k)} ends at {format_point(own_end[k])}, but side {followers[k]!r} "
+                f"starts at {format_point(end[k])}: make every side start where the one before it ends"
             )
-        for k, side in enumerate(self.sides):
-            if side.curve.is_straight and np.hypot(*(end[k] - start[k])) <= RESOLUTION * np.abs(start[k]).max():
-                raise GeometryError(
-                    f"Outline: {self._describe(k)} at {format_point(start[k])} has no length, or less than the digits of "
-                    "its coordinates resolve: leave it out, or move the body towards the origin"
-                )
+        is_straight = np.array([side.curve.is_straight for side in self.sides])
+        for k in np.flatnonzero(is_straight & (norms(end - start) <= resolution(start, end))).tolist():
+            raise GeometryError(
+                f"Outline: {self._describe(k)} at {format_point(start[k])} has no length, or less than the digits of "
+                "its coordinates resolve: leave it out, or move the body towards the origin"
+            )
         return start, end
 
     def _describe(self, k: int) -> str:

@@ -1,8 +1,8 @@
 """Pieces of a boundary: chords with a bound on how far the boundary strays from them.
 
 The sides of an outline and the elements of a mesh are examined as the same thing: pieces in order along closed
-loops, each a chord and the total angle by which its tangent turns. A piece that turns by `turning` strays from its chord by
-at most tan(turning / 2) / 2 chord lengths, and leaves its ends within the angle `turning` of the chord.
+loops, each a chord and the total angle by which its tangent turns. A piece that turns by `turning` strays from its
+chord by at most tan(turning / 2) / 2 chord lengths, and leaves its ends within the angle `turning` of the chord.
 """
 
 from collections.abc import Callable
@@ -13,6 +13,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.vectors import angles_between, norms
 
 LARGEST_TURNING = np.pi / 4
 """Pieces are split until they turn by less, so that none can meet itself."""
@@ -21,6 +22,12 @@ _TURNING_SAFETY = 1.25  # the turning is sampled, not bounded
 _MOST_SPLITS = 12  # a smooth side turns by less than LARGEST_TURNING on 1/4096 of its length
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
+
+
+def resolution(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the distances (n,) that the coordinates of the ends (n, 2) cannot resolve [m]."""
+    size: FloatArray = np.maximum(np.abs(start).max(axis=1), np.abs(end).max(axis=1))
+    return RESOLUTION * size
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +64,7 @@ class Pieces:
     @property
     def chord_length(self) -> FloatArray:
         """(n,) array [m]: distance of the ends."""
-        return np.hypot(*(self.end - self.start).T)
+        return norms(self.end - self.start)
 
     @property
     def deviation(self) -> FloatArray:
@@ -67,7 +74,7 @@ class Pieces:
     @property
     def resolution(self) -> FloatArray:
         """(n,) array [m]: distance that the coordinates of the ends cannot resolve."""
-        return RESOLUTION * np.maximum(np.abs(self.start).max(axis=1), np.abs(self.end).max(axis=1))
+        return resolution(self.start, self.end)
 
     def take(self, index: IntArray) -> "Pieces":
         """Return the pieces with these indices, in this order."""
@@ -202,9 +209,3 @@ def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: Floa
         tangent = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
         turning[rows] = _TURNING_SAFETY * np.abs(angles_between(tangent[:, :-1], tangent[:, 1:])).sum(axis=1)
     return Pieces(pieces.curves, start, end, pieces.curve, span, turning, pieces.owner)
-
-
-def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the signed angles from vectors (..., 2) to vectors (..., 2), anticlockwise positive [rad]."""
-    cross = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    return np.arctan2(cross, (first * second).sum(axis=-1))

@@ -1,13 +1,15 @@
 """Do the pieces of a boundary keep apart? Crossing, touching and folding back, at any grading and size.
 
 Nothing here compares with an absolute length. Two pieces touch if they come closer than the round-off of their own
-coordinates, so that neighbours a millionth of an element apart and elements 1e-12 of the body's size are seen as they are.
+coordinates, so that neighbours a millionth of an element apart, and elements 1e-12 of the size of the body, are seen as
+they are.
 """
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.pieces import Pieces, angles_between, concatenate
+from bemkit.geometry.pieces import Pieces, concatenate
+from bemkit.geometry.vectors import angles_between, cross, norms
 
 _MOST_PAIRS = 1_000_000  # more undecided pairs than this mean two curves that follow each other to about 1e-12
 
@@ -30,8 +32,8 @@ def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
     Notes
     -----
     Bounding boxes of contiguous runs of pieces, halved level by level, leave about n pairs to look at. A pair whose
-    chords are farther apart than both pieces stray is settled; otherwise the piece that strays more is halved. Neighbours are
-    settled when the angle between their chords exceeds what both turn.
+    chords are farther apart than both pieces stray is settled; otherwise the piece that strays more is halved.
+    Neighbours are settled when the angle between their chords exceeds what both turn.
     """
     reach = (pieces.deviation + pieces.resolution)[:, None]
     low = np.minimum(pieces.start, pieces.end) - reach
@@ -97,12 +99,12 @@ def point_distances(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     # measured from the nearer end, so that a long segment does not hide a short distance
     from_a = p - a - np.clip(fraction, 0.0, 1.0)[:, None] * chord
     from_b = p - b + np.clip(1.0 - fraction, 0.0, 1.0)[:, None] * chord
-    return np.where(fraction < 0.5, np.hypot(*from_a.T), np.hypot(*from_b.T))
+    return np.where(fraction < 0.5, norms(from_a), norms(from_b))
 
 
 def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
     """Return the sign of the side of the line from a to b on which c lies, +1 for the left."""
-    return np.sign((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+    return np.sign(cross(b - a, c - a))
 
 
 def overlapping_boxes(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:

@@ -1,6 +1,7 @@
 """Shapes: bodies given by a few plain numbers, so that scene files can name them."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -218,9 +219,9 @@ def _polygon_loop(vertices: tuple[tuple[float, float], ...], names: tuple[str, .
 
 def _circle_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[Side, ...]:
     """Return four arcs, anticlockwise from angle 0."""
-    angles = zip(_QUADRANTS[:-1], _QUADRANTS[1:], strict=True)
     return tuple(
-        Side(f"{name}-{k + 1}", Arc(centre, radius, float(start), float(end))) for k, (start, end) in enumerate(angles)
+        Side(f"{name}-{k + 1}", Arc(centre, radius, float(start), float(end)))
+        for k, (start, end) in enumerate(pairwise(_QUADRANTS))
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points, dof_weights
+from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
 from bemkit.operators.collocation import collocation_matrices
 from bemkit.operators.dense import Cholesky, DenseLU, multiply
@@ -55,7 +55,7 @@ class SteklovPoincare(Protocol):
         """The space of the displacements; its nodes carry the forces."""
 
     def matrix(self) -> FloatArray:
-        """Return the weak (n_dofs, n_dofs) matrix [Pa]; rigid motions are in its kernel and in that of its transpose."""
+        """Return the weak (n_dofs, n_dofs) matrix [Pa]; its forces are in equilibrium."""
 
     def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
         """Return the (n_nodes, 2) nodal forces [N/m] of a traction field [Pa] on some elements."""
@@ -122,7 +122,7 @@ class GalerkinMap:
         return matrix
 
     def matrix(self) -> FloatArray:
-        """Return the weak, symmetric (n_dofs, n_dofs) matrix [Pa]."""
+        """Return the weak, symmetric (n_dofs, n_dofs) matrix [Pa]; its kernel are the rigid motions."""
         return self._matrix
 
     def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
@@ -176,10 +176,10 @@ class CollocationMap:
 
     Notes
     -----
-    The paper's discretisation. Plain collocation satisfies the equilibrium of forces and moments, and the absence of tractions under a
-    rotation, only up to the discretisation error. Here a rigid motion c is added to the equations and the resultants of the tractions
-    are set to zero (c vanishes with the mesh size), and the double layer is projected so that it treats all rigid motions exactly. Both
-    corrections are of the order of the discretisation error.
+    The paper's discretisation. Plain collocation satisfies the equilibrium of forces and moments only up to the discretisation error.
+    Here a rigid motion c is added to the equations and the resultants of the tractions are set to zero; c vanishes with the mesh size.
+    Translations cause no tractions at all; a rotation, which constant elements cannot represent, causes some of the order of the
+    discretisation error.
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material) -> None:
@@ -198,12 +198,9 @@ class CollocationMap:
 
     @cached_property
     def _matrices(self) -> tuple[FloatArray, FloatArray]:
-        """The single layer U, and 1/2 + T made exact on rigid motions."""
+        """The single layer U and 1/2 + T."""
         single, double = collocation_matrices(self.mesh, self.material)
         double[np.diag_indices_from(double)] += 0.5
-        weighted = self._weights[:, None] * self._motions
-        gram = self._motions.T @ weighted
-        double -= multiply(multiply(double, self._motions), np.linalg.solve(gram, weighted.T))
         return single, double
 
     @cached_property
@@ -306,6 +303,3 @@ def _rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     blocks = result.reshape(-1, 2, matrix.shape[1])
     blocks[turned] = np.einsum("ncm,nkc->nkm", matrix.reshape(blocks.shape)[turned], frame[turned])
     return result
-
-
-__all__ = ["CollocationMap", "CondensedMap", "GalerkinMap", "SteklovPoincare", "dof_weights"]

@@ -1,6 +1,7 @@
 """Augmented Lagrangian method: Algorithm 1 of the paper, corrected."""
 
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 
@@ -39,17 +40,15 @@ class InnerNewton:
         check_count("full_steps", self.full_steps)
 
 
-@dataclass(frozen=True)
-class LaggedBound:
-    """Friction bound of each outer step from the multiplier of the last one, as printed in Algorithm 1."""
+class BoundUpdate(Enum):
+    """Which normal traction the friction bound of an outer step comes from."""
 
+    LAGGED = "lagged"
+    """The multiplier of the last outer step, as printed in Algorithm 1: each outer step solves a Tresca problem."""
 
-@dataclass(frozen=True)
-class CurrentBound:
-    """Friction bound from the present normal traction, differentiated inside the inner Newton iteration.
-
-    The outer iteration then no longer waits for the bound, and converges at the rate of the augmentation alone.
-    """
+    CURRENT = "current"
+    """The present one, differentiated inside the inner Newton iteration: the outer iteration no longer waits for the
+    bound and converges at the rate of the augmentation alone."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,7 +74,7 @@ class AugmentedLagrangian:
         rho_1 and rho_2 of the paper as ratios of traction to displacement [Pa/m]; a body in units of E' and L takes
         them in units of E'/L. By default 100 times the stiffness scale of the body.
     inner : InnerNewton
-    bound : LaggedBound or CurrentBound
+    bound : BoundUpdate
     max_steps : int
         Outer steps allowed.
 
@@ -95,7 +94,7 @@ class AugmentedLagrangian:
     rho_n: float | None = None
     rho_t: float | None = None
     inner: InnerNewton = field(default_factory=InnerNewton)
-    bound: LaggedBound | CurrentBound = field(default_factory=LaggedBound)
+    bound: BoundUpdate = BoundUpdate.LAGGED
     max_steps: int = 500
 
     def __post_init__(self) -> None:
@@ -131,7 +130,7 @@ class AugmentedLagrangian:
     def _conditions(self, problem: ContactProblem, multiplier: FloatArray) -> ProjectedConditions:
         automatic = _AUTOMATIC_RHO * problem.body.stiffness_scale
         given_bound = None
-        if isinstance(self.bound, LaggedBound):
+        if self.bound is BoundUpdate.LAGGED:
             given_bound = problem.friction_bound(multiplier[:, 0], is_closed=multiplier[:, 0] < 0.0)
         return ProjectedConditions(
             problem,

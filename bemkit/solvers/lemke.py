@@ -14,7 +14,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.options import check_max_steps
 
-_SPRING = 1e-3
+_SPRING = 1e-6
 """Springs on free rigid motions, in units of the mean diagonal of the stiffness; they are carried along from step to
 step and vanish from the solution."""
 
@@ -162,11 +162,12 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     body, n_contact = problem.body, problem.n_contact
     weights = np.repeat(body.weights, 2)
     none = np.zeros(n_contact)
+    amount = (float(np.abs(problem.glued_state.traction).max()) or 1.0) / body.stiffness_scale
     at_rest = body.respond(stick(none, none)).traction.ravel()
     stiffness = np.empty((2 * n_contact, 2 * n_contact))
-    for column, unit in enumerate(np.eye(2 * n_contact)):
+    for column, unit in enumerate(amount * np.eye(2 * n_contact)):
         moved = body.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
-        stiffness[:, column] = weights * (moved - at_rest)
+        stiffness[:, column] = weights * (moved - at_rest) / amount
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
 

@@ -1,0 +1,97 @@
+"""Conformance of friction laws."""
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.laws import FrictionLaw
+
+
+def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5, seed: int = 0) -> None:
+    """Check everything that `FrictionLaw` promises; call it on your own law.
+
+    Parameters
+    ----------
+    law : FrictionLaw
+    stress_scale : float [Pa]
+        Pressures from 1e-3 to 1e3 times this are tried; choose it so that the law's corners lie among them.
+    n_contact : int
+        Number of nodes to ask for at once; for a law with one coefficient a node, their number.
+    seed : int
+        Of the pressures tried.
+
+    Raises
+    ------
+    AssertionError
+        Naming the law, the promise broken, and where.
+    """
+    name = type(law).__name__
+    random = np.random.default_rng(seed)
+    for _ in range(20):
+        sigma_n = -stress_scale * 10.0 ** random.uniform(-3.0, 3.0, n_contact)
+        _check_values(law, name, sigma_n)
+        _check_monotony(law, name, sigma_n)
+        _check_derivative(law, name, sigma_n)
+        _check_locality(law, name, sigma_n)
+        _check_scaling(law, name, sigma_n)
+    _check_values(law, name, np.zeros(n_contact))
+    _demand(isinstance(law.acts_across_gap, bool), f"{name}.acts_across_gap is no bool")
+
+
+def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
+    given = sigma_n.copy()
+    for method in (law.bound, law.bound_derivative):
+        values = method(sigma_n)
+        label = f"{name}.{method.__name__}"
+        _demand(np.shape(values) == sigma_n.shape, f"{label} returns the shape {np.shape(values)} for {sigma_n.shape}")
+        _demand(bool(np.isfinite(values).all()), f"{label} is not finite at sigma_n = {sigma_n}")
+        _demand(np.array_equal(sigma_n, given), f"{label} changes its argument")
+        _demand(np.array_equal(values, method(sigma_n)), f"{label} gives two answers to one question")
+    _demand(bool((law.bound(sigma_n) >= 0.0).all()), f"{name}.bound is negative at sigma_n = {sigma_n}")
+    _demand(bool((law.bound_derivative(sigma_n) <= 0.0).all()), f"{name}.bound_derivative is positive at {sigma_n}")
+    is_zero = not law.bound(sigma_n).any()
+    _demand(is_zero or not law.is_frictionless, f"{name} says it is frictionless and has a bound at {sigma_n}")
+
+
+def _check_monotony(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
+    less, more = law.bound(sigma_n), law.bound(2.0 * sigma_n)
+    _demand(bool((more >= less).all()), f"{name}.bound falls when the pressure grows from {-sigma_n} to twice that")
+
+
+def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
+    """Compare with differences; at a corner any value between the two sides is right."""
+    step = 1e-6 * np.abs(sigma_n)
+    here = law.bound(sigma_n)
+    before = (here - law.bound(sigma_n - step)) / step
+    after = (law.bound(sigma_n + step) - here) / step
+    derivative = law.bound_derivative(sigma_n)
+    # Differences with a relative step of 1e-6 carry 1e-10 of round-off and 1e-6 of curvature.
+    slack = 1e-4 * (np.abs(before) + np.abs(after)) + 1e-9 * here / np.abs(sigma_n)
+    low, high = np.minimum(before, after) - slack, np.maximum(before, after) + slack
+    fits = (low <= derivative) & (derivative <= high)
+    if not fits.all():
+        node = int(np.argmin(fits))
+        raise AssertionError(
+            f"{name}.bound_derivative is {derivative[node]:g} at node {node}, sigma_n = {sigma_n[node]:g}; "
+            f"differences of bound give {before[node]:g} and {after[node]:g}"
+        )
+
+
+def _check_locality(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
+    other = sigma_n.copy()
+    other[1:] *= 3.0
+    is_local = law.bound(other)[0] == law.bound(sigma_n)[0]
+    _demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
+
+
+def _check_scaling(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
+    unit = 1e6
+    scaled = law.scaled(unit)
+    agrees = np.allclose(unit * scaled.bound(sigma_n / unit), law.bound(sigma_n), rtol=1e-12, atol=0.0)
+    _demand(agrees, f"{name}.scaled({unit:g}).bound is not the bound in that unit")
+    agrees = np.allclose(scaled.bound_derivative(sigma_n / unit), law.bound_derivative(sigma_n), rtol=1e-9, atol=1e-15)
+    _demand(agrees, f"{name}.scaled({unit:g}).bound_derivative changes with the unit")
+
+
+def _demand(is_kept: bool, message: str) -> None:
+    if not is_kept:
+        raise AssertionError(message)

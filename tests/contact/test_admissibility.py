@@ -1,0 +1,62 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bemkit.contact.admissibility import find_unsolvable_load
+from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.problem import ContactProblem, DenseBody
+from tests.handmade import block_problem
+
+
+def test_a_held_body_bears_any_load():
+    assert find_unsolvable_load(ContactProblem(DenseBody(np.eye(2), np.full(2, -5.0), np.ones(1)), np.zeros(1), Coulomb(0))) is None
+
+
+def test_pushed_away():
+    escape = find_unsolvable_load(block_problem(Coulomb(0.5), press=-1.0))
+    assert escape.description.startswith("the load pushes the body away from the obstacle (work 0.5 ")
+    assert np.allclose(escape.motion, [-1.0, 0.0], atol=1e-12)
+    assert escape.work == pytest.approx(0.5)
+
+
+# The block is pressed by 0.5 at x = 3/4 and pushed by push/2 at y = 3/4. It tips about its right corner from push = 1/3 on.
+@pytest.mark.parametrize(
+    ("law", "push", "word"),
+    [
+        (Coulomb(0.5), 0.3, None),
+        (Coulomb(0.5), 0.34, "tips"),
+        (Coulomb(0.2), 0.21, "slides"),
+        (Coulomb(0.2), 0.19, None),
+        (Frictionless(), 0.01, "slides"),
+        (Frictionless(), 0.0, None),
+        (Tresca(0.1), 0.19, None),
+        (Tresca(0.1), 0.21, "slides"),
+        (CohesiveCoulomb(0.1, 0.05), 0.19, None),
+        (CohesiveCoulomb(0.1, 0.05), 0.21, "slides"),
+        (CohesiveCoulomb(0.5, 0.0, 0.1), 0.19, None),
+        (CohesiveCoulomb(0.5, 0.0, 0.1), 0.21, "slides"),
+    ],
+    ids=repr,
+)
+def test_a_free_block(law, push, word):
+    escape = find_unsolvable_load(block_problem(law, is_held_sideways=False, push=push))
+    assert (escape is None) == (word is None)
+    if escape is not None:
+        assert f"the load {word} the body" in escape.description
+        assert escape.work > 0.0
+
+
+def test_the_edge_of_sliding_is_left_to_the_driver():
+    assert find_unsolvable_load(block_problem(Coulomb(0.2), is_held_sideways=False, push=0.2)) is None
+
+
+def test_an_obstacle_that_is_nowhere():
+    problem = block_problem(Coulomb(0.5))
+    nowhere = replace(problem, gap=np.full(problem.n_contact, np.inf))
+    assert "moves the body where no obstacle can meet it" in find_unsolvable_load(nowhere).description
+
+
+def test_no_load_is_no_trouble():
+    problem = block_problem(Coulomb(0.5), press=0.0, push=0.0)
+    assert find_unsolvable_load(problem) is None

@@ -1,0 +1,115 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bemkit.contact.certificate import Certificate, certify
+from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Tresca
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.solvers.base import solve
+from bemkit.solvers.ssn import SemismoothNewton
+from tests.handmade import block_problem
+
+SOLVED = block_problem(Coulomb(0.5))
+SOLUTION = solve(SOLVED, SemismoothNewton())
+
+
+def spoiled(displacement=None, traction=None):
+    """The solution with something added at one node each: node 0 is open, 4 slips backward, -1 sticks."""
+    u, t = SOLUTION.state.displacement.copy(), SOLUTION.state.traction.copy()
+    for node, component, amount in displacement or ():
+        u[node, component] += amount
+    for node, component, amount in traction or ():
+        t[node, component] += amount
+    return certify(SOLVED, ContactState(u, t)).as_dict()
+
+
+def test_a_solution_is_certified():
+    assert SOLUTION.certificate.worst < 1e-12
+    assert SOLUTION.certificate.is_below(1e-12)
+    assert not SOLUTION.certificate.is_below(0.0)
+    assert SOLUTION.node_status[[0, 4, -1]].tolist() == [0, 3, 1]
+
+
+# Stiffness and load of the block are of order one, so an error of 1e-3 must show as about 1e-3.
+@pytest.mark.parametrize(
+    ("entry", "displacement", "traction"),
+    [
+        ("penetration", [(-1, 0, 1e-3)], None),
+        ("tension", None, [(0, 0, 1e-3)]),
+        ("complementarity", None, [(0, 0, -1e-3)]),
+        ("complementarity", [(-1, 0, -1e-3)], None),
+        ("complementarity", None, [(0, 1, 1e-3)]),
+        ("cone_excess", None, [(4, 1, 1e-3)]),
+        ("slip_opposition", None, [(4, 1, -1e-3)]),
+        ("slip_opposition", [(-1, 1, 1e-3)], None),
+        ("slip_opposition", None, [(4, 0, -1e-3)]),
+        ("cone_excess", None, [(4, 0, 1e-3)]),
+        ("force_imbalance", None, [(-1, 0, -1e-3)]),
+        ("force_imbalance", [(-1, 0, -1e-3)], None),
+        ("moment_imbalance", None, [(-1, 0, -1e-3)]),
+    ],
+)
+def test_each_entry_sees_its_violation(entry, displacement, traction):
+    assert 1e-5 < spoiled(displacement, traction)[entry] < 1e-2
+
+
+def test_the_bound_is_taken_at_the_present_pressure():
+    """A frozen cone would certify this: tractions on the cone of a pressure that is not there any more."""
+    u, t = SOLUTION.state.displacement, SOLUTION.state.traction.copy()
+    t[:, 0] *= 0.5
+    assert certify(SOLVED, ContactState(u, t)).cone_excess > 0.05
+
+
+def test_nan_is_never_certified():
+    state = ContactState(np.full_like(SOLUTION.state.displacement, np.nan), SOLUTION.state.traction)
+    assert np.isnan(certify(SOLVED, state).worst)
+    assert not certify(SOLVED, state).is_below(1e300)
+
+
+def test_as_dict_and_worst():
+    certificate = Certificate(1.0, 2.0, 3.0, 4.0, 7.0, 5.0, 6.0)
+    assert certificate.worst == 7.0
+    assert certificate.is_below(7.0)
+    assert list(certificate.as_dict()) == [
+        "penetration",
+        "tension",
+        "complementarity",
+        "cone_excess",
+        "slip_opposition",
+        "force_imbalance",
+        "moment_imbalance",
+    ]
+
+
+@pytest.mark.parametrize("length", [1e-12, 1.0, 1e12])
+@pytest.mark.parametrize("stress", [1e-12, 1.0, 1e12])
+def test_units_do_not_matter(length, stress):
+    body = SOLVED.body
+    scaled = DenseBody(body.stiffness * stress / length, body.load * stress, body.weights, body.motions)
+    problem = ContactProblem(scaled, SOLVED.gap * length, SOLVED.law)
+    u, t = SOLUTION.state.displacement.copy(), SOLUTION.state.traction.copy()
+    u[0] += 1e-3
+    t[4] += 1e-3
+    expected = certify(SOLVED, ContactState(u, t)).as_dict()
+    assert certify(problem, ContactState(u * length, t * stress)).as_dict() == pytest.approx(expected, rel=1e-9)
+
+
+def test_nothing_loaded_nothing_moved_is_perfect():
+    body = DenseBody(np.eye(4), np.zeros(4), np.ones(2))
+    rest = ContactState(np.zeros((2, 2)), np.zeros((2, 2)))
+    for gap in (np.zeros(2), np.ones(2), np.full(2, np.inf)):
+        assert certify(ContactProblem(body, gap, Coulomb(0.3)), rest).worst == 0.0
+
+
+def test_open_nodes_carry_shear_only_under_friction_given_across_the_gap():
+    body = DenseBody(np.eye(2), np.array([-1.0, 0.4]), np.ones(1))
+    u = np.array([[-1.0, 0.1]])
+    state = ContactState(u, np.array([[0.0, -0.3]]))  # open by one, slips, resisted by 0.3
+    given = ContactProblem(body, np.zeros(1), Tresca(0.3))
+    assert certify(given, state).worst < 1e-15
+    for law in (Coulomb(0.3), CohesiveCoulomb(0.0, 0.3)):
+        assert certify(replace(given, law=law), state).worst > 0.1
+    free = ContactState(np.array([[-1.0, 0.4]]), np.zeros((1, 2)))
+    assert certify(replace(given, law=CohesiveCoulomb(0.0, 0.3)), free).worst < 1e-15
+    assert certify(given, free).slip_opposition > 0.1
