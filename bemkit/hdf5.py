@@ -188,8 +188,8 @@ class Reader:
             is_dataset = isinstance(found, h5py.Dataset)
             if not is_dataset or found.shape is None:
                 raise self.error(f"{path} is not an array")
-            is_plain = found.chunks is None and found.external is None and not found.is_virtual
-            if not is_plain or found.nbytes > min(self._size, found.id.get_storage_size()):
+            # compressed, virtual or never written data take less room in the file than in memory
+            if found.external is not None or found.nbytes > min(self._size, found.id.get_storage_size()):
                 raise self.error(f"{path} is not stored plainly in the file")
             if found.dtype.kind != kind or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
                 raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")

@@ -156,6 +156,7 @@ SOLVERS = Family(
             "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
             "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
             "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
+            "lemke": "bemkit.solvers.lemke:LemkePivoting",
         }
     ),
     "bemkit.solvers",

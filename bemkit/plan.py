@@ -135,8 +135,9 @@ def free_rigid_motions(scene: Scene, mesh: BoundaryMesh) -> int:
     rows = [np.zeros((1, 3))]
     for part in scene.parts:
         elements = mesh.part(part.name)
-        points = np.concatenate([mesh.start[elements], mesh.end[elements]])
-        normals = np.concatenate([mesh.normals[elements]] * 2)
+        places = np.array([-0.5, 0.5])  # two on each element: a single straight element already resists turning
+        points = mesh.points(elements, places).reshape(-1, 2)
+        normals = mesh.normals_at(elements, places).reshape(-1, 2)
         for direction in _held_directions(part.condition, normals):
             rows.append(_moved(mesh, points, direction))
     return 3 - int(np.linalg.matrix_rank(np.concatenate(rows), tol=_RANK_TOLERANCE))

@@ -18,6 +18,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.scene import ConstantCollocation
 from bemkit.solution import Solution
 
 if TYPE_CHECKING:
@@ -252,7 +253,7 @@ def node_displacement(solution: Solution) -> FloatArray:
         Given there directly, or the mean of the two elements that meet.
     """
     mesh, boundary = solution.mesh, solution.boundary
-    if np.array_equal(boundary.points, boundary.centres):
+    if isinstance(solution.scene.discretisation, ConstantCollocation):
         return np.asarray(boundary.displacement[mesh.node_elements].mean(axis=1))
     return boundary.displacement
 

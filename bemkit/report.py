@@ -96,7 +96,7 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     counts = Counter(solution.contact.status_words())
     certificate = solution.certificate
     worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
-    timings = ", ".join(f"{name} {value:.2f} s" for name, value in solution.timings.items() if name != "total")
+    timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
     status = Text(
         solution.status.name.lower().replace("_", " "), style="bold green" if solution.is_converged else "bold red"
     )

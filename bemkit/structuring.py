@@ -129,6 +129,9 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
     if isinstance(value, tuple | list):
         inner = get_args(declared)[0] if get_args(declared) else None
         return [unstructure(item, inner, f"{path}[{index}]") for index, item in enumerate(value)]
+    if isinstance(value, Mapping):
+        inner = get_args(declared)[1] if get_args(declared) else None
+        return {key: unstructure(item, inner, f"{path}.{key}") for key, item in value.items()}
     if is_dataclass(value):
         return _unstructure_dataclass(value, declared, path, keep_defaults)
     if callable(value):
@@ -184,6 +187,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(str, lambda value, _: _exactly(value, str, "a text in quotation marks"))
     add(lambda wanted: get_origin(wanted) is np.ndarray, lambda value, _: _array(value))
     add(lambda wanted: get_origin(wanted) is tuple, lambda value, wanted: _tuple(converter, value, wanted))
+    add(lambda wanted: get_origin(wanted) is Mapping, lambda value, wanted: _mapping(converter, value, wanted))
     add(lambda wanted: _is_class(wanted, Enum), lambda value, wanted: _enum(value, wanted))
     add(lambda wanted: bool(_options(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
     converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
@@ -241,6 +245,11 @@ def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
         _at(f"[{index}]", converter.structure, item, kind)
         for index, (item, kind) in enumerate(zip(items, inner, strict=True))
     )
+
+
+def _mapping(converter: Converter, value: object, wanted: Any) -> dict[str, Any]:
+    table = _exactly(value, dict, "a table")
+    return {key: _at(key, converter.structure, item, get_args(wanted)[1]) for key, item in table.items()}
 
 
 def _enum(value: object, wanted: type[Enum]) -> Enum:

@@ -14,6 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
+from bemkit.scene import ConstantCollocation
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -91,9 +92,7 @@ def element_displacement(solution: Solution) -> FloatArray:
         Given there directly, or the mean of both end nodes.
     """
     displacement = solution.boundary.displacement
-    if len(displacement) == solution.mesh.n_elements and np.array_equal(
-        solution.boundary.points, solution.boundary.centres
-    ):
+    if isinstance(solution.scene.discretisation, ConstantCollocation):
         return displacement
     return np.asarray(displacement[solution.mesh.elements].mean(axis=1))
 

@@ -31,7 +31,7 @@ def block_stiffness(n, poisson_ratio):
 
 
 def block_body(n=12, *, press=1.0, push=1.0, is_held_sideways=True, poisson_ratio=0.2):
-    """Unit block standing on its bottom, pressed on the right half of its top, pushed on the upper half of its left side.
+    """Unit block standing on its bottom, pressed on the right half of its top, pushed on its left side's upper half.
 
     Held sideways by a roller on its right side (the paper's Example 1) or free. The body floats vertically.
     """
@@ -47,7 +47,8 @@ def block_body(n=12, *, press=1.0, push=1.0, is_held_sideways=True, poisson_rati
     dofs = np.stack([2 * contact + 1, 2 * contact], axis=1).ravel()
     sign = np.tile([-1.0, 1.0], len(contact))  # the outward normal points down, the tangent to the right
     inner = np.setdiff1d(np.arange(len(load)), np.concatenate([dofs, held]))
-    solved = np.linalg.solve(stiffness[np.ix_(inner, inner)], np.column_stack([stiffness[np.ix_(inner, dofs)], load[inner]]))
+    right_sides = np.column_stack([stiffness[np.ix_(inner, dofs)], load[inner]])
+    solved = np.linalg.solve(stiffness[np.ix_(inner, inner)], right_sides)
     condensed = stiffness[np.ix_(dofs, dofs)] - stiffness[np.ix_(dofs, inner)] @ solved[:, :-1]
     condensed = sign[:, None] * condensed * sign
     weights = np.full(len(contact), 1.0 / n)
@@ -89,11 +90,11 @@ def random_problem(seed, *, friction_share=0.9, n_most=40, condition=10.0):
     return ContactProblem(body, gap, Coulomb(friction_share / np.linalg.cond(body.stiffness)))
 
 
-def cycling_problem(seed):
-    """Random problem with friction far beyond uniqueness and a stiffness no elastic body has."""
+def hard_problem(seed, *, n_most=5, condition=100.0, friction_coefficient=2.0):
+    """Random problem with friction far beyond uniqueness; most drivers fail on some of them."""
     random = np.random.default_rng(seed)
-    body = random_body(random, int(random.integers(10, 41)), condition=1e4)
-    return ContactProblem(body, np.zeros(body.n_contact), Coulomb(1.0))
+    body = random_body(random, int(random.integers(1, n_most + 1)), condition)
+    return ContactProblem(body, np.zeros(body.n_contact), Coulomb(friction_coefficient))
 
 
 def assert_solves(problem, state, friction_coefficient, tolerance=1e-8):

@@ -46,9 +46,7 @@ def combined(values: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
     two = st.sampled_from(["min", "max", "hypot", "atan2"])
     conditions = st.builds("{} {} {}".format, values, st.sampled_from(["<", "<=", ">", ">=", "==", "!="]), values)
     conditions = conditions | st.builds("not ({})".format, conditions)
-    conditions = conditions | st.builds(
-        "({}) {} ({})".format, conditions, st.sampled_from(["and", "or"]), conditions
-    )
+    conditions = conditions | st.builds("({}) {} ({})".format, conditions, st.sampled_from(["and", "or"]), conditions)
     return st.one_of(
         st.builds("({} {} {})".format, values, st.sampled_from(["+", "-", "*", "/"]), values),
         st.builds("({} ** {})".format, values, st.sampled_from(["2", "3", "0.5", "-1"])),

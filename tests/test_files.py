@@ -33,9 +33,14 @@ def test_a_finished_file_replaces_the_old_one(tmp_path: Path) -> None:
 def test_whatever_is_raised_leaves_the_old_file_and_no_rest(tmp_path: Path, error: type[BaseException]) -> None:
     target = tmp_path / "a.txt"
     target.write_text("old", "utf-8")
-    with pytest.raises(error), replacing(target) as temporary:
-        temporary.write_text("half", "utf-8")
-        raise error
+
+    def write_half() -> None:
+        with replacing(target) as temporary:
+            temporary.write_text("half", "utf-8")
+            raise error
+
+    with pytest.raises(error):
+        write_half()
     assert target.read_text("utf-8") == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
 

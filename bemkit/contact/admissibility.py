@@ -20,24 +20,27 @@ class UnsolvableLoad:
     ----------
     motion : (n_contact, 2) array
         Normal and tangential components of the escape at the contact nodes, scaled to a largest entry of one.
+    lift : (n_contact,) array
+        How much faster each node leaves the obstacle than sliding against full friction would allow, ``-v_n - s |v_t|``;
+        zero everywhere if the body slides, nan where a node can never touch.
     work : float [N]
         Work of the load on it, less what friction takes up; positive.
     """
 
     motion: FloatArray
+    lift: FloatArray
     work: float
 
     @property
     def description(self) -> str:
         """One sentence that names the escape."""
-        lifts, slides = self.motion[:, 0] < -1e-6, np.abs(self.motion[:, 1]) > 1e-6
-        if lifts.any():
+        if np.isnan(self.lift).all():
+            how = "moves the body where no obstacle can meet it"
+        elif np.nanmax(self.lift) > 1e-6:
             how = "pushes" if np.ptp(self.motion[:, 0]) < 1e-6 else "tips"
             how += " the body away from the obstacle"
-        elif slides.any():
-            how = "slides the body along the obstacle against all the friction there is"
         else:
-            how = "moves the body where no obstacle can meet it"
+            how = "slides the body along the obstacle against all the friction there is"
         return f"the load {how} (work {self.work:.3g} on that rigid motion); change the load or hold the body"
 
 
@@ -77,7 +80,9 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         motion = np.tensordot(coefficients, motions, axes=1)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
         if work > _RELATIVE_WORK * force_scale and (best is None or work > best.work):
-            best = UnsolvableLoad(motion / np.abs(motion).max(), work)
+            motion = motion / np.abs(motion).max()
+            lift = np.where(touches, -motion[:, 0] - slope * np.abs(motion[:, 1]), np.nan)
+            best = UnsolvableLoad(motion, lift, work)
     return best
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
@@ -243,7 +244,10 @@ def reverse_curve(curve: Curve) -> Curve:
 
 def as_point(value: tuple[float, float], name: str) -> tuple[float, float]:
     """Return two finite floats, or say what `name` should have been."""
-    array = np.asarray(value, dtype=float)
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        array = np.zeros(0)  # refused like any other wrong shape
     if array.shape != (2,) or not np.isfinite(array).all():
         raise GeometryError(f"{name} is {value}: give two finite numbers (x, y)")
     return float(array[0]), float(array[1])
@@ -252,7 +256,7 @@ def as_point(value: tuple[float, float], name: str) -> tuple[float, float]:
 def require_positive(owner: str, **lengths: float) -> None:
     """Raise unless every named length is finite and positive."""
     for name, value in lengths.items():
-        if not (np.isfinite(value) and value > 0.0):
+        if not (isinstance(value, Real) and 0.0 < value < np.inf):
             raise GeometryError(f"{owner}: {name} is {value}: give a positive finite length")
 
 

@@ -62,8 +62,8 @@ def discretise(
     Raises
     ------
     GeometryError
-        If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces, or a density
-        is not positive or names an unknown side.
+        If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces, or a
+        density is not positive or names an unknown side.
     """
     density = {} if density is None else density
     _check_density(density, outline)
@@ -92,7 +92,7 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
     GeometryError
         If there are fewer elements than pieces.
     """
-    if n_elements != int(n_elements) or n_elements < len(lengths):
+    if not isinstance(n_elements, int | np.integer) or n_elements < len(lengths):
         raise GeometryError(
             f"discretise: n_elements is {n_elements}, but the outline has {len(lengths)} pieces (sides, cut "
             f"where parts end): give a whole number of at least {len(lengths)}"
@@ -108,7 +108,7 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
     quota = np.round(quota, 9)  # halves that differ by round-off are ties, settled by the order of pieces
     counts: IntArray = np.floor(quota).astype(np.intp)
     by_remainder = np.argsort(counts - quota, kind="stable")
-    counts[by_remainder[: int(n_elements) - int(counts.sum())]] += 1
+    counts[by_remainder[: n_elements - int(counts.sum())]] += 1
     return counts
 
 

@@ -78,7 +78,7 @@ class Geometric:
     def __post_init__(self) -> None:
         if not 0.0 < self.ratio < 1.0:
             raise GeometryError(f"Geometric: ratio is {self.ratio}: give a number between 0 and 1")
-        if self.levels != int(self.levels) or self.levels < 0:
+        if not isinstance(self.levels, int | np.integer) or self.levels < 0:
             raise GeometryError(f"Geometric: levels is {self.levels}: give a whole number, zero or more")
 
     def positions(self, n: int) -> FloatArray:

@@ -110,8 +110,8 @@ def _meeting_message(first: int, second: int, describe: Callable[[int], str]) ->
     if first == second:
         return f"{describe(first)} meets itself: a boundary must not cross or touch itself; correct its curve"
     return (
-        f"{describe(min(first, second))} and {describe(max(first, second))} cross, touch or fold back onto each other: "
-        "a boundary must not meet itself; move them apart"
+        f"{describe(min(first, second))} and {describe(max(first, second))} cross, touch or fold back onto each other, "
+        "as far as their digits tell: a boundary must not meet itself; move them apart"
     )
 
 

@@ -11,7 +11,8 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.pieces import Pieces, concatenate
 from bemkit.geometry.vectors import angles_between, cross, norms
 
-_MOST_PAIRS = 1_000_000  # more undecided pairs than this mean two curves that follow each other to about 1e-12
+_BATCH = 4096
+_MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
 
 
 def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
@@ -48,28 +49,43 @@ def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
 
 
 def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None:
-    """Halve pairs (a, b) until each is settled; where `is_joint`, b starts at the end of a."""
-    while len(a):
+    """Settle pairs (a, b), halving where needed; where `is_joint`, b starts at the end of a.
+
+    Halves go first, a batch at a time: curves that coincide are found out after one descent to round-off.
+    """
+    waiting = [(a, b, is_joint)]
+    n_halved = 0
+    while waiting:
+        a, b, is_joint = waiting.pop()
+        if len(a) > _BATCH:
+            rest = np.arange(_BATCH, len(a))
+            waiting.append((a.take(rest), b.take(rest), is_joint[_BATCH:]))
+            a, b, is_joint = a.take(np.arange(_BATCH)), b.take(np.arange(_BATCH)), is_joint[:_BATCH]
         is_open = ~np.where(is_joint, _neighbours_part(a, b), _keep_apart(a, b))
         rows = np.flatnonzero(is_open)
+        if not len(rows):
+            continue
+        n_halved += len(rows)
         a, b, is_joint = a.take(rows), b.take(rows), is_joint[rows]
-        if not len(a):
-            break
         is_final = np.maximum(a.deviation, b.deviation) <= np.maximum(a.resolution, b.resolution)
-        if is_final.any() or len(a) > _MOST_PAIRS:
+        if is_final.any() or n_halved > _MOST_HALVED:
             row = int(np.argmax(is_final))
             return int(a.owner[row]), int(b.owner[row])
-        splits_a = a.deviation > b.deviation
-        in_a, in_b = np.flatnonzero(splits_a), np.flatnonzero(~splits_a)
-        a_first, a_second = a.take(in_a).halves()
-        b_first, b_second = b.take(in_b).halves()
-        at_a, at_b = is_joint[in_a], is_joint[in_b]
-        a, b = (
-            concatenate([a_first, a_second, a.take(in_b), a.take(in_b)]),
-            concatenate([b.take(in_a), b.take(in_a), b_first, b_second]),
-        )
-        is_joint = np.concatenate([np.zeros_like(at_a), at_a, at_b, np.zeros_like(at_b)])
+        waiting.append(_halve_pairs(a, b, is_joint))
     return None
+
+
+def _halve_pairs(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[Pieces, Pieces, BoolArray]:
+    """Replace each pair by two: the piece that strays more is halved."""
+    strays_more = a.deviation > b.deviation
+    in_a, in_b = np.flatnonzero(strays_more), np.flatnonzero(~strays_more)
+    a_first, a_second = a.take(in_a).halves()
+    b_first, b_second = b.take(in_b).halves()
+    halved_a = concatenate([a_first, a_second, a.take(in_b), a.take(in_b)])
+    halved_b = concatenate([b.take(in_a), b.take(in_a), b_first, b_second])
+    # b joins the second half of a, or the first half of b joins a
+    no_joint_a, no_joint_b = np.zeros(len(in_a), dtype=bool), np.zeros(len(in_b), dtype=bool)
+    return halved_a, halved_b, np.concatenate([no_joint_a, is_joint[in_a], is_joint[in_b], no_joint_b])
 
 
 def _keep_apart(a: Pieces, b: Pieces) -> BoolArray:

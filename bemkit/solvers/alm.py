@@ -176,23 +176,24 @@ def solve_projected(conditions: ProjectedConditions, start: ContactState, option
     for step in range(options.max_steps):
         response = respond(conditions, trial, sets)
         linear_solves += response.linear_solves
-        state = response.state
-        if step >= options.full_steps:
-            state = _descended(conditions, trial, state)
-        new_trial = conditions.evaluate(state)
-        if _is_solved(conditions, new_trial, sets, is_newton_point=state is response.state and not response.is_sprung):
-            return InnerResult(state, linear_solves, is_solved=True)
-        sets = new_trial.sets if step >= options.full_steps else conditions.cautious(new_trial, sets)
-        trial = new_trial
+        reached = conditions.evaluate(response.state)
+        if not response.is_sprung and _is_solved(conditions, reached, sets):
+            return InnerResult(response.state, linear_solves, is_solved=True)
+        if step < options.full_steps:
+            sets = conditions.cautious(reached, sets)
+        else:
+            reached = conditions.evaluate(_descended(conditions, trial, response.state))
+            sets = reached.sets
+        trial = reached
     return InnerResult(trial.state, linear_solves, is_solved=False)
 
 
-def _is_solved(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, *, is_newton_point: bool) -> bool:
+def _is_solved(conditions: ProjectedConditions, reached: Trial, sets: ActiveSets) -> bool:
     """Whether the Newton point reproduced its own sets, and with them the residual vanished."""
-    if is_newton_point and conditions.given_bound is not None and trial.sets.key == sets.key:
+    if conditions.given_bound is not None and reached.sets.key == sets.key:
         return True  # piecewise linear equations: solved exactly, whatever round-off says
-    stress, _ = certificate_scales(conditions.problem, trial.state)
-    return bool(np.abs(trial.residual).max() <= 1e-12 * stress)
+    stress, _ = certificate_scales(conditions.problem, reached.state)
+    return bool(np.abs(reached.residual).max() <= 1e-12 * stress)
 
 
 def _descended(conditions: ProjectedConditions, trial: Trial, target: ContactState) -> ContactState:

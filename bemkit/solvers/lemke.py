@@ -77,11 +77,14 @@ class LemkePivoting:
             return replace(iterate, ended=Status.SINGULAR, message="the body has motions that are not listed as rigid")
         free = compliance @ (load + spring_load)
         matrix, vector, unit_force = _complementarity(problem, compliance, free)
-        unknowns, n_pivots = lemke(matrix, vector)
+        exists = np.isfinite(vector)  # nodes that can never touch have no pressing force
+        unknowns = np.zeros(len(vector))
+        solution, n_pivots = lemke(matrix[np.ix_(exists, exists)], vector[exists])
         spent = iterate.linear_solves + linear_solves + 1
-        if unknowns is None:
+        if solution is None:
             message = f"Lemke's algorithm ended on a ray after {n_pivots} pivots"
             return replace(iterate, linear_solves=spent, ended=Status.STALLED, message=message)
+        unknowns[exists] = solution
         pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
         force = np.stack([-pressed, backward - forward], axis=1)
         displacement = (free + compliance @ force.ravel()).reshape(-1, 2)
@@ -114,6 +117,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
     tableau = np.hstack([np.eye(n), -matrix, -cover[:, None], vector[:, None]])
     basis = np.arange(n)
     row, entering = int(np.argmin(vector / cover)), 2 * n
+    cover_at_start = -vector[row] / cover[row]
     for n_pivots in range(1, limit + 1):
         leaving = int(basis[row])
         tableau[row] /= tableau[row, entering]
@@ -136,7 +140,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
         # because an open node has no friction either.
         covering = int(np.flatnonzero(basis == 2 * n)[0])
         left_over = tableau[covering, -1] - ratio[row] * column[covering]
-        if may_leave[covering] and left_over <= _ROUND_OFF * tableau[:, -1].max():
+        if may_leave[covering] and left_over <= _ROUND_OFF * cover_at_start:
             row = covering
     return None, limit
 
@@ -209,9 +213,6 @@ def _complementarity(
     )
     clearance = problem.gap - free[normal]
     slip = free[tangential] - problem.slip_origin
-    # A node that can never touch: a distance beyond anything the others can cause.
-    furthest = np.abs(clearance[np.isfinite(clearance)]).max(initial=length)
-    clearance = np.where(np.isfinite(clearance), clearance, 1e6 * furthest)
     most_friction = problem.body.weights * cohesion / force
     vector = np.concatenate([clearance / length, slip / length, -slip / length, most_friction])
     return matrix, vector, force

@@ -150,8 +150,11 @@ class SemismoothNewton:
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
         repeats = not is_new and not response.is_sprung and following.merit >= 0.5 * iterate.merit
-        if repeats or following.n_in_phase >= self.full_steps:
+        if repeats:
             return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
+        if following.n_in_phase >= self.full_steps:
+            reason = f"{self.full_steps} full steps have not settled the active sets"
+            return self._rescued(problem, following, Status.STALLED, reason)
         return following
 
     def _damped_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:

@@ -1,0 +1,227 @@
+"""The loop: history, callback, starts; floating bodies; the path; metamorphic properties."""
+
+import numpy as np
+import pytest
+
+from bemkit.contact.certificate import certify
+from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
+from bemkit.solvers.base import solve
+from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting, lemke
+from bemkit.solvers.path import AffineBound, follow_path, path_exists
+from bemkit.solvers.probe import start_with
+from bemkit.solvers.ssn import SemismoothNewton
+from tests.contact.test_laws import Rubber
+from tests.handmade import assert_solves, block_body, block_problem, hard_problem, random_problem
+
+OUTER = [AugmentedLagrangian(), AugmentedLagrangian(bound=BoundUpdate.CURRENT), FixedPoint()]
+DRIVERS = [SemismoothNewton(), *OUTER]
+
+
+def test_history_and_callback_tell_the_same_true_story():
+    problem = block_problem(Coulomb(0.5))
+    seen = []
+    solution = solve(problem, AugmentedLagrangian(), callback=seen.append)
+    assert tuple(seen) == solution.history
+    assert [record.step for record in seen] == list(range(solution.steps + 1))
+    assert seen[0].relative_change == np.inf
+    assert seen[0].linear_solves == 1
+    assert seen[-1].linear_solves == solution.linear_solves
+    assert seen[-1].certificate == solution.certificate == certify(problem, solution.state)
+    assert all(later.linear_solves > sooner.linear_solves for sooner, later in zip(seen, seen[1:], strict=False))
+    for record in seen:
+        assert record.n_separated + record.n_stick + record.n_slip == problem.n_contact
+    counts = np.bincount(solution.node_status, minlength=4)
+    assert (seen[-1].n_separated, seen[-1].n_stick, seen[-1].n_slip) == (counts[0], counts[1], counts[2] + counts[3])
+    assert seen[1].n_changed > 0
+    assert seen[-1].n_changed == 0
+
+
+def test_the_papers_stopping_quantity_is_recorded():
+    """Its first step below 1e-8 counts the outer steps of the paper's tables: many at small rho, then a constant."""
+    problem = block_problem(Coulomb(0.5), n=24)
+    steps = []
+    for rho in (1e2, 1e3, 1e4, 1e5):  # the block has E = 1 and unit length
+        history = solve(problem, AugmentedLagrangian(rho_n=rho, rho_t=rho), tolerance=1e-13, throw=False).history
+        steps.append(next(record.step for record in history if record.relative_change <= 1e-8))
+    assert 15 <= steps[0] <= 30  # print: 25
+    assert all(8 <= step <= 14 for step in steps[1:])  # print: 13
+    assert steps[0] > steps[1] + 3
+    assert max(steps[1:]) - min(steps[1:]) <= 1
+
+
+def test_differentiating_the_bound_saves_outer_steps():
+    problem = block_problem(Coulomb(1.0), n=24)
+    lagged, current = (solve(problem, AugmentedLagrangian(bound=bound)) for bound in BoundUpdate)
+    assert current.steps <= 6 < lagged.steps
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=repr)
+def test_a_solution_is_its_own_start(driver):
+    problem = block_problem(Coulomb(0.5))
+    solution = solve(problem, SemismoothNewton())
+    again = solve(problem, driver, start=solution.state)
+    assert again.steps == 0
+    assert again.linear_solves == 1
+    # a start that is in no equilibrium is not believed, though it violates no contact condition
+    rest = ContactState(np.zeros((12, 2)), np.zeros((12, 2)))
+    assert solve(problem, driver, start=rest).steps > 0
+
+
+@pytest.mark.parametrize("driver", [*DRIVERS, LemkePivoting()], ids=repr)
+@pytest.mark.parametrize("status", list(NodeStatus), ids=lambda status: status.name)
+def test_a_floating_block_from_any_start(driver, status):
+    """All open, all sliding: the tangent is singular, springs help, and the result is right."""
+    problem = block_problem(Coulomb(0.5), is_held_sideways=False, push=0.1)
+    solution = solve(problem, driver, start=start_with(problem, [status] * problem.n_contact))
+    assert_solves(problem, solution.state, 0.5)
+    assert problem.body.weights @ solution.state.traction == pytest.approx([-0.5, -0.05])
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=repr)
+@pytest.mark.parametrize("distance", [0.1, 1e3, 1e6])
+def test_a_block_far_from_its_foundation_falls_and_lands(driver, distance):
+    landed = solve(block_problem(Coulomb(0.5)), driver)
+    body = block_body()
+    far = solve(ContactProblem(body, np.full(12, distance), Coulomb(0.5)), driver)
+    assert np.array_equal(far.node_status, landed.node_status)
+    # displacements of 1e6 leave 1e-10 of round-off, times a stiffness of about 10
+    assert np.allclose(far.state.traction, landed.state.traction, atol=1e-7)
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=repr)
+def test_a_free_direction_without_load_is_left_where_it_is(driver):
+    problem = block_problem(Frictionless(), is_held_sideways=False, push=0.0)
+    solution = solve(problem, driver)
+    assert_solves(problem, solution.state, 0.0)
+    assert np.abs(solution.state.u_t).max() < 1.0
+
+
+@pytest.mark.parametrize("law", [Rubber(), CohesiveCoulomb(0.5, 0.02, 0.2), CohesiveCoulomb(0.5, 0.0, 0.1)], ids=repr)
+def test_nonlinear_laws(law):
+    problem = block_problem(law)
+    states = [solve(problem, driver).state for driver in DRIVERS]
+    for state in states[1:]:
+        assert np.allclose(state.traction, states[0].traction, atol=1e-7 * np.abs(states[0].traction).max())
+    closed = states[0].sigma_n < 0.0
+    assert np.all(np.abs(states[0].sigma_t[closed]) <= law.bound(states[0].sigma_n)[closed] + 1e-12)
+    assert np.any(np.abs(states[0].u_t[closed]) > 1e-3)
+
+
+def test_an_overlap_is_pressed_out_without_any_load():
+    """Shrink fit: zero load, negative gap."""
+    body = DenseBody(np.diag([2.0, 1.0]), np.zeros(2), np.array([0.5]))
+    for driver in DRIVERS:
+        solution = solve(ContactProblem(body, np.array([-0.3]), Coulomb(0.5)), driver)
+        # the augmented Lagrangian stops at a certificate of 1e-9
+        assert solution.state.displacement == pytest.approx(np.array([[-0.3, 0.0]]), abs=1e-8)
+        assert solution.state.traction == pytest.approx(np.array([[-1.2, 0.0]]), abs=1e-8)
+
+
+# ----------------------------------------------------------------------------------------------------------- the path
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_path_leads_to_a_solution_whatever_the_friction(seed):
+    problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=5.0)
+    end = follow_path(problem, AffineBound.tangent(problem, np.zeros(problem.n_contact)))
+    assert_solves(problem, end.state, 5.0)
+    assert end.linear_solves == 2 * end.n_pieces
+    assert end.n_pieces <= 4 * problem.n_contact + 2
+
+
+def test_the_path_goes_to_tresca_solutions_with_open_sticking_nodes():
+    body = DenseBody(np.eye(4), np.array([-1.0, 0.2, -1.0, 2.0]), np.ones(2))
+    problem = ContactProblem(body, np.zeros(2), Tresca(0.5))
+    end = follow_path(problem, AffineBound.tangent(problem, np.zeros(2)))
+    assert np.allclose(end.state.displacement, [[-1.0, 0.0], [-1.0, 1.5]])
+    assert np.allclose(end.state.traction, [[0.0, -0.2], [0.0, -0.5]])
+    assert path_exists(problem)
+
+
+def test_the_path_reports_its_ends():
+    problem = hard_problem(16)
+    bound = AffineBound.tangent(problem, np.zeros(problem.n_contact))
+    assert follow_path(problem, bound, max_pieces=1).reason == "the path has more than 1 pieces"
+    assert follow_path(problem, bound, max_pieces=1).state is None
+    lifting = block_problem(Coulomb(0.5), press=-1.0)
+    end = follow_path(lifting, AffineBound.tangent(lifting, np.zeros(12)))
+    assert end.state is None
+    assert "singular response" in end.reason or "does not return" in end.reason
+    assert not path_exists(block_problem(CohesiveCoulomb(0.5, 0.1)))
+
+
+def test_newton_says_when_it_follows_the_path():
+    history = solve(hard_problem(16), SemismoothNewton()).history
+    messages = [record.message for record in history]
+    assert any("line search begins" in message for message in messages)
+    assert any("the path is followed next" in message for message in messages)
+    assert any(message.startswith("path of ") for message in messages)
+
+
+# ------------------------------------------------------------------------------------------------------- metamorphic
+
+
+def fingerprint(solution):
+    return solution.node_status.tolist(), solution.steps, solution.linear_solves
+
+
+SUBJECTS = [block_problem(Coulomb(0.5)), random_problem(5), hard_problem(16)]
+
+
+@pytest.mark.parametrize("driver", [*DRIVERS, LemkePivoting()], ids=repr)
+@pytest.mark.parametrize("subject", range(2))
+@pytest.mark.parametrize(("length", "stress"), [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-12), (1.0, 1e12), (1e12, 1e-12)])
+def test_units(driver, subject, length, stress):
+    """Lengths by c, stresses by c: the same sets after the same number of steps and linear solves."""
+    problem = SUBJECTS[subject]
+    body = problem.body
+    scaled_body = DenseBody(body.stiffness * stress / length, body.load * stress, body.weights, body.motions)
+    scaled = solve(ContactProblem(scaled_body, problem.gap * length, problem.law), driver)
+    plain = solve(problem, driver)
+    assert fingerprint(scaled) == fingerprint(plain)
+    assert np.allclose(scaled.state.displacement / length, plain.state.displacement, rtol=1e-9, atol=1e-12)
+    assert np.allclose(scaled.state.traction / stress, plain.state.traction, rtol=1e-9, atol=1e-12)
+
+
+def transformed(problem, order, tangent_sign):
+    """The problem with its nodes renumbered and its tangents reversed."""
+    body = problem.body
+    dofs = np.stack([2 * order, 2 * order + 1], axis=1).ravel()
+    sign = np.tile([1.0, tangent_sign], len(order))
+    stiffness = sign[:, None] * body.stiffness[np.ix_(dofs, dofs)] * sign
+    motions = body.rigid_motions()[:, order] * [1.0, tangent_sign]
+    other = DenseBody(stiffness, sign * body.load[dofs], body.weights[order], motions)
+    return ContactProblem(other, problem.gap[order], problem.law)
+
+
+@pytest.mark.parametrize("driver", DRIVERS, ids=repr)
+@pytest.mark.parametrize("subject", range(2))
+@pytest.mark.parametrize("tangent_sign", [1.0, -1.0])
+def test_reflection_and_renumbering(driver, subject, tangent_sign):
+    problem = SUBJECTS[subject]
+    order = np.random.default_rng(7).permutation(problem.n_contact)
+    plain, other = solve(problem, driver), solve(transformed(problem, order, tangent_sign), driver)
+    expected = plain.node_status[order]
+    if tangent_sign < 0.0:
+        expected = np.array([0, 1, 3, 2])[expected]
+    assert (other.node_status.tolist(), other.steps, other.linear_solves) == (
+        expected.tolist(),
+        plain.steps,
+        plain.linear_solves,
+    )
+    assert np.allclose(other.state.traction, plain.state.traction[order] * [1.0, tangent_sign], atol=1e-8)
+
+
+# ------------------------------------------------------------------------------------------------------------- lemke
+
+
+def test_lemke_on_known_problems():
+    matrix, vector = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-5.0, -6.0])
+    assert np.allclose(lemke(matrix, vector)[0], [4 / 3, 7 / 3])
+    assert np.array_equal(lemke(matrix, -vector)[0], [0.0, 0.0])
+    assert lemke(np.array([[-1.0]]), np.array([-1.0]))[0] is None  # -z - 1 >= 0 has no solution
+    assert lemke(matrix, vector, max_pivots=1)[0] is None

@@ -1,0 +1,213 @@
+"""Each status is produced, and no failure passes for a success."""
+
+import numpy as np
+import pytest
+
+from bemkit.contact.laws import Coulomb, FrictionLaw
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, SingularResponse
+from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
+from bemkit.solvers.base import ContactFailure, Status, solve
+from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.lemke import LemkePivoting
+from bemkit.solvers.ssn import SemismoothNewton
+from tests.handmade import assert_solves, block_problem, hard_problem, random_problem
+
+BARE_NEWTON = SemismoothNewton(damped_steps=0, follows_path=False)
+
+
+class OnlyClamped:
+    """A body that responds to prescribed displacements and to nothing else."""
+
+    n_contact = 2
+    weights = np.ones(2)
+    stiffness_scale = 1.0
+
+    def __init__(self, *, never=False):
+        self.never = never
+
+    def respond(self, conditions):
+        if self.never or conditions.on_traction.any():
+            raise SingularResponse("the sockets are empty")
+        return ContactState(conditions.value[:, ::1].copy(), np.array([[1.0, 0.0], [-1.0, 0.0]]))
+
+    def rigid_motions(self):
+        return np.zeros((0, 2, 2))
+
+    def rigid_load(self):
+        return np.zeros(0)
+
+    def imbalance(self, state):
+        return 0.0, 0.0
+
+
+def overflowing_problem():
+    """Load and compliance beyond the range of floating point together."""
+    body = DenseBody(np.eye(2) * 1e-200, np.array([-1e200, 0.0]), np.ones(1))
+    return ContactProblem(body, np.zeros(1), Coulomb(0.1))
+
+
+CASES = {
+    "converged": (Status.CONVERGED, random_problem(0), SemismoothNewton(), {}),
+    "max steps": (Status.MAX_STEPS, block_problem(Coulomb(0.5)), AugmentedLagrangian(), {"max_steps": 1}),
+    "max steps, none": (Status.MAX_STEPS, block_problem(Coulomb(0.5)), SemismoothNewton(), {"max_steps": 0}),
+    "stalled, line search": (Status.STALLED, hard_problem(16), SemismoothNewton(follows_path=False), {}),
+    "stalled, full steps": (
+        Status.STALLED,
+        block_problem(Coulomb(0.5)),
+        SemismoothNewton(full_steps=2, damped_steps=0, follows_path=False),
+        {},
+    ),
+    "stalled, tiny rho": (Status.STALLED, block_problem(Coulomb(0.5)), AugmentedLagrangian(rho_n=1e-4, rho_t=1e-4), {}),
+    "stalled, fixed point": (Status.STALLED, hard_problem(71), FixedPoint(), {}),
+    "stalled, tolerance below round-off": (
+        Status.STALLED,
+        block_problem(Coulomb(0.5)),
+        AugmentedLagrangian(),
+        {"tolerance": 1e-30},
+    ),
+    "cycling, newton": (Status.CYCLING, hard_problem(120), BARE_NEWTON, {}),
+    "cycling, fixed point": (Status.CYCLING, hard_problem(11), FixedPoint(), {}),
+    "cycling, augmented": (Status.CYCLING, hard_problem(11), AugmentedLagrangian(), {}),
+    "singular at the start": (
+        Status.SINGULAR,
+        ContactProblem(OnlyClamped(never=True), np.zeros(2), Coulomb(0.1)),
+        SemismoothNewton(),
+        {},
+    ),
+    "singular later": (
+        Status.SINGULAR,
+        ContactProblem(OnlyClamped(), np.zeros(2), Coulomb(0.1)),
+        SemismoothNewton(),
+        {},
+    ),
+    "unsolvable load": (Status.UNSOLVABLE_LOAD, block_problem(Coulomb(0.5), press=-1.0), SemismoothNewton(), {}),
+    "inner failed, augmented": (
+        Status.INNER_FAILED,
+        block_problem(Coulomb(0.5)),
+        AugmentedLagrangian(inner=InnerNewton(max_steps=1)),
+        {},
+    ),
+    "inner failed, fixed point": (
+        Status.INNER_FAILED,
+        block_problem(Coulomb(0.5)),
+        FixedPoint(inner=SemismoothNewton(max_steps=1)),
+        {},
+    ),
+    "not finite": (Status.NOT_FINITE, overflowing_problem(), SemismoothNewton(), {}),
+    "singular stiffness, lemke": (
+        Status.SINGULAR,
+        ContactProblem(DenseBody(np.diag([1.0, 0.0]), np.array([1.0, 1.0]), np.ones(1)), np.zeros(1), Coulomb(0.1)),
+        LemkePivoting(),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize(("status", "problem", "driver", "options"), CASES.values(), ids=CASES.keys())
+def test_status(status, problem, driver, options):
+    solution = solve(problem, driver, throw=False, **options)
+    assert solution.status is status
+    assert solution.message.startswith(status.value)
+    assert solution.is_converged == (status is Status.CONVERGED)
+    if status is Status.CONVERGED:
+        assert_solves(problem, solution.state, problem.law.friction_coefficient)
+        return
+    assert not solution.certificate.is_below(options.get("tolerance", 1e-9))
+    with pytest.raises(ContactFailure, match=f"^{status.name}: ") as caught:
+        solve(problem, driver, **options)
+    assert caught.value.solution.status is status
+
+
+def test_every_status_has_a_case():
+    assert {case[0] for case in CASES.values()} == set(Status)
+
+
+@pytest.mark.parametrize(
+    ("case", "words"),
+    [
+        ("stalled, line search", "no Newton step reduces the residual"),
+        ("stalled, full steps", "2 full steps have not settled the active sets"),
+        ("cycling, newton", "the active sets come back"),
+        ("singular later", "the sockets are empty"),
+        ("singular at the start", "the sockets are empty"),
+        ("unsolvable load", "the load pushes the body away from the obstacle"),
+        ("inner failed, augmented", "inner Newton iteration unfinished after 1 linear solves"),
+        ("inner failed, fixed point", "Tresca problem of this step: MAX_STEPS"),
+        ("singular stiffness, lemke", "motions that are not listed as rigid"),
+    ],
+)
+def test_messages_name_the_reason(case, words):
+    status, problem, driver, options = CASES[case]
+    assert words in solve(problem, driver, throw=False, **options).message
+
+
+@pytest.mark.parametrize("seed", [11, 16, 71, 120, 245, 397, 479])
+def test_the_full_newton_driver_solves_what_others_fail_on(seed):
+    problem = hard_problem(seed)
+    assert_solves(problem, solve(problem, SemismoothNewton()).state, 2.0)
+
+
+@pytest.mark.parametrize("driver", [AugmentedLagrangian(), FixedPoint()], ids=repr)
+def test_large_friction_on_real_stiffness_is_no_trouble(driver):
+    problem = block_problem(Coulomb(5.0))
+    assert_solves(problem, solve(problem, driver).state, 5.0)
+
+
+class Broken(FrictionLaw):
+    """Fails as soon as it meets pressure."""
+
+    def bound(self, sigma_n):
+        if sigma_n.any():
+            raise KeyError("temperature")
+        return np.zeros_like(sigma_n)
+
+    def bound_derivative(self, sigma_n):
+        return np.zeros_like(sigma_n)
+
+
+@pytest.mark.parametrize("driver", [SemismoothNewton(), AugmentedLagrangian(), FixedPoint(), LemkePivoting()], ids=repr)
+def test_errors_inside_a_law_surface_with_its_name(driver):
+    problem = block_problem(Broken())
+    with pytest.raises(LawError, match="friction law Broken.bound failed: KeyError: 'temperature'"):
+        solve(problem, driver, throw=False)
+
+
+@pytest.mark.parametrize(
+    ("make", "complaint"),
+    [
+        (lambda: SemismoothNewton(rho=0.0), "rho = 0.0; give a positive number"),
+        (lambda: SemismoothNewton(max_steps=0), "max_steps = 0; allow at least one step"),
+        (lambda: SemismoothNewton(full_steps=-1), "full_steps = -1"),
+        (lambda: SemismoothNewton(damped_steps=-1), "damped_steps = -1"),
+        (lambda: AugmentedLagrangian(rho_n=float("inf")), "rho_n = inf"),
+        (lambda: AugmentedLagrangian(rho_t=-1.0), "rho_t = -1.0"),
+        (lambda: InnerNewton(max_steps=0), "max_steps = 0"),
+        (lambda: InnerNewton(full_steps=-1), "full_steps = -1"),
+        (lambda: FixedPoint(inner_tolerance=0.0), "inner_tolerance = 0.0; give a number between 0 and 1"),
+        (lambda: FixedPoint(max_steps=0), "max_steps = 0"),
+        (lambda: LemkePivoting(max_steps=0), "max_steps = 0"),
+        (lambda: solve(random_problem(0), SemismoothNewton(), max_steps=-1), "max_steps = -1"),
+        (lambda: solve(random_problem(0), SemismoothNewton(), tolerance=-1.0), "tolerance = -1.0"),
+        (lambda: solve(random_problem(0), SemismoothNewton(), tolerance=float("nan")), "tolerance = nan"),
+    ],
+)
+def test_refusals(make, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        make()
+
+
+def test_starts_are_checked():
+    problem = block_problem(Coulomb(0.5))
+    with pytest.raises(ValueError, match="start has 3 nodes; the problem has 12"):
+        solve(problem, SemismoothNewton(), start=ContactState(np.zeros((3, 2)), np.zeros((3, 2))))
+    with pytest.raises(ValueError, match="start contains entries that are not finite"):
+        solve(problem, SemismoothNewton(), start=ContactState(np.full((12, 2), np.nan), np.zeros((12, 2))))
+
+
+def test_drivers_refuse_each_others_iterates():
+    problem = random_problem(0)
+    newton, augmented, fixed = SemismoothNewton(), AugmentedLagrangian(), FixedPoint()
+    iterate = LemkePivoting().init(problem, problem.glued_state)
+    for driver in (newton, augmented, fixed):
+        with pytest.raises(TypeError, match="iterate is a Iterate; give what init or step of this driver returned"):
+            driver.step(problem, iterate)

@@ -1,0 +1,260 @@
+"""The command line: exit codes, one-line errors, no broken files, nothing imported without need."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import bemkit.io
+import bemkit.run
+from bemkit.cli import main
+from bemkit.io import read_result
+from bemkit.report import ConvergenceTable, format_size
+from bemkit.scenefile import scene_from_toml, scene_to_toml
+from bemkit.shipped import shipped_files
+
+SMALL = ["--elements", "40"]
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    assert isinstance(caught.value.code, int)
+    return caught.value.code
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_run_prints_a_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-1", *SMALL) == 0
+    output = capsys.readouterr()
+    for word in ("converged", "contact nodes", "normal force", "friction force", "separated to slip", "certificate"):
+        assert word in output.out
+    assert output.err == ""  # no convergence table unless a person is watching
+
+
+def test_json_on_standard_output_is_one_object(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-2", *SMALL, "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["status"], result["converged"], result["n_elements"]) == ("converged", True, 40)
+    assert result["force_normal"] == pytest.approx(1.0 / 60.0, rel=1e-9)  # equilibrium
+    assert result["force_tangential"] < 0.0
+    assert {"x", "y", "s", "from", "to"} <= set(result["transitions"][0])
+
+
+def test_outputs_go_to_files_and_can_be_shown_again(capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):  # the second time replaces the first
+        assert call("run", "paper-1", *SMALL, "-q", "-o", "r.h5", "--json", "r.json", "--csv", "r.csv") == 0
+    assert capsys.readouterr() == ("", "")
+    assert sorted(os.listdir()) == ["r.csv", "r.h5", "r.json"]
+    stored = json.loads(Path("r.json").read_text("utf-8"))
+
+    assert call("show", "r.h5") == 0
+    assert "converged" in capsys.readouterr().out
+    assert call("show", "r.h5", "--json", "-") == 0
+    assert json.loads(capsys.readouterr().out) == stored
+    assert call("show", "r.h5", "--csv", "contact") == 0
+    text = capsys.readouterr().out
+    assert text == Path("r.csv").read_text("utf-8")
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert list(rows[0])[:10] == "x y s u_n u_t sigma_n sigma_t gap clearance status".split()
+    assert len(rows) == stored["n_contact"]
+    assert {row["status"] for row in rows} == {"separated", "slip", "stick"}
+    solution = read_result("r.h5")
+    assert [float(row["sigma_n"]) for row in rows] == solution.contact.sigma_n.tolist()
+    assert call("show", "r.h5", "--csv", "boundary") == 0
+    assert len(capsys.readouterr().out.splitlines()) == 41
+    assert call("show", "r.h5", "--csv", "history") == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1 + len(solution.history)
+    assert call("show", "r.h5", "--scene") == 0
+    assert scene_to_toml(scene_from_toml(capsys.readouterr().out)) == scene_to_toml(solution.scene)
+
+
+def test_overrides_reach_the_solver(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--discretisation", "linear", "--solver", "augmented-lagrangian", "--rho", "1e4"]
+    assert call("run", "paper-1", *SMALL, *arguments, "-o", "r.h5", "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["outer_steps"] > 1
+    scene = read_result("r.h5").scene
+    assert 'discretisation = "linear"' in scene_to_toml(scene)
+    assert "rho_n = 10000.0" in scene_to_toml(scene)
+
+
+def test_a_run_that_does_not_converge_says_so_and_exits_with_1(capsys: pytest.CaptureFixture[str]) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    word = 'solver = "semismooth-newton"'
+    Path("hard.toml").write_text(text.replace(word, 'solver = { kind = "fixed-point", max_steps = 1 }'), "utf-8")
+    assert call("run", "hard.toml", *SMALL) == 1
+    assert "max steps" in capsys.readouterr().out
+
+
+def test_scenes_and_plan(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("scenes") == 0
+    assert "paper-1  Square on a rigid foundation" in capsys.readouterr().out
+    assert call("plan", "paper-1") == 0
+    output = capsys.readouterr().out
+    assert "left out" in output
+    assert "hypersingular" in output
+    assert call("plan", "paper-1", "--json", "--elements", "64", "--discretisation", "linear") == 0
+    names = {item["name"]: item["needed"] for item in json.loads(capsys.readouterr().out)["items"]}
+    assert names["hypersingular operator"]
+
+
+def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    before = sorted(os.listdir())
+    assert call(*arguments) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith("bemkit: error: ")
+    assert output.err.count("\n") == 1
+    assert sorted(os.listdir()) == before
+    return output.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "papr-1"], "did you mean 'paper-1'"),
+        (["run", "paper-1", "--elements", "2"], "elements is 2"),
+        (["run", "paper-1", "--elements", "many"], "'many' is not a valid integer.*bemkit run --help"),
+        (["run", "paper-1", "--elements", "1000000"], "use at most"),
+        (["run", "paper-1", "--solver", "newtn"], "unknown solver 'newtn'"),
+        (["run", "paper-1", "--discretisation", "cubic"], "unknown discretisation 'cubic'"),
+        (["run", "paper-1", "--rho", "-1"], "rho"),
+        (["run", "paper-1", "--bogus"], "--bogus"),
+        (["run"], "Missing argument"),
+        (["bogus"], "No such command"),
+        (["run", "paper-1", "-o", "no/r.h5"], "the folder .* does not exist"),
+        (["run", "paper-1", "-o", "."], "exists and is not a file"),
+        (["run", "paper-1", "-o", "thesis.txt"], "exists and is not a bemkit result"),
+        (["run", "paper-1", "--json", "thesis.txt"], "exists and is not a JSON file"),
+        (["run", "paper-1", "--csv", "thesis.txt"], "exists and is not a CSV file"),
+        (["run", "paper-1", "--plot", "thesis.txt"], "exists and is not a folder"),
+        (["run", "paper-1", "--json", "-", "--csv", "-"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r", "--json", "r"], "two outputs go to the same place"),
+        (["show", "none.h5"], "no such file"),
+        (["show", "thesis.txt"], "not an HDF5 file"),
+        (["show", "thesis.txt", "--json", "-", "--scene"], "give one of them"),
+        (["plan", "none"], "no such file or shipped scene"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import re
+
+    Path("thesis.txt").write_text("my thesis", "utf-8")
+    assert re.search(message, one_line_error(capsys, *arguments))
+    assert Path("thesis.txt").read_text("utf-8") == "my thesis"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("poisson_ratio = 0.2", "poisson_ratio = 0.9", "poisson_ratio is 0.9"),
+        ("friction_coefficient", "friction_coeficient", "did you mean 'friction_coefficient'"),
+        ('sides = ["right"]', 'sides = ["bottom"]', "foundation"),
+        ("y = -1.0", 'y = "log(x - 2)"', "is nan at"),
+        ("x > 0.5", "x > 5", "top-load"),
+        ("[shape]", "[shape", "not valid TOML"),
+    ],
+)
+def test_a_bad_scene_is_one_line_that_names_the_file(
+    old: str, new: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    assert old in text
+    Path("my.toml").write_text(text.replace(old, new), "utf-8")
+    error = one_line_error(capsys, "run", "my.toml", "-o", "r.h5", *SMALL)
+    assert error.startswith("bemkit: error: my.toml: ")
+    assert message in error
+
+
+def test_defects_of_bemkit_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object, **options: object) -> None:
+        raise ValueError("not an input error")
+
+    monkeypatch.setattr(bemkit.run, "run", broken)
+    with pytest.raises(ValueError, match="not an input error"):
+        main(["run", "paper-1"])
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_an_interrupt_leaves_no_file(
+    error: type[BaseException], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(bemkit.io, "_write_mesh", interrupted)
+    assert call("run", "paper-1", *SMALL, "-o", "r.h5") == (130 if error is KeyboardInterrupt else 2)
+    assert os.listdir() == []
+    assert capsys.readouterr().err.strip().count("\n") == 0
+
+
+def test_a_real_ctrl_c_ends_with_130() -> None:
+    code = "import sys; from bemkit.cli import main; print('ready', flush=True); main(sys.argv[1:])"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "run", "paper-1", "--elements", "3000", "-o", "r.h5"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(1.0)  # into the assembly of 3000 elements, which takes longer than that
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.strip() == "bemkit: error: interrupted, nothing was written"
+    assert os.listdir() == []
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    command = f"{sys.executable} -c 'from bemkit.cli import main; main()' run paper-1 --csv - | head -n 1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("x,y,s")
+    assert done.stderr == ""
+
+
+def test_nothing_is_imported_without_need() -> None:
+    code = """
+import sys
+from bemkit.cli import main
+try:
+    main(["run", "paper-1", "--elements", "40", "--json", "-"])
+except SystemExit as end:
+    assert end.code == 0
+wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed"}
+print(sorted(wanted & set(sys.modules)), file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_the_convergence_table_has_a_line_per_step() -> None:
+    from rich.console import Console
+
+    from bemkit.scenefile import load_scene, with_overrides
+
+    console = Console(file=io.StringIO(), width=100)
+    solution = bemkit.run.run(with_overrides(load_scene("paper-1"), elements=40), callback=ConvergenceTable(console))
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert lines[0].split()[:3] == ["step", "solves", "separated"]
+    assert len(lines) == 1 + len(solution.history)
+
+
+def test_sizes_are_readable() -> None:
+    assert [format_size(n) for n in (0, 999, 3_280_000, 5 * 10**13)] == ["0 B", "999 B", "3.28 MB", "50 TB"]
