@@ -1,7 +1,8 @@
 """From a scene to a dimensionless contact problem, and back to physical fields.
 
-Inside, lengths are measured by the diameter of the body, stresses of the material by E', loads by their largest value p and
-displacements by p L / E', so that nothing depends on the user's units, on where the body sits, or on how stiff it is.
+Inside, lengths are measured by the diameter of the body, stresses of the material by E', loads by their largest value
+p and displacements by p L / E', so that nothing depends on the user's units, on where the body sits, or on how stiff
+it is.
 """
 
 from __future__ import annotations
@@ -95,7 +96,8 @@ class Model:
         -------
         displacement : (n_nodes, 2) array [m]
         traction : (n_elements, 2) array [Pa]
-            Mean of each element: given loads where they are given, contact tractions on the contact boundary, reactions elsewhere.
+            Mean of each element: given loads where they are given, contact tractions on the contact boundary,
+            reactions elsewhere.
         energy : float [J/m]
             Elastic energy 1/2 a(u, u).
         """
@@ -110,7 +112,9 @@ class Model:
         for _, elements, _ in _parts(self.scene, self.mesh):
             is_loose[elements] = False
         traction[is_loose] = 0.0
-        energy = 0.5 * float(np.sum(displacement * force)) * self.units.stress * self.units.displacement * self.units.length
+        energy = (
+            0.5 * float(np.sum(displacement * force)) * self.units.stress * self.units.displacement * self.units.length
+        )
         return displacement * self.units.displacement, traction, energy
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
@@ -138,10 +142,11 @@ def build_model(scene: Scene, mesh: BoundaryMesh) -> Model:
     Raises
     ------
     ConflictingSupportsError, SingularMatrixError, ValueError
-        If the supports contradict each other or do not hold the body even with glued contact, or an expression is not finite somewhere.
+        If the supports contradict each other or do not hold the body even with glued contact, or an expression is not
+        finite somewhere.
     """
     units = _units(scene, mesh)
-    unit_mesh = mesh.transformed(shift=mesh.centre, factor=1.0 / units.length)
+    unit_mesh = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / units.length)
     elastic = _elastic_map(scene, unit_mesh, units)
     force = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
     for part, elements, normals in _parts(scene, mesh):
@@ -197,7 +202,9 @@ def _by_direction(elements: IntArray, normals: FloatArray) -> list[tuple[IntArra
     return [(elements[group.ravel() == k], normal) for k, normal in enumerate(unique)]
 
 
-def _dimensionless_load(load: Traction | Pressure, normal: FloatArray, units: Units) -> Callable[[FloatArray], FloatArray]:
+def _dimensionless_load(
+    load: Traction | Pressure, normal: FloatArray, units: Units
+) -> Callable[[FloatArray], FloatArray]:
     def field(points: FloatArray) -> FloatArray:
         normals = np.broadcast_to(normal, points.shape)
         return load.at(units.to_physical(points), normals) / units.stress
@@ -223,7 +230,9 @@ def _supports(scene: Scene, mesh: BoundaryMesh, units: Units) -> list[Support]:
             result.append(Support(part.name, elements, axes))
         elif isinstance(condition, PrescribedDisplacement):
             result.append(
-                Support(part.name, elements, axes[:, list(condition.is_prescribed)], _dimensionless_motion(condition, units))
+                Support(
+                    part.name, elements, axes[:, list(condition.is_prescribed)], _dimensionless_motion(condition, units)
+                )
             )
     return result
 
@@ -235,9 +244,7 @@ def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Ca
     return field
 
 
-def _gap(
-    scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, elastic: SteklovPoincare, units: Units
-) -> FloatArray:
+def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, elastic: SteklovPoincare, units: Units) -> FloatArray:
     """Measure the gap of each contact node to the nearest obstacle among the parts it belongs to."""
     gap = np.full(elastic.displacement_space.n_dofs // 2, np.inf)
     points = units.to_physical(nodes.points)

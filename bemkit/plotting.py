@@ -144,9 +144,7 @@ def draw_contact_displacement(solution: Solution, part: str, *, units: Units | N
     axes.plot(s, contact.u_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label="tangential $u_t$")
     gap = contact.gap[chosen]
     if np.any(np.isfinite(gap) & (gap != 0.0)):
-        largest = 2.0 * max(np.abs(contact.u_n[chosen]).max(), np.abs(contact.u_t[chosen]).max())
-        near = np.where(np.abs(gap) <= largest, gap, np.nan)
-        axes.plot(s, near, color="black", linestyle=":", linewidth=1.2, label="gap $g$")
+        axes.plot(s, _near(gap, solution, chosen), color="black", linestyle=":", linewidth=1.2, label="gap $g$")
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     axes.set_ylabel(f"displacement [{units.length}]")
     axes.legend(frameon=False)
@@ -207,7 +205,7 @@ def draw_contact_status(solution: Solution, part: str, *, units: Units | None = 
     axes.set_ylabel(f"pressure [{units.stress}]")
     right = axes.twinx()
     right.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
-    clearance = np.where(np.isfinite(contact.clearance[chosen]), contact.clearance[chosen], np.nan)
+    clearance = _near(contact.clearance[chosen], solution, chosen)
     opening = right.plot(
         s, clearance, color=VERMILION, linestyle="--", linewidth=1.6, label="clearance $g - u_n$ (right)"
     )
@@ -250,11 +248,13 @@ def node_displacement(solution: Solution) -> FloatArray:
     Returns
     -------
     (n_nodes, 2) array [m]
-        Given there directly, or the mean of the two elements that meet.
+        Given there directly, or interpolated between the two elements that meet.
     """
     mesh, boundary = solution.mesh, solution.boundary
     if isinstance(solution.scene.discretisation, ConstantCollocation):
-        return np.asarray(boundary.displacement[mesh.node_elements].mean(axis=1))
+        before, after = mesh.node_elements.T
+        share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
+        return np.asarray(share * boundary.displacement[before] + (1.0 - share) * boundary.displacement[after])
     return boundary.displacement
 
 
@@ -263,6 +263,13 @@ _LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "m
 
 def _rows(solution: Solution, part: str) -> BoolArray:
     return np.array([name == part for name in solution.contact.part])
+
+
+def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
+    """Blank out distances to the obstacle that would dwarf the displacements."""
+    contact = solution.contact
+    largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
+    return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
 
 
 def _friction_bound(solution: Solution) -> FloatArray:
@@ -290,18 +297,25 @@ def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> 
 
 
 def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
-    """Paint the status along a part, and name it where there is room."""
+    """Paint the status along a part; name it where there is room, and in a legend where there is none."""
+    from matplotlib.patches import Patch
+
     chosen = _rows(solution, part)
     length = float(solution.mesh.lengths[solution.mesh.part(part)].sum())
     transitions = [transition for transition in solution.transitions if transition.part == part]
     first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]
     words = [first, *(transition.to_status for transition in transitions)]
     edges = [0.0, *(transition.s for transition in transitions), length]
+    named = set()
     for (begin, end), word in zip(pairwise(edges), words, strict=True):
         strip.axvspan(begin, end, color=STATUS_COLOURS[word], linewidth=0)
         if end - begin > 0.12 * length:
             style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": _STATUS_TEXT[word]}
             strip.text((begin + end) / 2.0, 0.5, word, **style)
+            named.add(word)
+    handles = [Patch(color=colour, label=word) for word, colour in STATUS_COLOURS.items() if word in {*words} - named]
+    if handles:
+        strip.figure.legend(handles=handles, loc="outside lower right", ncols=3, frameon=False)
     strip.set_xlim(0.0, length)
     strip.set_ylim(0.0, 1.0)
     strip.set_yticks([])

@@ -85,7 +85,8 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
     ----------
     scenes : iterable of Scene
     executor : Executor, optional
-        For example a `ProcessPoolExecutor`, or the executor of a `distributed` client. Without one the scenes are solved in turn.
+        For example a `ProcessPoolExecutor`, or the executor of a `distributed` client. Without one the scenes are
+        solved in turn.
 
     Returns
     -------

@@ -94,9 +94,9 @@ class CondensedBody:
 
     Notes
     -----
-    At a node where a support prescribes one direction (a roller meets the contact boundary) only the other one is open. Its normal
-    motion and pressure are true; the friction there is left to the support, and the tangential component is a decoupled spring
-    without load, which rests.
+    At a node where a support prescribes one direction (a roller meets the contact boundary) only the other one is
+    open. Its normal motion and pressure are true; the friction there is left to the support, and the tangential
+    component is a decoupled spring without load, which rests.
     """
 
     dense: DenseBody
@@ -212,7 +212,10 @@ def _open_directions(conditions: NodalConditions, contact: ContactNodes) -> tupl
     number = np.full(conditions.is_open.size, -1)
     number[np.flatnonzero(conditions.is_open)] = np.arange(int(conditions.is_open.sum()))
     number = number.reshape(-1, 2)[contact.nodes]
-    matrix, offset = np.zeros((int(conditions.is_open.sum()), 2 * contact.nodes.size)), np.zeros(int(conditions.is_open.sum()))
+    matrix, offset = (
+        np.zeros((int(conditions.is_open.sum()), 2 * contact.nodes.size)),
+        np.zeros(int(conditions.is_open.sum())),
+    )
     whole = np.flatnonzero(np.all(number >= 0, axis=1))
     for component in range(2):
         matrix[number[whole, component], 2 * whole + component] = 1.0
@@ -238,4 +241,5 @@ def _free_motions(conditions: NodalConditions, contact: ContactNodes, points: Fl
         free = directions[size_of < HELD * np.sqrt(fixed.shape[0])]
     else:
         free = np.eye(3)
-    return np.einsum("nkc,ncm,jm->jnk", contact.frame, motions[contact.nodes], free)
+    at_contact: FloatArray = np.einsum("nkc,ncm,jm->jnk", contact.frame, motions[contact.nodes], free)
+    return at_contact

@@ -180,9 +180,9 @@ class DenseBody:
 
     @cached_property
     def _probe(self) -> FloatArray:
-        """(2 n_contact,) array between -1 and 1 without any pattern: multiples of the golden ratio, modulo one."""
+        """(2 n_contact,) array around one: not orthogonal to rigid motions, and without any pattern."""
         multiples = np.arange(1, 2 * self.n_contact + 1) * 0.6180339887498949
-        return np.asarray(2.0 * np.modf(multiples)[0] - 1.0)
+        return np.asarray(0.5 + np.modf(multiples)[0])
 
     def _check_motions_are_held(self, matrix: FloatArray) -> None:
         if not self.rigid_motions().size:

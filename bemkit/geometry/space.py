@@ -129,7 +129,7 @@ class ConstantSpace:
 
 
 def _endpoint_dofs(mesh: BoundaryMesh, broken: BoolArray | None) -> tuple[IntArray, int]:
-    """Number the end points of the elements; a broken node carries one dof for each side."""
+    """Give the end points of the elements their dofs, and a broken node one for each side."""
     dofs = mesh.elements.copy()
     n_scalar = mesh.n_nodes
     if broken is not None and broken.any():

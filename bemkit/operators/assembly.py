@@ -1,8 +1,8 @@
 """Assembly of dense operators: one sweep over the element pairs serves all matrices that are wanted.
 
-An operator is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local coordinates, weighted by
-the monomial coefficients of the local test and trial functions. Its columns are gathered first, in a buffer of a few rows of
-elements, so that the large matrix is written once.
+An operator is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local
+coordinates, weighted by the monomial coefficients of the local test and trial functions. Its columns are gathered
+first, in a buffer of a few rows of elements, so that the large matrix is written once.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The boundary operators of plane elasticity as lazy weak forms on boundary spaces.
 
-With r = y - x, Q = r r^T / |r|^2, J = [[0, 1], [-1, 0]], mu the shear modulus, nu the (effective) Poisson ratio, d/ds the tangential
-derivative and k the Laplace double layer kernel, for continuous u on closed curves:
+With r = y - x, Q = r r^T / |r|^2, J = [[0, 1], [-1, 0]], mu the shear modulus, nu the (effective) Poisson ratio, d/ds
+the tangential derivative and k the Laplace double layer kernel, for continuous u on closed curves:
 
     <V t, q> = 1 / (8 pi mu (1 - nu)) int int q^T (-(3 - 4 nu) log(|r| / r0) I + Q) t
     <K u, q> = int int k q^T u + 1 / (4 pi (1 - nu)) int int q^T ((1 - 2 nu) J log|r| + J Q) du/ds
@@ -103,7 +103,7 @@ class _DenseOperator(ABC):
 
 
 class PairOperator(_DenseOperator):
-    """An operator assembled from element-pair integrals; subclasses say which, and how they combine (see `assembly`)."""
+    """An operator assembled from element-pair integrals; subclasses say which, and how they combine."""
 
     @property
     @abstractmethod
@@ -291,8 +291,8 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
     Notes
     -----
-    The logarithm is log(|r| / r0) with r0 the diameter of the mesh, which makes V positive definite at every size of the body;
-    the constant matters nowhere where the tractions are in equilibrium.
+    The logarithm is log(|r| / r0) with r0 the diameter of the mesh, which makes V positive definite at every size of
+    the body; the constant matters nowhere where the tractions are in equilibrium.
     """
     return SingleLayer(trial, test, material)
 

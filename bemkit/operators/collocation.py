@@ -5,8 +5,8 @@ With complex tractions p and displacements v on one element (closed forms of `ke
     U p = A l ([1 - kappa (2 log(l / r0) + J)] p + tau^2 [1 + i eta conj(T_0)] conj(p)),   A = 1 / (8 pi mu (1 - nu))
     T v = -B ([(2 - 2 nu) theta + i (1 - 2 nu) lambda] v + tau^2 eta conj(G_0) conj(v)),   B = 1 / (4 pi (1 - nu))
 
-where J = log|zeta^2 - 1| + Re T_1 and T_0 = lambda - i theta. On its own element theta, lambda and the second term are zero
-(principal value), and (1/2 I + T) u = U t.
+where J = log|zeta^2 - 1| + Re T_1 and T_0 = lambda - i theta. On its own element theta, lambda and the second term
+are zero (principal value), and (1/2 I + T) u = U t.
 """
 
 from __future__ import annotations
@@ -37,8 +37,9 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
     Returns
     -------
     single, double : (2 n_elements, 2 n_elements) arrays
-        Rows and columns are 2 * element + component. single maps tractions [Pa] to displacements [m]; its logarithm is log(|r| / r0) with
-        r0 the diameter of the mesh. double maps displacements to displacements, without the free term 1/2.
+        Rows and columns are 2 * element + component. single maps tractions [Pa] to displacements [m]; its logarithm
+        is log(|r| / r0) with r0 the diameter of the mesh. double maps displacements to displacements, without the
+        free term 1/2.
     """
     n = mesh.n_elements
     single, double = np.empty((n, 2, n, 2)), np.empty((n, 2, n, 2))
@@ -70,14 +71,21 @@ Coefficients = tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]
 
 
 def _combine(
-    material: Material, half: FloatArray, tangent: ComplexArray, log_half: FloatArray, first: ComplexArray, j: FloatArray, eta: FloatArray, gradient: ComplexArray
+    material: Material,
+    half: FloatArray,
+    tangent: ComplexArray,
+    log_half: FloatArray,
+    first: ComplexArray,
+    j: FloatArray,
+    eta: FloatArray,
+    gradient: ComplexArray,
 ) -> Coefficients:
     """Return the factors of p and conj(p) in the single layer, then those of v and conj(v) in the double layer."""
     nu = material.effective_poisson_ratio
     a = half / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
     b = -1.0 / (4.0 * np.pi * (1.0 - nu))
     square = tangent * tangent
-    on_p = a * (1.0 - (3.0 - 4.0 * nu) * (2.0 * log_half + j))
+    on_p = (a * (1.0 - (3.0 - 4.0 * nu) * (2.0 * log_half + j))).astype(complex)
     on_conj_p = (a * square) * (1.0 + 1j * eta * first.conj())
     on_v = (-b * (2.0 - 2.0 * nu)) * first.imag + (1j * b * (1.0 - 2.0 * nu)) * first.real
     on_conj_v = (b * square) * (eta * gradient.conj())
@@ -94,7 +102,9 @@ def _dense(panels: Panels, material: Material, rows: slice, log_half: FloatArray
         return _combine(material, panels.half, panels.tangent, log_half, first, j, zeta.imag, gradient)
 
 
-def _listed(panels: Panels, material: Material, rows: IntArray, columns: IntArray, log_half: FloatArray) -> Coefficients:
+def _listed(
+    panels: Panels, material: Material, rows: IntArray, columns: IntArray, log_half: FloatArray
+) -> Coefficients:
     """Evaluate listed pairs by the closed forms, exact at any distance."""
     to_local = panels.to_local[columns]
     plus = (panels.centre[rows] - panels.start[columns]) * to_local
@@ -106,7 +116,14 @@ def _listed(panels: Panels, material: Material, rows: IntArray, columns: IntArra
     moments[0][same] = 0.0  # principal value
     j = log_minus + log_plus + moments[1].real
     return _combine(
-        material, panels.half[columns], panels.tangent[columns], log_half[columns], moments[0], j, eta, kernels.gradient_moment(plus * minus)
+        material,
+        panels.half[columns],
+        panels.tangent[columns],
+        log_half[columns],
+        moments[0],
+        j,
+        eta,
+        kernels.gradient_moment(plus * minus),
     )
 
 

@@ -10,8 +10,8 @@ from bemkit.arrays import FloatArray
 def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left @ right by the BLAS of scipy.
 
-    numpy and scipy bring one BLAS each, and the threads of one keep spinning for a while after each call: products between LAPACK calls
-    are several times faster when they come from the same library.
+    numpy and scipy bring one BLAS each, and the threads of one keep spinning for a while after each call: products
+    between LAPACK calls are several times faster when they come from the same library.
     """
     from scipy.linalg.blas import dgemm
 
@@ -46,8 +46,10 @@ class Cholesky:
         self._factor, info = dpotrf(np.array(matrix.T, order="F"), lower=1, overwrite_a=1, clean=0)
         pivots = np.diag(self._factor)
         if info or (pivots.size and pivots.min() <= 1e-14 * pivots.max()):
-            msg = f"{name} is not positive definite: check for coincident elements and for supports that leave the body free"
-            raise SingularMatrixError(msg)
+            raise SingularMatrixError(
+                f"{name} is not positive definite: check for coincident elements and for supports that leave "
+                "the body free"
+            )
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""
@@ -85,14 +87,16 @@ class DenseLU:
     """
 
     def __init__(self, matrix: FloatArray, name: str) -> None:
-        from scipy.linalg.lapack import dgecon, dgetrf, dlange
+        from scipy.linalg.lapack import dgecon, dgetrf
 
-        norm = dlange("1", matrix)
+        norm = float(np.linalg.norm(matrix, 1))
         self._factor, self._pivots, info = dgetrf(matrix, overwrite_a=1)
-        reciprocal_condition = 0.0 if info else dgecon(self._factor, norm, norm="1")[0]
+        reciprocal_condition = 0.0 if info else dgecon(self._factor, norm)[0]
         if not reciprocal_condition > 1e-15:
-            msg = f"{name} is singular (reciprocal condition {reciprocal_condition:.1e}): check that the supports and contacts hold it"
-            raise SingularMatrixError(msg)
+            raise SingularMatrixError(
+                f"{name} is singular (reciprocal condition {reciprocal_condition:.1e}): "
+                "check that the supports and contacts hold it"
+            )
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""

@@ -6,9 +6,10 @@ For a test element i and a trial element j, with local coordinates xi and t in [
     quotient[a, b] = int int xi^a t^b (x - y) / conj(x - y)          (complex: Q11 - Q22 + 2i Q12)
     double[a, b]   = int int xi^a t^b k(x, y)                        (Laplace double layer)
 
-serve all four operators. The inner integral is closed form (`kernels`). The outer one is a Gauss rule whose number of points follows
-from the distance of the two singular points of the inner integral, the end points of the trial element. Most pairs are far and are
-swept densely in chunks; the few that need more points or exact local coordinates are listed and corrected (`near`).
+serve all four operators. The inner integral is closed form (`kernels`). The outer one is a Gauss rule whose number of
+points follows from the distance of the two singular points of the inner integral, the end points of the trial
+element. Most pairs are far and are swept densely in chunks; the few that need more points or exact local coordinates
+are listed and corrected (`near`).
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from bemkit.operators.near import integrate_near, integrate_same, integrate_sepa
 from bemkit.operators.pairs import Degrees, PairIntegrals
 from bemkit.operators.panels import Panels, squared_distance
 
-# An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points with an
-# error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15.
+# An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points
+# with an error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15.
 GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the test element] from which each is enough."""
 DENSE_DISTANCE = 45.0
@@ -38,7 +39,7 @@ LISTED_COST = 2.5
 
 
 class PairSweep:
-    """Integrals of all pairs of some test and trial elements, delivered in chunks of rows (safe to call from several threads).
+    """Integrals of all pairs of some test and trial elements, delivered in chunks of rows (from any thread).
 
     Parameters
     ----------

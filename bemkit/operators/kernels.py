@@ -1,7 +1,7 @@
 r"""Formulas only: polynomial densities on one straight element, seen from a point.
 
-Complex notation. The element runs from a to b with unit tangent tau, half length l and centre c; a point x has the local
-coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. With
+Complex notation. The element runs from a to b with unit tangent tau, half length l and centre c; a point x has the
+local coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. With
 
     T_k = int_{-1}^{1} t^k / (zeta - t) dt,    T_0 = log((zeta + 1) / (zeta - 1)),    T_k = zeta T_{k-1} - m_{k-1},
 
@@ -9,7 +9,7 @@ coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]
 
     int t^k log|rho| ds        = l (m_k log l + [log|zeta - 1| - (-1)^{k+1} log|zeta + 1| + Re T_{k+1}] / (k + 1))
     int t^k rho / conj(rho) ds = l tau^2 (m_k + 2 i eta conj(T_k)),   eta = Im zeta
-    int t^k k(x, y) ds         = Im T_k / (2 pi)                      (Laplace double layer k = -(1/2 pi) d log|rho| / dn_y)
+    int t^k k(x, y) ds         = Im T_k / (2 pi),   k = -(1/2 pi) d log|rho| / dn_y the Laplace double layer
 
 The recursion loses digits like |zeta|^(2k), so far points take the series of the highest T and recurse downwards.
 """
@@ -80,7 +80,9 @@ def far_log_product(zeta: ComplexArray) -> FloatArray:
     return squared
 
 
-def near_moments(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple[list[ComplexArray], FloatArray, FloatArray]:
+def near_moments(
+    plus: ComplexArray, minus: ComplexArray, highest: int
+) -> tuple[list[ComplexArray], FloatArray, FloatArray]:
     """Return the moments at points at any distance from the element, exact to round-off.
 
     Parameters
@@ -108,7 +110,9 @@ def near_moments(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple
     zeta = np.where(near_a, plus - 1.0, minus + 1.0)
     xi = zeta.real
     # |zeta+1|^2 - |zeta-1|^2 = 4 xi: log1p keeps the digits of the difference of two nearly equal logarithms
-    ratio = np.divide(4.0 * xi, abs_minus * abs_minus, out=np.zeros_like(xi), where=np.abs(xi) < abs_minus * abs_minus / 8.0)
+    ratio = np.divide(
+        4.0 * xi, abs_minus * abs_minus, out=np.zeros_like(xi), where=np.abs(xi) < abs_minus * abs_minus / 8.0
+    )
     lam = np.where(ratio != 0.0, 0.5 * np.log1p(ratio), log_plus - log_minus)
     theta = np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta)
     moments: list[ComplexArray] = [lam - 1j * theta]

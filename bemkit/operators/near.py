@@ -13,14 +13,17 @@ from bemkit.operators.pairs import Degrees, PairIntegrals
 from bemkit.operators.panels import Panels
 
 SEPARATION = 3.0
-"""A piece of the test element is integrated once every singular point is this many of its half lengths from its centre."""
+"""A piece of the test element is integrated once its centre is this many of its half lengths from every singular
+point."""
 N_REGULAR = 10
 N_TOUCHING = 20
 MAX_SPLITS = 60
 """Pieces shorter than 2**-60 of an element carry nothing that a double can hold."""
 
 
-def integrate_separated(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray, n_points: int) -> PairIntegrals:
+def integrate_separated(
+    panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray, n_points: int
+) -> PairIntegrals:
     """Integrate pairs with an outer Gauss rule on the whole test element.
 
     Parameters
@@ -37,20 +40,22 @@ def integrate_separated(panels: Panels, degrees: Degrees, test: IntArray, trial:
     for xi, weight in zip(points, weights, strict=True):
         node = panels.start if xi < 0 else panels.end
         offset = panels.tangent[test] * panels.half[test] * (xi + 1.0 if xi < 0 else xi - 1.0)
-        _add_points(result, panels, trial, node[test], offset, degrees, np.full(test.size, weight), np.full(test.size, xi))
+        _add_points(
+            result, panels, trial, node[test], offset, degrees, np.full(test.size, weight), np.full(test.size, xi)
+        )
     result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
     return result
 
 
 def integrate_near(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
-    """Integrate close or touching pairs: the test element is split until each piece is well away from both singular points.
+    """Integrate close or touching pairs: the test element is split until each piece is away from both singular points.
 
     Parameters and result as in `integrate_separated`.
 
     Notes
     -----
-    Each half of the test element is measured from its own end node, so that the distance to a shared node, and to a node at any
-    small distance from it, is exact however small the piece.
+    Each half of the test element is measured from its own end node, so that the distance to a shared node, and to a
+    node at any small distance from it, is exact however small the piece.
     """
     result = PairIntegrals.zeros(degrees, (test.size,))
     pair = np.arange(test.size)
@@ -98,7 +103,9 @@ def _split(panels: Panels, test: IntArray, trial: IntArray, at_start: bool) -> _
         pair, low, high = pair[rest], low[rest], high[rest]
         middle = 0.5 * (low + high)
         pair, low, high = np.tile(pair, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
-    return _Pieces(*(np.concatenate([getattr(piece, name) for piece in done]) for name in ("pair", "low", "high", "touches")))
+    return _Pieces(
+        *(np.concatenate([getattr(piece, name) for piece in done]) for name in ("pair", "low", "high", "touches"))
+    )
 
 
 def _integrate_pieces(
@@ -172,7 +179,7 @@ def _unit_log(a: int, b: int) -> float:
         plus = np.where(sign < 0, points, 2.0 - points) + 0j
         minus = np.where(sign < 0, points - 2.0, -points) + 0j
         moments, log_minus, log_plus = kernels.near_moments(plus, minus, b + 1)
-        moments = [moment.real + 0j for moment in moments]
+        moments = [moment.real.astype(complex) for moment in moments]
         inner = kernels.log_moment(b, moments, log_minus + log_plus)
         total += float(np.sum(weights * (sign - near_end) ** a * inner))
     return total

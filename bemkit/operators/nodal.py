@@ -11,7 +11,8 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.space import BoundarySpace, dof_points
 
 SMOOTH = 0.07
-"""Two directions of one support that differ by less than 30 degrees (eigenvalue ratio tan(15 deg)^2) stand for one smooth side."""
+"""Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
+their sum then differ by the factor tan(15 deg)^2."""
 CONFLICT = 1e-9
 """Relative difference of two prescribed displacements at one node that round-off may explain."""
 
@@ -33,7 +34,8 @@ class Support:
     directions : (m, k, 2) array
         k = 1 or 2 unit directions on each element (the normal of a roller, both axes of a clamp).
     displacement : callable, optional
-        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. Zero if left out.
+        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. Zero if left
+        out.
     """
 
     name: str
@@ -122,7 +124,8 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
         np.add.at(matrix, dofs, outer)
     size, vectors = np.linalg.eigh(matrix)
     keep = np.where(size > SMOOTH * size[:, 1:], 1.0, 0.0)
-    return np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
+    projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
+    return projector
 
 
 def _check_agreement(

@@ -1,7 +1,8 @@
 """Steklov-Poincare maps: from the displacement of the boundary to its tractions, by Galerkin or by collocation.
 
-Both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map does. Discretisation alone would
-break it slightly, and with it the independence of the arbitrary constant in the logarithm of the single layer.
+Both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map does. Discretisation
+alone would break it slightly, and with it the independence of the arbitrary constant in the logarithm of the single
+layer.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
@@ -39,7 +40,8 @@ class CondensedMap:
     load : (n_open,) array
         What the given loads and supports press onto the open directions.
     recover : callable
-        (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x and y.
+        (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x
+        and y.
     """
 
     stiffness: FloatArray
@@ -64,7 +66,7 @@ class SteklovPoincare(Protocol):
         """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, 2) mean tractions [Pa] that belong to a solution as `CondensedMap.recover` gives it."""
+        """Return the (n_elements, 2) mean tractions [Pa] that belong to what `CondensedMap.recover` gives."""
 
 
 class GalerkinMap:
@@ -79,8 +81,9 @@ class GalerkinMap:
 
     Notes
     -----
-    Paper, eq. (28). V is inverted on the tractions that exert no resultant force and moment, which makes S independent of the constant
-    in the logarithm; S is symmetric, and positive definite on displacements without rigid motions.
+    Paper, eq. (28). V is inverted on the tractions that exert no resultant force and moment, which makes S
+    independent of the constant in the logarithm; S is symmetric, and positive definite on displacements without rigid
+    motions.
     """
 
     def __init__(
@@ -99,7 +102,11 @@ class GalerkinMap:
     def _traction_solver(self) -> tuple[Cholesky, FloatArray, FloatArray, FloatArray]:
         """Factor V; return it with L^-1 B, and with the part of it that carries resultants, already orthonormal."""
         u, t = self.displacement_space, self.traction_space
-        v, k, w = single_layer(t, t, self.material), double_layer(u, t, self.material), hypersingular(u, u, self.material)
+        v, k, w = (
+            single_layer(t, t, self.material),
+            double_layer(u, t, self.material),
+            hypersingular(u, u, self.material),
+        )
         assemble(v, k, w)
         identity = mass(u, t).matrix()
         factor = Cholesky(v.matrix(), "the single layer operator")
@@ -134,7 +141,9 @@ class GalerkinMap:
         n = force.shape[0]
         matrix = _rotate_rows(_rotate_columns(self.matrix(), conditions.frame), conditions.frame)
         local_force = np.einsum("nkc,nc->nk", conditions.frame, force).ravel()
-        free, is_open, fixed = (np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed))
+        free, is_open, fixed = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
+        )
         prescribed = conditions.displacement.ravel()[fixed]
         factor = Cholesky(matrix[np.ix_(free, free)], "the body held by its supports and its contact boundary")
         rest = local_force[free] - matrix[np.ix_(free, fixed)] @ prescribed
@@ -163,11 +172,13 @@ class GalerkinMap:
         """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
         points, weights = gauss_legendre(self.traction_space.degree + 1)
         mean = self.traction_space.basis(points) @ weights / 2.0
-        return np.einsum("p,epc->ec", mean, self.tractions(displacement)[self.traction_space.element_dofs])
+        at_dofs = self.tractions(displacement)[self.traction_space.element_dofs]
+        tractions: FloatArray = np.einsum("p,epc->ec", mean, at_dofs)
+        return tractions
 
 
 class CollocationMap:
-    """Direct collocation with constant elements at their midpoints, (1/2 + T) u = U t, with tractions in exact equilibrium.
+    """Direct collocation with constant elements, (1/2 + T) u = U t at their midpoints, with tractions in equilibrium.
 
     Parameters
     ----------
@@ -176,10 +187,10 @@ class CollocationMap:
 
     Notes
     -----
-    The paper's discretisation. Plain collocation satisfies the equilibrium of forces and moments only up to the discretisation error.
-    Here a rigid motion c is added to the equations and the resultants of the tractions are set to zero; c vanishes with the mesh size.
-    Translations cause no tractions at all; a rotation, which constant elements cannot represent, causes some of the order of the
-    discretisation error.
+    The paper's discretisation. Plain collocation satisfies the equilibrium of forces and moments only up to the
+    discretisation error. Here a rigid motion c is added to the equations and the resultants of the tractions are set
+    to zero; c vanishes with the mesh size. Translations cause no tractions at all; a rotation, which constant
+    elements cannot represent, causes some of the order of the discretisation error.
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material) -> None:
@@ -206,7 +217,9 @@ class CollocationMap:
     @cached_property
     def _matrix(self) -> FloatArray:
         single, double = self._matrices
-        factor = DenseLU(self._bordered(single, np.ones(single.shape[1], bool), self._motions), "the single layer operator")
+        factor = DenseLU(
+            self._bordered(single, np.ones(single.shape[1], bool), self._motions), "the single layer operator"
+        )
         tractions = factor.solve(np.vstack([double, np.zeros((3, double.shape[1]))]))[:-3]
         matrix: FloatArray = self._weights[:, None] * tractions
         read_only(matrix)
@@ -220,8 +233,8 @@ class CollocationMap:
         """Return the resultants of a traction field on the elements."""
         return _integrate(self.displacement_space, elements, traction)
 
-    def _bordered(self, columns: FloatArray, is_traction: np.ndarray, motions: FloatArray) -> FloatArray:  # type: ignore[type-arg]
-        """Border a system with the rigid motion c and the resultants of its traction unknowns (all scaled by the mean length)."""
+    def _bordered(self, columns: FloatArray, is_traction: BoolArray, motions: FloatArray) -> FloatArray:
+        """Border a system with the rigid motion c and the resultants of its traction unknowns, by the mean length."""
         n = columns.shape[0]
         bordered = np.zeros((n + 3, n + 3), order="F")
         bordered[:n, :n] = columns
@@ -231,12 +244,14 @@ class CollocationMap:
         return bordered
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Exchange columns so that the unknowns of the free, fixed and open directions stand on the left, and solve once."""
+        """Exchange columns so that all unknowns but the open displacements stand on the left, and solve once."""
         n = force.shape[0]
         single, double = (_rotate_columns(matrix, conditions.frame) for matrix in self._matrices)
         motions = _rotate_columns(self._motions.T, conditions.frame).T
         traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / self._weights
-        free, is_open, fixed = (np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed))
+        free, is_open, fixed = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
+        )
         prescribed = conditions.displacement.ravel()[fixed]
         is_traction = ~conditions.is_free.ravel()
         factor = DenseLU(

@@ -160,9 +160,7 @@ class SemismoothNewton:
     def _damped_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         conditions = self._conditions(problem)
         response = respond(conditions, iterate.trial, iterate.trial.sets)
-        trials = [
-            conditions.evaluate(iterate.state.blended(response.state, 0.5**halvings)) for halvings in range(9)
-        ]
+        trials = [conditions.evaluate(iterate.state.blended(response.state, 0.5**halvings)) for halvings in range(9)]
         size, trial = min(((merit(problem, trial), trial) for trial in trials), key=lambda pair: pair[0])
         following = replace(
             iterate,
@@ -177,9 +175,7 @@ class SemismoothNewton:
             return self._rescued(problem, following, Status.STALLED, "the line search takes too many steps")
         return following
 
-    def _rescued(
-        self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str
-    ) -> NewtonIterate:
+    def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
         if iterate.phase is Phase.FULL and self.damped_steps > 0:
             size, trial = iterate.best

@@ -10,7 +10,12 @@ from tests.handmade import block_problem
 
 
 def test_a_held_body_bears_any_load():
-    assert find_unsolvable_load(ContactProblem(DenseBody(np.eye(2), np.full(2, -5.0), np.ones(1)), np.zeros(1), Coulomb(0))) is None
+    assert (
+        find_unsolvable_load(
+            ContactProblem(DenseBody(np.eye(2), np.full(2, -5.0), np.ones(1)), np.zeros(1), Coulomb(0))
+        )
+        is None
+    )
 
 
 def test_pushed_away():

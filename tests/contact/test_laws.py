@@ -27,11 +27,7 @@ def test_conformance(law):
 
 
 def test_every_law_is_checked():
-    public = {
-        cls
-        for cls in vars(laws).values()
-        if isinstance(cls, type) and FrictionLaw in cls.__mro__[1:]
-    }
+    public = {cls for cls in vars(laws).values() if isinstance(cls, type) and FrictionLaw in cls.__mro__[1:]}
     assert public == {type(law) for law in LAWS}
 
 

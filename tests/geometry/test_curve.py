@@ -82,11 +82,17 @@ def constant(s):
         (lambda: Arc((0.0, 0.0), 1.0, 2.0, 2.0), r"start_angle=2.0 to end_angle=2.0 is not an arc: give angles"),
         (lambda: Arc((0.0, 0.0), 1.0, 0.0, 90.0), r"end_angle=90.0 is not an arc: give angles in radians"),
         (lambda: Arc((0.0, 0.0), 1.0, 0.0, np.nan), r"end_angle=nan is not an arc"),
-        (lambda: ParametricCurve(line, lambda s: 2.0 * constant(s)), r"function moves by \(0.125, 0\), but .*\(0.25, 0\)"),
+        (
+            lambda: ParametricCurve(line, lambda s: 2.0 * constant(s)),
+            r"function moves by \(0.125, 0\), but .*\(0.25, 0\)",
+        ),
         (lambda: ParametricCurve(line, lambda s: -constant(s)), r"give the derivative of function with respect to s"),
         (lambda: ParametricCurve(line, lambda s: 0.0 * constant(s)), r"vanishes at s=.*: choose a parameter"),
         (lambda: ParametricCurve(line, lambda s: s), r"derivative_function returned an array of shape \(64,\) for 64"),
-        (lambda: ParametricCurve(lambda s: line(s) / 0.0, constant), r"function is \(nan, nan\) at s=0: it must be finite"),
+        (
+            lambda: ParametricCurve(lambda s: line(s) / 0.0, constant),
+            r"function is \(nan, nan\) at s=0: it must be finite",
+        ),
     ],
 )
 @pytest.mark.filterwarnings("ignore:divide by zero:RuntimeWarning", "ignore:invalid value:RuntimeWarning")

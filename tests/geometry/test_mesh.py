@@ -110,7 +110,15 @@ def test_arrays_are_read_only_and_not_the_callers() -> None:
     nodes[0] = 5.0
     assert mesh.nodes[0].tolist() == [0.0, 0.0]
     assert mesh.part("part").tolist() == [0, 2]
-    for array in (mesh.nodes, mesh.elements, mesh.part("part"), mesh.lengths, mesh.centres, mesh.normals, mesh.loops[0]):
+    for array in (
+        mesh.nodes,
+        mesh.elements,
+        mesh.part("part"),
+        mesh.lengths,
+        mesh.centres,
+        mesh.normals,
+        mesh.loops[0],
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
     with pytest.raises(TypeError, match="does not support item assignment"):
@@ -147,7 +155,9 @@ def test_sides_a_millionth_of_an_element_apart_are_legal(vertices, size, angle) 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_grading_by_1e12_is_legal(corner, scale: float, angle: float) -> None:
-    points = scale * np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.2], [0.0, 1.0]]) @ rotation(angle).T + scale * np.array(corner)
+    points = scale * np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.2], [0.0, 1.0]]) @ rotation(angle).T + scale * np.array(
+        corner
+    )
     outline = Polygon(tuple(map(tuple, points.tolist()))).outline()
     mesh = discretise(outline, n_elements=400, grading=Geometric(0.5, 40))
     assert mesh.lengths.max() / mesh.lengths.min() > 1e12

@@ -182,13 +182,19 @@ REFUSED = {
         ),
         r"the curve of side 'v' has a kink near s=0\.\d+: .*split it into two sides there",
     ),
-    "clockwise": (lambda: Outline((hole(1.0),)), r"outer loop of sides h1, h2, h3, h4 runs clockwise: list its vertices"),
+    "clockwise": (
+        lambda: Outline((hole(1.0),)),
+        r"outer loop of sides h1, h2, h3, h4 runs clockwise: list its vertices",
+    ),
     "all reversed": (lambda: Outline((hole(2.0), square(1.0))), r"outer loop of sides h1, .* runs clockwise"),
     "hole anticlockwise": (
         lambda: Outline((square(2.0), square(1.0, name="h"))),
         r"loop of sides h1, h2, h3, h4 runs anticlockwise inside or beside the outer loop .*: list the vertices of a hole",
     ),
-    "two bodies": (lambda: Outline((square(1.0), square(1.0, 5.0, name="t"))), r"give a second body an outline of its own"),
+    "two bodies": (
+        lambda: Outline((square(1.0), square(1.0, 5.0, name="t"))),
+        r"give a second body an outline of its own",
+    ),
     "hole outside": (lambda: Outline((square(1.0), hole(0.5, 3.0))), r"is a hole that lies outside of the outer loop"),
     "hole in hole": (
         lambda: Outline((square(3.0), hole(2.0), hole(1.0, name="g"))),
@@ -206,7 +212,10 @@ REFUSED = {
         lambda: Outline((polygon((0, 0), (0, 1), (0.5, 2), (1, 1), (1, 0)),)),
         r"outer loop of sides s1, s2, \.\.\., s5 runs clockwise",
     ),
-    "not finite": (lambda: Outline(((Side("bad", NotFinite()),),)), r"side 'bad' has an end that is not finite: correct"),
+    "not finite": (
+        lambda: Outline(((Side("bad", NotFinite()),),)),
+        r"side 'bad' has an end that is not finite: correct",
+    ),
     "no name": (lambda: Side("", Segment((0, 0), (1, 0))), r"Side: name is '': give a non-empty string"),
 }
 TURN = np.array([[np.cos(0.7), np.sin(0.7)], [-np.sin(0.7), np.cos(0.7)]])

@@ -32,7 +32,9 @@ def test_several_breakpoints_on_an_arc() -> None:
     assert np.allclose(found, [1 / 3, 2 / 3], rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("where", [lambda x, y: x > 0.0, lambda x, y: x < 1.0, lambda x, y: x > -1.0, lambda x, y: True])
+@pytest.mark.parametrize(
+    "where", [lambda x, y: x > 0.0, lambda x, y: x < 1.0, lambda x, y: x > -1.0, lambda x, y: True]
+)
 def test_ends_are_no_breakpoints(where) -> None:
     assert len(breakpoints(BOTTOM, where)) == 0
 
@@ -55,7 +57,10 @@ def test_selection_of_sides_and_points() -> None:
     [
         (lambda: Selection("bottom"), r"sides is the string 'bottom': give a tuple, \('bottom',\)"),
         (lambda: breakpoints(BOTTOM, lambda x, y: x), r"where returned an array of float64 of shape \(257,\) for 257"),
-        (lambda: breakpoints(BOTTOM, lambda x, y: x[:3] > 0), r"of bool of shape \(3,\) for 257 points: return booleans"),
+        (
+            lambda: breakpoints(BOTTOM, lambda x, y: x[:3] > 0),
+            r"of bool of shape \(3,\) for 257 points: return booleans",
+        ),
     ],
 )
 def test_refused(make, message: str) -> None:

@@ -44,7 +44,9 @@ def test_side_names(shape: Shape, names: str) -> None:
     assert shape.outline().side_names == tuple(names.split())
 
 
-@pytest.mark.parametrize("shape", [Disk(1.0), Ring(0.5, 1.0), PlateWithHole(4, 4, 1, (-2.0, -2.0)), ExteriorOf(Disk(1))])
+@pytest.mark.parametrize(
+    "shape", [Disk(1.0), Ring(0.5, 1.0), PlateWithHole(4, 4, 1, (-2.0, -2.0)), ExteriorOf(Disk(1))]
+)
 def test_arcs_are_numbered_by_quadrant(shape: Shape) -> None:
     for side in shape.outline().sides:
         if not side.curve.is_straight:
@@ -101,7 +103,10 @@ def test_polygon_that_is_none_is_refused(vertices, size, angle) -> None:
         (lambda: PlateWithHole(1.0, 2.0, 0.5), r"radius is 0.5, but the plate is 1.0 by 2.0: give a radius less than"),
         (lambda: PlateWithHole(1.0, 2.0, 0.0), r"PlateWithHole: radius is 0.0"),
         (lambda: PlateWithHole(1.0, 2.0, 0.1, (0.0, np.nan)), r"PlateWithHole: corner is"),
-        (lambda: ExteriorOf(ExteriorOf(Disk(1.0))), r"ExteriorOf: shape is already an exterior: give the bounded shape"),
+        (
+            lambda: ExteriorOf(ExteriorOf(Disk(1.0))),
+            r"ExteriorOf: shape is already an exterior: give the bounded shape",
+        ),
         (lambda: ExteriorOf(Ring(1.0, 2.0)), r"ExteriorOf: shape has 1 hole\(s\), .*: give a shape without holes"),
     ],
 )

@@ -31,7 +31,10 @@ def exact(mesh: BoundaryMesh, i: int, j: int) -> tuple[float, complex, float]:
         tau_i, tau_j = (b_i - a_i) / length_i, (b_j - a_j) / length_j
         d = (a_i + b_i - a_j - b_j) / 2
         direction = d / abs(d)
-        beta_of = {0: mpmath.conj(tau_i) * (-length_i / 2) + mpmath.conj(d), 1: mpmath.conj(tau_i) * length_i / 2 + mpmath.conj(d)}
+        beta_of = {
+            0: mpmath.conj(tau_i) * (-length_i / 2) + mpmath.conj(d),
+            1: mpmath.conj(tau_i) * length_i / 2 + mpmath.conj(d),
+        }
         sum_log = sum_x0 = sum_x1 = mpmath.mpc(0)
         for p, z_i in enumerate(ends[0]):
             for q, z_j in enumerate(ends[1]):
@@ -85,7 +88,16 @@ def test_pairs_stay_exact_when_lengths_differ_by_orders(ratio: float) -> None:
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_pairs_stay_exact_on_nearly_touching_sides(gap: float) -> None:
     # a slit of width gap between two parallel sides whose elements overlap by halves
-    outline = [(0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (0.0, 2.0), (0.0, 1.0 + gap), (1.0, 1.0 + gap), (2.0, 1.0 + gap), (2.0, 1.0)]
+    outline = [
+        (0.0, 0.0),
+        (3.0, 0.0),
+        (3.0, 2.0),
+        (0.0, 2.0),
+        (0.0, 1.0 + gap),
+        (1.0, 1.0 + gap),
+        (2.0, 1.0 + gap),
+        (2.0, 1.0),
+    ]
     outline += [(1.5, 1.0), (0.5, 1.0), (0.0, 1.0)]
     check_constants(mesh_of(outline), 1e-12)
 
@@ -104,7 +116,12 @@ def test_same_element_has_its_closed_form() -> None:
 def test_far_pairs_agree_with_a_tensor_rule() -> None:
     # two squares far apart in one loop: pairs at 1e2 to 1e4 element lengths, where plain logarithms lose digits
     side = np.linspace(0.0, 1.0, 65)[:-1]
-    points = [(x, 0.0) for x in side] + [(1.0, x) for x in side] + [(1 - x, 1.0) for x in side] + [(0.0, 1 - x) for x in side]
+    points = (
+        [(x, 0.0) for x in side]
+        + [(1.0, x) for x in side]
+        + [(1 - x, 1.0) for x in side]
+        + [(0.0, 1 - x) for x in side]
+    )
     mesh = mesh_of(points)
     integrals = PairSweep(mesh, DEGREES).chunk(slice(0, mesh.n_elements))
     xi, weight = np.polynomial.legendre.leggauss(8)

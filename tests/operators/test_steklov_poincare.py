@@ -102,7 +102,8 @@ def test_collocation_keeps_exact_equilibrium_and_kills_translations() -> None:
 
 @pytest.mark.parametrize("kind", [GalerkinMap, CollocationMap])
 @pytest.mark.parametrize(
-    ("shape", "nu"), [(Rectangle(3.0, 1.0), 0.2398328), (Rectangle(2.1116510, 2.1116510), 0.2), (Rectangle(1e3, 1e3), 0.3)]
+    ("shape", "nu"),
+    [(Rectangle(3.0, 1.0), 0.2398328), (Rectangle(2.1116510, 2.1116510), 0.2), (Rectangle(1e3, 1e3), 0.3)],
 )
 def test_no_size_of_the_body_is_degenerate(kind: type, shape: Rectangle, nu: float) -> None:
     material = Material(1.0, nu)

@@ -137,7 +137,7 @@ def test_every_status_has_a_case():
     ],
 )
 def test_messages_name_the_reason(case, words):
-    status, problem, driver, options = CASES[case]
+    _, problem, driver, options = CASES[case]
     assert words in solve(problem, driver, throw=False, **options).message
 
 
@@ -168,7 +168,7 @@ class Broken(FrictionLaw):
 @pytest.mark.parametrize("driver", [SemismoothNewton(), AugmentedLagrangian(), FixedPoint(), LemkePivoting()], ids=repr)
 def test_errors_inside_a_law_surface_with_its_name(driver):
     problem = block_problem(Broken())
-    with pytest.raises(LawError, match="friction law Broken.bound failed: KeyError: 'temperature'"):
+    with pytest.raises(LawError, match=r"friction law Broken.bound failed: KeyError: 'temperature'"):
         solve(problem, driver, throw=False)
 
 

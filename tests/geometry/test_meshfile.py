@@ -1,0 +1,165 @@
+import importlib.util
+
+import meshio
+import numpy as np
+import pytest
+
+from bemkit.geometry.discretise import discretise
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshfile import read_mesh, write_mesh
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.shapes import ExteriorOf, Polygon, Rectangle
+
+from .strategies import closed
+
+OUTER = np.array([[0, 0], [3, 0], [3, 2], [0, 2]]) / 3.0
+INNER = np.array([[0.25, 0.25], [0.25, 0.5], [0.5, 0.5], [0.5, 0.25]])
+
+
+@pytest.fixture
+def mesh() -> BoundaryMesh:
+    parts = {"left side": [3], "hole": [4, 5, 6, 7]}
+    return BoundaryMesh(np.vstack([OUTER, INNER]), np.vstack([closed(4), closed(4, 4)]), parts)
+
+
+def test_round_trip_keeps_every_digit(mesh: BoundaryMesh, tmp_path) -> None:
+    write_mesh(tmp_path / "body.msh", mesh)
+    copy = read_mesh(tmp_path / "body.msh")
+    assert np.array_equal(copy.nodes, mesh.nodes)
+    assert np.array_equal(copy.elements, mesh.elements)
+    assert {name: part.tolist() for name, part in copy.parts.items()} == {"left side": [3], "hole": [4, 5, 6, 7]}
+
+
+def test_round_trip_of_an_exterior(tmp_path) -> None:
+    mesh = discretise(ExteriorOf(Polygon(((0, 0), (1, 0), (0, 1)))).outline(), n_elements=9)
+    write_mesh(tmp_path / "cavity.msh", mesh)
+    copy = read_mesh(tmp_path / "cavity.msh", is_exterior=True)
+    assert copy.is_exterior
+    assert np.allclose(copy.loop_areas, -0.5, rtol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("is_exterior", [False, True])
+def test_lines_in_any_order_and_direction(mesh: BoundaryMesh, tmp_path, seed: int, is_exterior: bool) -> None:
+    random = np.random.default_rng(seed)
+    nodes, elements = (mesh.nodes[:4], mesh.elements[:4]) if is_exterior else (mesh.nodes, mesh.elements)
+    # with a stray node, triangles, two blocks of lines, and a constant third coordinate
+    place = random.permutation(len(nodes)) + 1
+    points = np.full((len(nodes) + 1, 3), 7.0)
+    points[place, :2] = nodes
+    order = random.permutation(len(elements))
+    lines = place[elements][order]
+    flipped = random.random(len(lines)) < 0.5
+    lines[flipped] = lines[flipped][:, ::-1]
+    cells = [("line", lines[:2]), ("triangle", [[1, 2, 3]]), ("line", lines[2:])]
+    is_left = order == 3
+    tags = [is_left[:2] * 5, np.array([5]), is_left[2:] * 5]
+    meshio.Mesh(
+        points,
+        cells,
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": [np.ones_like(tag) for tag in tags]},
+        field_data={"left": np.array([5, 1]), "body": np.array([5, 2]), "no line": np.array([6, 1])},
+    ).write(tmp_path / "body.msh", file_format="gmsh22")
+    copy = read_mesh(tmp_path / "body.msh", is_exterior=is_exterior)
+    assert list(copy.parts) == ["left"]
+    (left,) = copy.part("left")
+    assert copy.centres[left].tolist() == [0.0, 1.0 / 3.0]
+    assert copy.normals[left].tolist() == ([1.0, 0.0] if is_exterior else [-1.0, 0.0])
+    assert copy.loop_areas.sum() == pytest.approx(-2 / 3 if is_exterior else 2 / 3 - 1 / 16, rel=1e-14)
+    assert np.array_equal(copy.elements[:, 0], np.arange(copy.n_elements))
+
+
+def test_cell_sets_become_parts(tmp_path) -> None:
+    sets = {"low": [np.array([0]), np.array([], dtype=int)], "inside": [np.array([], dtype=int), np.array([0])]}
+    cells = [("line", closed(4)), ("quad", [[0, 1, 2, 3]])]
+    meshio.Mesh(OUTER, cells, cell_sets=sets).write(tmp_path / "body.inp")
+    copy = read_mesh(tmp_path / "body.inp")
+    assert {name: part.tolist() for name, part in copy.parts.items()} == {"low": [0]}
+
+
+def test_curved_elements_are_written_as_chords(tmp_path) -> None:
+    from bemkit.geometry.shapes import Disk
+
+    write_mesh(tmp_path / "disk.msh", discretise(Disk(1.0).outline(), n_elements=12))
+    copy = read_mesh(tmp_path / "disk.msh")
+    assert copy.is_straight.all()
+    assert copy.area == pytest.approx(3.0, rel=1e-15)  # the regular polygon of twelve sides
+
+
+def test_file_of_a_scene_keeps_its_parts(tmp_path) -> None:
+    parts = {"contact": Selection(("bottom",)), "load": Selection(("top",), lambda x, y: x < 0.5)}
+    mesh = discretise(Rectangle(1, 1).outline(), n_elements=20, parts=parts)
+    write_mesh(tmp_path / "block.msh", mesh)
+    copy = read_mesh(tmp_path / "block.msh")
+    assert {name: part.tolist() for name, part in copy.parts.items()} == {
+        name: part.tolist() for name, part in mesh.parts.items()
+    }
+
+
+def line_mesh(points, lines, cell: str = "line") -> meshio.Mesh:
+    return meshio.Mesh(np.array(points, dtype=float), [(cell, np.array(lines))])
+
+
+REFUSED = {
+    "branch": (
+        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1], [1, 2], [2, 0], [0, 1]]),
+        r"3 lines of .*body.vtk meet at \(0, 0\): the boundary must be closed and simple",
+    ),
+    "open": (line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1], [1, 2]]), r"1 lines of .* meet at \(0, 0\)"),
+    "not plane": (
+        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 2]], closed(3)),
+        r"have z from 0 to 2: give a plane mesh",
+    ),
+    "no lines": (
+        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], "triangle"),
+        r"has no line cells: export the",
+    ),
+    "second order": (
+        line_mesh([[0, 0, 0], [1, 0, 0], [0.5, 0, 0]], [[0, 1, 2]], "line3"),
+        r"has cells of type 'line3': write a mesh of first order",
+    ),
+    "two bodies": (
+        line_mesh(
+            [[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]], np.vstack([closed(3), closed(3, 3)])
+        ),
+        r"is a hole that lies outside of the outer loop",
+    ),
+}
+
+
+@pytest.mark.parametrize(("file_mesh", "message"), REFUSED.values(), ids=REFUSED)
+def test_refused(file_mesh: meshio.Mesh, message: str, tmp_path) -> None:
+    file_mesh.write(tmp_path / "body.vtk")
+    with pytest.raises(GeometryError, match=message):
+        read_mesh(tmp_path / "body.vtk")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("body.msh", None, r"body.msh cannot be read \(ReadError: File .* not found.\): give a mesh file of a format"),
+        ("body.txt", "hello", r"cannot be read \(ReadError: Could not deduce file format"),
+        ("body.msh", "hello\n", r"cannot be read \(.*Couldn't read file"),
+        ("body.vtk", "# vtk DataFile Version 4.2\n", r"cannot be read"),
+    ],
+)
+def test_unreadable_file_is_named_and_nothing_is_printed(name, content, message: str, tmp_path, capsys) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(GeometryError, match=message):
+        read_mesh(tmp_path / name)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_other_endings_are_not_written(mesh: BoundaryMesh, tmp_path) -> None:
+    with pytest.raises(GeometryError, match=r"body.vtk is not a name for a Gmsh file: end it in .msh"):
+        write_mesh(tmp_path / "body.vtk", mesh)
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_meshio_says_what_to_install(mesh: BoundaryMesh, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    for act in (lambda: read_mesh(tmp_path / "a.msh"), lambda: write_mesh(tmp_path / "a.msh", mesh)):
+        with pytest.raises(GeometryError, match=r'meshio is not installed: pip install "bemkit\[mesh\]"'):
+            act()
