@@ -1,3 +1,141 @@
-"""Frictional contact of elastic bodies by boundary elements."""
+"""Frictional contact of elastic bodies by boundary elements.
+
+>>> import bemkit
+>>> bemkit.run(bemkit.load_scene("paper-1")).status.name
+'CONVERGED'
+
+The names below are imported when they are first used, so that importing bemkit costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
+    from bemkit.contact.laws import Coulomb as Coulomb
+    from bemkit.contact.laws import FrictionLaw as FrictionLaw
+    from bemkit.contact.laws import Frictionless as Frictionless
+    from bemkit.contact.laws import Tresca as Tresca
+    from bemkit.contact.obstacle import Cavity as Cavity
+    from bemkit.contact.obstacle import Circle as Circle
+    from bemkit.contact.obstacle import Gap as Gap
+    from bemkit.contact.obstacle import HalfPlane as HalfPlane
+    from bemkit.contact.obstacle import Obstacle as Obstacle
+    from bemkit.expression import Expression as Expression
+    from bemkit.geometry.discretise import discretise as discretise
+    from bemkit.geometry.grading import Algebraic as Algebraic
+    from bemkit.geometry.grading import Geometric as Geometric
+    from bemkit.geometry.grading import Uniform as Uniform
+    from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+    from bemkit.geometry.shapes import Disk as Disk
+    from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
+    from bemkit.geometry.shapes import PlateWithHole as PlateWithHole
+    from bemkit.geometry.shapes import Polygon as Polygon
+    from bemkit.geometry.shapes import Rectangle as Rectangle
+    from bemkit.geometry.shapes import Ring as Ring
+    from bemkit.geometry.space import ConstantSpace as ConstantSpace
+    from bemkit.geometry.space import LinearSpace as LinearSpace
+    from bemkit.geometry.space import QuadraticSpace as QuadraticSpace
+    from bemkit.geometry.space import corner_nodes as corner_nodes
+    from bemkit.io import read_result as read_result
+    from bemkit.io import write_result as write_result
+    from bemkit.operators.boundary import adjoint_double_layer as adjoint_double_layer
+    from bemkit.operators.boundary import assemble as assemble
+    from bemkit.operators.boundary import double_layer as double_layer
+    from bemkit.operators.boundary import hypersingular as hypersingular
+    from bemkit.operators.boundary import mass as mass
+    from bemkit.operators.boundary import single_layer as single_layer
+    from bemkit.operators.material import Material as Material
+    from bemkit.operators.material import Plane as Plane
+    from bemkit.operators.steklov_poincare import CollocationMap as CollocationMap
+    from bemkit.operators.steklov_poincare import GalerkinMap as GalerkinMap
+    from bemkit.plan import make_plan as make_plan
+    from bemkit.runner import run as run
+    from bemkit.runner import run_all as run_all
+    from bemkit.scene import Clamped as Clamped
+    from bemkit.scene import ConstantCollocation as ConstantCollocation
+    from bemkit.scene import Contact as Contact
+    from bemkit.scene import LinearGalerkin as LinearGalerkin
+    from bemkit.scene import MeshOptions as MeshOptions
+    from bemkit.scene import Part as Part
+    from bemkit.scene import PrescribedDisplacement as PrescribedDisplacement
+    from bemkit.scene import Pressure as Pressure
+    from bemkit.scene import Roller as Roller
+    from bemkit.scene import Scene as Scene
+    from bemkit.scene import Traction as Traction
+    from bemkit.scenefile import load_scene as load_scene
+    from bemkit.scenefile import scene_from_toml as scene_from_toml
+    from bemkit.scenefile import scene_to_toml as scene_to_toml
+    from bemkit.solution import Solution as Solution
+    from bemkit.solvers.alm import AugmentedLagrangian as AugmentedLagrangian
+    from bemkit.solvers.base import ContactSolver as ContactSolver
+    from bemkit.solvers.base import Status as Status
+    from bemkit.solvers.base import solve as solve
+    from bemkit.solvers.fixed_point import FixedPoint as FixedPoint
+    from bemkit.solvers.lemke import LemkePivoting as LemkePivoting
+    from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
+
+_HOME = {
+    "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
+    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
+    "expression": ("Expression",),
+    "geometry.discretise": ("discretise",),
+    "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
+    "geometry.mesh": ("BoundaryMesh",),
+    "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring"),
+    "geometry.space": ("ConstantSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
+    "io": ("read_result", "write_result"),
+    "operators.boundary": (
+        "adjoint_double_layer",
+        "assemble",
+        "double_layer",
+        "hypersingular",
+        "mass",
+        "single_layer",
+    ),
+    "operators.material": ("Material", "Plane"),
+    "operators.steklov_poincare": ("CollocationMap", "GalerkinMap"),
+    "plan": ("make_plan",),
+    "runner": ("run", "run_all"),
+    "scene": (
+        "Clamped",
+        "ConstantCollocation",
+        "Contact",
+        "LinearGalerkin",
+        "MeshOptions",
+        "Part",
+        "PrescribedDisplacement",
+        "Pressure",
+        "Roller",
+        "Scene",
+        "Traction",
+    ),
+    "scenefile": ("load_scene", "scene_from_toml", "scene_to_toml"),
+    "solution": ("Solution",),
+    "solvers.alm": ("AugmentedLagrangian",),
+    "solvers.base": ("ContactSolver", "Status", "solve"),
+    "solvers.fixed_point": ("FixedPoint",),
+    "solvers.lemke": ("LemkePivoting",),
+    "solvers.ssn": ("SemismoothNewton",),
+}
+_MODULE_OF = {name: f"bemkit.{module}" for module, names in _HOME.items() for name in names}
+
+__all__ = sorted(_MODULE_OF)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name on first use."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'bemkit' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return [*globals(), *__all__]

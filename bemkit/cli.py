@@ -177,7 +177,7 @@ def _load(
 
 def _solve(scene: Scene, *, is_live: bool) -> Solution:
     from bemkit.plan import check_memory
-    from bemkit.run import run as solve_scene
+    from bemkit.runner import run as solve_scene
 
     check_memory(scene)
     if not is_live:

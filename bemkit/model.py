@@ -17,6 +17,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.condensation import CondensedBody, ContactNodes, condense
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.nodal import Support
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
@@ -161,7 +162,7 @@ def build_model(scene: Scene, mesh: BoundaryMesh) -> Model:
 
 def contact_elements(scene: Scene, mesh: BoundaryMesh) -> IntArray:
     """Return the elements of all contact parts, in order along each."""
-    return np.concatenate([mesh.part(part.name) for part in scene.contact_parts])
+    return np.concatenate([along_boundary(mesh, mesh.part(part.name)) for part in scene.contact_parts])
 
 
 def _elastic_map(scene: Scene, mesh: BoundaryMesh, units: Units) -> SteklovPoincare:

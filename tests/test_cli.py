@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import bemkit.io
-import bemkit.run
+import bemkit.runner
 from bemkit.cli import main
 from bemkit.io import read_result
 from bemkit.report import ConvergenceTable, format_size
@@ -186,7 +186,7 @@ def test_defects_of_bemkit_keep_their_traceback(monkeypatch: pytest.MonkeyPatch)
     def broken(*arguments: object, **options: object) -> None:
         raise ValueError("not an input error")
 
-    monkeypatch.setattr(bemkit.run, "run", broken)
+    monkeypatch.setattr(bemkit.runner, "run", broken)
     with pytest.raises(ValueError, match="not an input error"):
         main(["run", "paper-1"])
 
@@ -250,7 +250,7 @@ def test_the_convergence_table_has_a_line_per_step() -> None:
     from bemkit.scenefile import load_scene, with_overrides
 
     console = Console(file=io.StringIO(), width=100)
-    solution = bemkit.run.run(with_overrides(load_scene("paper-1"), elements=40), callback=ConvergenceTable(console))
+    solution = bemkit.runner.run(with_overrides(load_scene("paper-1"), elements=40), callback=ConvergenceTable(console))
     lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
     assert lines[0].split()[:3] == ["step", "solves", "separated"]
     assert len(lines) == 1 + len(solution.history)

@@ -15,7 +15,7 @@ import pytest
 
 import bemkit.io
 from bemkit.io import OutputFileError, ResultFileError, read_result, write_result
-from bemkit.run import run
+from bemkit.runner import run
 from bemkit.scene import Part, Traction
 from bemkit.scenefile import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
 from bemkit.solution import Solution

@@ -21,7 +21,7 @@ from bemkit.plotting import (
     node_displacement,
     save_figures,
 )
-from bemkit.run import run
+from bemkit.runner import run
 from bemkit.scenefile import load_scene, with_overrides
 from bemkit.solution import BoundaryFields, Solution
 

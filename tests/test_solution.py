@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemkit.run import run
+from bemkit.runner import run
 from bemkit.scenefile import load_scene, with_overrides
 from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
 from bemkit.solvers.active_sets import NodeStatus
@@ -110,7 +110,7 @@ def test_the_summary_has_the_promised_names(solution: Solution) -> None:
 
 
 def test_a_failed_solution_says_so(solution: Solution) -> None:
-    failed = dataclasses.replace(solution, status=Status.MAX_STEPS)
+    failed = dataclasses.replace(solution, status=Status.MAX_STEPS, message="")
     assert not failed.is_converged
     assert failed.summary()["status"] == "max_steps"
     assert "raise max_steps" in failed.summary()["message"]

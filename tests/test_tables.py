@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from bemkit.run import run
+from bemkit.runner import run
 from bemkit.scenefile import load_scene, with_overrides
 from bemkit.solution import BoundaryFields, Solution
 from bemkit.tables import CSV_STARTS, TABLES, element_displacement, to_json, write_csv

@@ -21,7 +21,7 @@ class UnsolvableLoad:
     motion : (n_contact, 2) array
         Normal and tangential components of the escape at the contact nodes, scaled to a largest entry of one.
     lift : (n_contact,) array
-        How much faster each node leaves the obstacle than sliding against full friction would allow, ``-v_n - s |v_t|``;
+        How much faster each node leaves the obstacle than sliding at full friction would allow, ``-v_n - s |v_t|``;
         zero everywhere if the body slides, nan where a node can never touch.
     work : float [N]
         Work of the load on it, less what friction takes up; positive.

@@ -193,7 +193,7 @@ def condense(
     stiffness[idle, idle] = np.median(diagonal[diagonal > 0.0])
     points = dof_points(space)
     motions = _free_motions(conditions, contact, points)
-    motions.reshape(len(motions), -1)[:, idle] = 0.0
+    motions.reshape(len(motions), 2 * contact.nodes.size)[:, idle] = 0.0
     dense = DenseBody(stiffness, load, contact.weights, motions)
     return CondensedBody(dense, condensed, to_open, offset, points), contact
 

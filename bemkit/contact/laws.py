@@ -234,29 +234,25 @@ class CohesiveCoulomb(FrictionLaw):
 
 @dataclass(frozen=True)
 class RescaledLaw(FrictionLaw):
-    """Any law, seen through another unit of stress and weakened or strengthened by a factor.
+    """Any law, seen through another unit of stress; what `FrictionLaw.scaled` returns by default.
 
     Parameters
     ----------
     law : FrictionLaw
     stress_scale : float [Pa]
         The unit in which this law receives and returns stresses.
-    fraction : float [-]
-        Factor on the bound; the friction continuation leads it to one.
     """
 
     law: FrictionLaw
-    stress_scale: float = 1.0
-    fraction: float = 1.0
+    stress_scale: float
 
     def __post_init__(self) -> None:
         _check_scale(self.stress_scale)
-        _coefficient("fraction", self.fraction)
 
     @property
     def is_frictionless(self) -> bool:
-        """Whether the law is frictionless or its fraction is zero."""
-        return self.law.is_frictionless or self.fraction == 0.0
+        """What the law says."""
+        return self.law.is_frictionless
 
     @property
     def acts_across_gap(self) -> bool:
@@ -264,12 +260,12 @@ class RescaledLaw(FrictionLaw):
         return self.law.acts_across_gap
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``fraction * bound(sigma_n * stress_scale) / stress_scale``."""
-        return self.fraction * self.law.bound(sigma_n * self.stress_scale) / self.stress_scale
+        """Return ``bound(sigma_n * stress_scale) / stress_scale``."""
+        return self.law.bound(sigma_n * self.stress_scale) / self.stress_scale
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``fraction * bound_derivative(sigma_n * stress_scale)``."""
-        return self.fraction * self.law.bound_derivative(sigma_n * self.stress_scale)
+        """Return ``bound_derivative(sigma_n * stress_scale)``."""
+        return self.law.bound_derivative(sigma_n * self.stress_scale)
 
 
 def _coefficient(name: str, value: float | FloatArray, *, may_be_infinite: bool = False) -> float | FloatArray:

@@ -165,13 +165,7 @@ def _join(
     outline: Outline, pieces: list[_Piece], parameters: list[FloatArray], part_names: tuple[str, ...]
 ) -> BoundaryMesh:
     """Make the mesh whose elements lie between consecutive parameters of each piece."""
-    corners = np.concatenate(outline.corners)
-    nodes = []
-    for piece, s in zip(pieces, parameters, strict=True):
-        points = outline.sides[piece.side].curve.point(s[:-1])
-        if piece.span[0] == 0.0:
-            points[0] = corners[piece.side]  # where the side before ends too, to the last digit
-        nodes.append(points)
+    nodes = [outline.sides[piece.side].curve.point(s[:-1]) for piece, s in zip(pieces, parameters, strict=True)]
     counts = [len(points) for points in nodes]
     side = np.repeat([piece.side for piece in pieces], counts)
     part = np.repeat([piece.part or "" for piece in pieces], counts)

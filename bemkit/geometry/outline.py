@@ -102,7 +102,8 @@ class Outline:
         for k in np.flatnonzero(norms(own_end - end) > tolerance).tolist():
             raise GeometryError(
                 f"Outline: {self._describe(k)} ends at {format_point(own_end[k])}, but side {followers[k]!r} "
-                f"starts at {format_point(end[k])}: make every side start where the one before it ends"
+                f"starts at {format_point(end[k])}, {norms(own_end - end)[k]:.3g} away: make every side start "
+                "where the one before it ends"
             )
         is_straight = np.array([side.curve.is_straight for side in self.sides])
         for k in np.flatnonzero(is_straight & (norms(end - start) <= resolution(start, end))).tolist():

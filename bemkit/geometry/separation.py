@@ -112,10 +112,7 @@ def point_distances(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the distances of the points p from the segments from a to b, all (n, 2)."""
     chord = b - a
     fraction = ((p - a) * chord).sum(axis=1) / (chord * chord).sum(axis=1)
-    # measured from the nearer end, so that a long segment does not hide a short distance
-    from_a = p - a - np.clip(fraction, 0.0, 1.0)[:, None] * chord
-    from_b = p - b + np.clip(1.0 - fraction, 0.0, 1.0)[:, None] * chord
-    return np.where(fraction < 0.5, norms(from_a), norms(from_b))
+    return norms(p - a - np.clip(fraction, 0.0, 1.0)[:, None] * chord)
 
 
 def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:

@@ -129,20 +129,26 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
             solution[basis] = np.maximum(tableau[:, -1], 0.0)
             return solution[n:], n_pivots
         entering = leaving + n if leaving < n else leaving - n
-        column = tableau[:, entering]
-        may_leave = column > _ROUND_OFF * np.abs(column).max()
-        if not may_leave.any():
-            return None, n_pivots
-        ratio = np.full(n, np.inf)
-        ratio[may_leave] = np.maximum(tableau[may_leave, -1], 0.0) / column[may_leave]
-        row = int(np.argmin(ratio))
-        # Of equal rows the covering variable leaves first: the problem is then solved. Rows are often equal there,
-        # because an open node has no friction either.
         covering = int(np.flatnonzero(basis == 2 * n)[0])
-        left_over = tableau[covering, -1] - ratio[row] * column[covering]
-        if may_leave[covering] and left_over <= _ROUND_OFF * cover_at_start:
-            row = covering
+        next_row = _leaving_row(tableau[:, entering], tableau[:, -1], covering, cover_at_start)
+        if next_row is None:
+            return None, n_pivots
+        row = next_row
     return None, limit
+
+
+def _leaving_row(column: FloatArray, right_side: FloatArray, covering: int, cover_at_start: float) -> int | None:
+    """Return the row whose variable reaches zero first when the entering one grows; None if none does (a ray)."""
+    may_leave = column > _ROUND_OFF * np.abs(column).max()
+    if not may_leave.any():
+        return None
+    ratio = np.full(len(column), np.inf)
+    ratio[may_leave] = np.maximum(right_side[may_leave], 0.0) / column[may_leave]
+    row = int(np.argmin(ratio))
+    # Of equal rows the covering variable leaves first: the problem is then solved. Rows are often equal there,
+    # because an open node has no friction either.
+    left_over = right_side[covering] - ratio[row] * column[covering]
+    return covering if may_leave[covering] and left_over <= _ROUND_OFF * cover_at_start else row
 
 
 def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:

@@ -25,7 +25,8 @@ def test_pushed_away():
     assert escape.work == pytest.approx(0.5)
 
 
-# The block is pressed by 0.5 at x = 3/4 and pushed by push/2 at y = 3/4. It tips about its right corner from push = 1/3 on.
+# The block is pressed by 0.5 at x = 3/4 and pushed by push/2 at y = 3/4: it tips about its right corner from
+# push = 1/3 on.
 @pytest.mark.parametrize(
     ("law", "push", "word"),
     [

@@ -17,7 +17,7 @@ LAWS = [
     CohesiveCoulomb(0.4, 0.1, 3.0),
     CohesiveCoulomb(PER_NODE, 0.2 * PER_NODE, 1.0 + PER_NODE),
     CohesiveCoulomb(0.0),
-    RescaledLaw(CohesiveCoulomb(0.4, 0.1, 3.0), stress_scale=7.0, fraction=0.5),
+    RescaledLaw(CohesiveCoulomb(0.4, 0.1, 3.0), stress_scale=7.0),
 ]
 
 
@@ -50,7 +50,7 @@ def test_values():
         (Tresca(0.1), False),
         (CohesiveCoulomb(0.0, 0.1), False),
         (CohesiveCoulomb(0.5, 0.0, 0.0), True),
-        (RescaledLaw(Coulomb(1.0), fraction=0.0), True),
+        (RescaledLaw(Coulomb(0.0), 7.0), True),
     ],
     ids=repr,
 )
@@ -203,5 +203,5 @@ def test_a_problem_refuses_broken_laws_by_name(law, complaint):
 def test_a_negative_bound_is_refused_by_name():
     problem = random_problem(0)
     broken = ContactProblem(problem.body, problem.gap, Negative())  # zero at zero pressure: seen only later
-    with pytest.raises(LawError, match="friction law Negative.bound is -1 at contact node 0"):
+    with pytest.raises(LawError, match=r"friction law Negative.bound is -1 at contact node 0"):
         broken.friction_bound(np.full(problem.n_contact, -1.0))

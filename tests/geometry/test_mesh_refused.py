@@ -159,6 +159,31 @@ def test_refused(make, message: str) -> None:
         make()
 
 
+def sagging(sag: float) -> BoundaryMesh:
+    """Return a strip 0.05 high whose upper side is one arc that sags."""
+    radius = (0.25 + sag**2) / (2 * sag)
+    half = np.arcsin(0.5 / radius)
+    arc = Arc((0.5, 0.05 + radius - sag), radius, -np.pi / 2 + half, -np.pi / 2 - half)
+    nodes = [[0, 0], [1, 0], [1, 0.05], [0, 0.05]]
+    return BoundaryMesh(nodes, closed(4), {}, (arc,), [-1, -1, 0, -1], [[0, 1]] * 4)
+
+
+def test_bent_element_is_seen_where_it_is_and_not_where_its_chord_is() -> None:
+    assert sagging(0.0499).area == pytest.approx(0.05 - 2 / 3 * 0.0499, rel=5e-3)  # a flat arc is nearly a parabola
+    for sag in (0.05, 0.0501):
+        with pytest.raises(GeometryError, match=r"element 0, .* and element 2, .* cross, touch"):
+            sagging(sag)
+
+
+def test_bent_element_that_leaves_a_joint_to_cross_its_neighbour_is_seen() -> None:
+    # it starts below the straight element, whose end it joins, and ends above
+    arc = Arc((0.5 * np.sin(0.2), 0.5 * np.cos(0.2)), 0.5, -np.pi / 2 - 0.2, -np.pi / 2 + 0.4)
+    end = arc.point(np.array([1.0]))[0].tolist()
+    nodes = [[1, 0], [0, 0], end, [1, 1]]
+    with pytest.raises(GeometryError, match=r"element 0, .* and element 1, .* cross, touch or fold back"):
+        BoundaryMesh(nodes, closed(4), {}, (arc,), [-1, 0, -1, -1], [[0, 1]] * 4)
+
+
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("angle", [0.0, 1.0])
 @pytest.mark.parametrize("place", [0.0, 1e6])

@@ -7,6 +7,9 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
 
 
+DOWN = -np.pi / 2 + np.pi / 32  # the middle of one of the 16 pieces of a half circle
+
+
 def polygon(*points, name: str = "s") -> tuple[Side, ...]:
     return tuple(
         Side(f"{name}{k + 1}", Segment(start, end))
@@ -58,6 +61,15 @@ LEGAL = {
             circle(0.05, 0.0, -0.94, "a", -1.0),  # beyond every chord of a coarse division of the bow
         )
     ),
+    "hole that starts close to a bent side": lambda: Outline(
+        (
+            (Side("bow", Arc((0, 0), 1.0, -np.pi, 0.0)), Side("chord", Segment((1.0, 0.0), (-1.0, 0.0)))),
+            (Side("a", Arc((0.94 * np.cos(DOWN), 0.94 * np.sin(DOWN)), 0.0599, DOWN, DOWN - 2 * np.pi)),),
+        )
+    ),
+    "angle typed with 15 digits": lambda: Outline(
+        ((Side("bow", Arc((0, 0), 1.0, 0.0, 3.14159265358978)), Side("chord", Segment((-1.0, 0.0), (1.0, 0.0)))),)
+    ),
     "lens of two arcs": lambda: Outline((_lens(),)),
     "waves over waves": lambda: Outline((_waves(0.1, 0.1, 0.01),)),
 }
@@ -75,7 +87,7 @@ def _waves(low: float, high: float, distance: float) -> tuple[Side, ...]:
     """Return a strip between two waves: they cross if `distance` is less than half the difference in height."""
     top, bottom = wavy(high, 12), wavy(low, 12)
     y_top, y_bottom = high + distance, low
-    shifted = ParametricCurve(lambda s: top.point(s) + [0.0, distance], top.derivative)
+    shifted = ParametricCurve(lambda s: top.point(s) + np.array([0.0, distance]), top.derivative)
     back = ParametricCurve(lambda s: bottom.point(1 - s), lambda s: -bottom.derivative(1 - s))
     return (
         Side("bottom", back),
@@ -112,7 +124,11 @@ REFUSED = {
     "same name": (lambda: Outline((square(2.0), hole(1.0, name="s"))), r"2 sides are named 's1': give each its own"),
     "open": (
         lambda: Outline(((*square(1.0)[:3], Side("s4", Segment((-1.0, 1.0), (-1.0, -0.9)))),)),
-        r"side 's4' ends at \(-1, -0.9\), but side 's1' starts at \(-1, -1\): make every side start where",
+        r"side 's4' ends at \(-1, -0.9\), but side 's1' starts at \(-1, -1\), 0.1 away: make every side start where",
+    ),
+    "open by little": (
+        lambda: Outline(((*square(1.0)[:3], Side("s4", Segment((-1.0, 1.0), (-1.0, -1.0 + 1e-11)))),)),
+        r"side 's4' ends at \(-1, -1\), but side 's1' starts at \(-1, -1\), 1e-11 away: make every side start where",
     ),
     "one straight side": (
         lambda: Outline(((Side("only", Segment((0, 0), (1, 0))),),)),

@@ -113,6 +113,6 @@ def test_incremental_law_is_the_static_law_moved():
     moved = ContactProblem(problem.body, problem.gap, problem.law, np.full(problem.n_contact, shift))
     for driver in DRIVERS.values():
         here, there = solve(problem, driver), solve(moved, driver)
-        expected = ContactState(here.state.displacement + [0.0, shift], here.state.traction)
+        expected = ContactState(here.state.displacement + np.array([0.0, shift]), here.state.traction)
         assert_same(problem, there.state, expected)
         assert np.array_equal(here.node_status, there.node_status)

@@ -77,6 +77,7 @@ def test_no_load_no_gap(driver, law):
     assert solution.steps <= 2
     assert not solution.state.displacement.any()
     assert not solution.state.traction.any()
+    assert not solution.node_status.any()  # touching without traction counts as separated
 
 
 @pytest.mark.parametrize("rho", [0.3, 1.0, 20.0])

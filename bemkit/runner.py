@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.order import along_boundary
 from bemkit.geometry.space import dof_points
 from bemkit.model import Model, build_model
 from bemkit.plan import make_plan
@@ -43,6 +44,8 @@ def run(
 
     Raises
     ------
+    UnsolvableSceneError
+        If no contact tractions can balance the load, or the body can move freely.
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
@@ -53,6 +56,8 @@ def run(
     model = build_model(scene, mesh)
     clock.append(time.perf_counter())
     result = solve(model.problem, scene.solver, throw=False, callback=callback)
+    if not result.history:
+        raise UnsolvableSceneError(result.message)
     clock.append(time.perf_counter())
     fields, energy = _fields(model, result.state)
     table = _contact_table(model, result)
@@ -75,6 +80,7 @@ def run(
         transitions=find_transitions(table),
         timings=timings,
         plan=plan,
+        message=result.message,
     )
 
 
@@ -131,7 +137,7 @@ def _places(model: Model) -> tuple[tuple[str, ...], FloatArray]:
     names: list[str] = [""] * n_scalar
     arc_length = np.full(n_scalar, np.nan)
     for part in model.scene.contact_parts:
-        elements = model.mesh.part(part.name)
+        elements = along_boundary(model.mesh, model.mesh.part(part.name))
         lengths = model.mesh.lengths[elements]
         begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         dofs = space.element_dofs[elements]
