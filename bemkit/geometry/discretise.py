@@ -128,12 +128,11 @@ class _Ruler:
         return float(np.diff(np.interp([start, end], self._ends, self._arc_length))[0])
 
     def parameters(self, span: tuple[float, float], positions: FloatArray) -> FloatArray:
-        """Return the parameters at fractions of the arc length of a span; its ends are kept to the last digit."""
+        """Return the parameters at fractions of the arc length of a span."""
         if not self._is_even:
             whole = np.interp(span, self._ends, self._arc_length)
             lengths = whole[0] * (1.0 - positions) + whole[1] * positions
             s: FloatArray = np.interp(lengths, self._arc_length, self._ends)
-            s[0], s[-1] = span
             return s
         return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
 

@@ -16,7 +16,7 @@ def star_polygons(draw: st.DrawFn) -> FloatArray:
     Every vertex is seen from the origin under less than half a turn from the one before, so the polygon is simple.
     """
     n = draw(st.integers(3, 12))
-    steps = np.array(draw(st.lists(st.floats(0.5, 1.0), min_size=n, max_size=n)))
+    steps = np.array(draw(st.lists(st.floats(0.6, 1.0), min_size=n, max_size=n)))
     radii = np.array(draw(st.lists(st.floats(0.1, 1.0), min_size=n, max_size=n)))
     directions = draw(angles) + 2.0 * np.pi * np.cumsum(steps) / steps.sum()
     return radii[:, None] * np.column_stack([np.cos(directions), np.sin(directions)])

@@ -6,7 +6,6 @@ from bemkit.geometry.discretise import discretise
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
 
-
 DOWN = -np.pi / 2 + np.pi / 32  # the middle of one of the 16 pieces of a half circle
 
 
@@ -205,7 +204,7 @@ REFUSED = {
     "all reversed": (lambda: Outline((hole(2.0), square(1.0))), r"outer loop of sides h1, .* runs clockwise"),
     "hole anticlockwise": (
         lambda: Outline((square(2.0), square(1.0, name="h"))),
-        r"loop of sides h1, h2, h3, h4 runs anticlockwise inside or beside the outer loop .*: list the vertices of a hole",
+        r"loop of sides h1, h2, h3, h4 runs anticlockwise inside or beside the outer .*: list the vertices of a hole",
     ),
     "two bodies": (
         lambda: Outline((square(1.0), square(1.0, 5.0, name="t"))),

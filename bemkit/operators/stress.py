@@ -1,0 +1,56 @@
+"""Measures of a plane stress state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.operators.material import Plane
+
+
+def von_mises(stress: FloatArray, poisson_ratio: float, plane: Plane) -> FloatArray:
+    """Return the equivalent stress of von Mises.
+
+    Parameters
+    ----------
+    stress : (..., 2, 2) array [Pa]
+        Symmetric stresses in the plane.
+    poisson_ratio : float [-]
+        Of the material itself (not the effective one).
+    plane : Plane
+        In plane strain the stress across the plane is poisson_ratio (sigma_xx + sigma_yy), in plane stress zero.
+
+    Returns
+    -------
+    (...) array [Pa]
+        sqrt(3 J_2), not negative.
+    """
+    trace = stress[..., 0, 0] + stress[..., 1, 1]
+    across = poisson_ratio * trace if plane is Plane.STRAIN else np.zeros_like(trace)
+    radius = _shear_radius(stress)
+    # 3 J_2 = 3 radius^2 + (trace / 2 - sigma_zz)^2: a sum of squares, hence without cancellation
+    result: FloatArray = np.hypot(np.sqrt(3.0) * radius, 0.5 * trace - across)
+    return result
+
+
+def principal_stresses(stress: FloatArray) -> FloatArray:
+    """Return the two principal stresses in the plane, the larger (more tensile) one first.
+
+    Parameters
+    ----------
+    stress : (..., 2, 2) array [Pa]
+        Symmetric stresses.
+
+    Returns
+    -------
+    (..., 2) array [Pa]
+    """
+    middle = 0.5 * (stress[..., 0, 0] + stress[..., 1, 1])
+    radius = _shear_radius(stress)
+    return np.stack([middle + radius, middle - radius], axis=-1)
+
+
+def _shear_radius(stress: FloatArray) -> FloatArray:
+    """Return the radius of Mohr's circle, the largest shear stress in the plane."""
+    radius: FloatArray = np.hypot(0.5 * (stress[..., 0, 0] - stress[..., 1, 1]), stress[..., 0, 1])
+    return radius
