@@ -14,6 +14,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.space import dof_points
 from bemkit.model import Model, build_model
+from bemkit.operators.threads import blas_threads_for
 from bemkit.plan import make_plan
 from bemkit.scene import Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
@@ -53,9 +54,10 @@ def run(
     mesh = scene.build_mesh() if mesh is None else mesh
     plan = make_plan(scene, mesh)
     clock.append(time.perf_counter())
-    model = build_model(scene, mesh)
-    clock.append(time.perf_counter())
-    result = solve(model.problem, scene.solver, throw=False, callback=callback)
+    with blas_threads_for(2 * mesh.n_elements):
+        model = build_model(scene, mesh)
+        clock.append(time.perf_counter())
+        result = solve(model.problem, scene.solver, throw=False, callback=callback)
     if not result.history:
         raise UnsolvableSceneError(result.message)
     clock.append(time.perf_counter())

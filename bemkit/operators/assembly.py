@@ -116,8 +116,13 @@ def assemble_together(operators: Sequence[Assemblable]) -> list[FloatArray]:
                 with lock:  # two chunks share the rows of the node between them
                     target.add(rows, a, gathered)
 
-    with ThreadPoolExecutor(_threads(mesh.n_elements**2)) as pool:
-        list(pool.map(fill, sweep.row_slices()))
+    n_threads = _threads(mesh.n_elements**2)
+    if n_threads == 1:
+        for rows in sweep.row_slices():
+            fill(rows)
+    else:
+        with ThreadPoolExecutor(n_threads) as pool:
+            list(pool.map(fill, sweep.row_slices()))
     return [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
 
 

@@ -1,15 +1,16 @@
 r"""Integrals over single elements, seen from points off the boundary, that fields inside a body are made of.
 
-With rho = x - y, tau the unit tangent at y and t the local coordinate of the element, for the powers k = 0, 1, ...:
+With rho = x - y, rho* its conjugate, tau the unit tangent at y and t the local coordinate of the element, for the
+powers k = 0, 1, ...:
 
-    log          = int t^k log|rho| ds                             quotient = int t^k rho / conj(rho) ds
-    cauchy       = int t^k tau / rho ds                            turn     = int t^k (rho conj(tau) / conj(rho)^2 - tau / conj(rho)) ds
-    reciprocal   = int t^k / rho ds                                spread   = int t^k rho / conj(rho)^2 ds
-    hyper        = int t^k tau / rho^2 ds                          twist    = int t^k (tau / conj(rho)^2 - 2 rho conj(tau) / conj(rho)^3) ds
+    log          int t^k log|rho| ds        quotient     int t^k rho / rho* ds
+    cauchy       int t^k tau / rho ds       turn         int t^k (rho tau* / rho*^2 - tau / rho*) ds
+    reciprocal   int t^k / rho ds           spread       int t^k rho / rho*^2 ds
+    hyper        int t^k tau / rho^2 ds     twist        int t^k (tau / rho*^2 - 2 rho tau* / rho*^3) ds
 
 Straight elements have them in closed form: with the local coordinate zeta = xi + i eta of x, they are combinations of
 
-    T_k = int t^k / (zeta - t) dt,    G_k = int t^k / (zeta - t)^2 dt = -dT_k / dzeta,    H_k = int t^k / (zeta - t)^3 dt = T_k'' / 2.
+    T_k = int t^k / (zeta - t) dt,  G_k = int t^k / (zeta - t)^2 dt,  H_k = int t^k / (zeta - t)^3 dt
 
 Curved elements are bisected until each piece is well away from the point, and every piece takes one Gauss rule.
 """
@@ -123,7 +124,12 @@ def straight_displacement_moments(
     powers = range(highest + 1)
     constants = [kernels.interval_moment(k) for k in powers]
     return DisplacementMoments(
-        log=np.stack([half * (m * np.log(half / length) + kernels.log_moment(k, t, log_product)) for k, m in enumerate(constants)]),
+        log=np.stack(
+            [
+                half * (m * np.log(half / length) + kernels.log_moment(k, t, log_product))
+                for k, m in enumerate(constants)
+            ]
+        ),
         measure=np.stack([half * m for m in constants]),
         quotient=np.stack([half * square * kernels.quotient_moment(k, t, eta) for k in powers]),
         cauchy=np.stack(t[: highest + 1]),
@@ -140,7 +146,7 @@ def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArra
     chosen = slice(0, highest + 1)
     return GradientMoments(
         reciprocal=tangent.conj() * t[chosen],
-        spread=cube * (t[chosen] .conj() + 2j * eta * g[chosen].conj()),
+        spread=cube * (t[chosen].conj() + 2j * eta * g[chosen].conj()),
         hyper=(tangent.conj() / half) * g[chosen],
         twist=(-cube / half) * (g[chosen].conj() + 4j * eta * h[chosen].conj()),
     )

@@ -111,10 +111,14 @@ class GalerkinMap:
         identity = mass(u, t).matrix()
         factor = Cholesky(v.matrix(), "the single layer operator")
         motions = rigid_motions(dof_points(u), self.mesh.centre, self.mesh.diameter).reshape(u.n_dofs, 3)
-        lower = factor.solve_lower(0.5 * identity + k.matrix())
+        # quadrature on curved elements would leave rigid motions a little stiffness, and forces out of equilibrium
+        at_rest, _ = np.linalg.qr(motions)
+        strained = _without(0.5 * identity + k.matrix(), at_rest)
+        hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
+        lower = factor.solve_lower(strained)
         resultant, _ = np.linalg.qr(factor.solve_lower(multiply(identity, motions)))
         lower -= multiply(resultant, multiply(resultant.T, lower))
-        return factor, lower, resultant, w.matrix()
+        return factor, lower, resultant, hyper
 
     @cached_property
     def _matrix(self) -> FloatArray:
@@ -298,14 +302,20 @@ def _integrate(space: BoundarySpace, elements: IntArray, field: Field) -> FloatA
     return result
 
 
+def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return the matrix made to vanish on some orthonormal motions (n_dofs, n_motions)."""
+    return matrix - multiply(multiply(matrix, motions), np.ascontiguousarray(motions.T))
+
+
 def _rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     """Express the columns (2 * node + component) in the frames of the nodes."""
     turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
     if not turned.size:
         return matrix
     result = matrix.copy()
-    blocks = result.reshape(matrix.shape[0], -1, 2)
-    blocks[:, turned] = np.einsum("mnc,nkc->mnk", matrix.reshape(blocks.shape)[:, turned], frame[turned])
+    x, y = matrix[:, 2 * turned], matrix[:, 2 * turned + 1]
+    for k in range(2):
+        result[:, 2 * turned + k] = frame[turned, k, 0] * x + frame[turned, k, 1] * y
     return result
 
 
@@ -315,6 +325,7 @@ def _rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     if not turned.size:
         return matrix
     result = matrix.copy()
-    blocks = result.reshape(-1, 2, matrix.shape[1])
-    blocks[turned] = np.einsum("ncm,nkc->nkm", matrix.reshape(blocks.shape)[turned], frame[turned])
+    x, y = matrix[2 * turned], matrix[2 * turned + 1]
+    for k in range(2):
+        result[2 * turned + k] = frame[turned, k, 0, None] * x + frame[turned, k, 1, None] * y
     return result

@@ -1,0 +1,39 @@
+"""Fields inside the body of a solved scene."""
+
+from __future__ import annotations
+
+from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace
+from bemkit.operators.representation import InteriorFields
+from bemkit.scene import ConstantCollocation
+from bemkit.solution import Solution
+
+
+def interior_fields(solution: Solution) -> InteriorFields:
+    """Return the displacement, strain and stress inside the body of a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+        As `run` returns it or `read_result` reads it. Look at its status first: fields of a run that did not converge
+        are fields of whatever it reached.
+
+    Returns
+    -------
+    InteriorFields
+        In physical units; evaluate it at points with ``displacement(points)`` and ``stress(points)``, and see
+        `von_mises` and `principal_stresses`.
+
+    Notes
+    -----
+    A solution holds one traction for each element, the mean over it, and displacements at nodes or element centres.
+    Inside, their error decays quickly with the distance from the boundary. Within about one element length of it,
+    stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
+    """
+    mesh = solution.mesh
+    space: BoundarySpace = LinearSpace(mesh)
+    if isinstance(solution.scene.discretisation, ConstantCollocation):
+        space = ConstantSpace(mesh)
+    boundary = solution.boundary
+    return InteriorFields(
+        mesh, solution.scene.material, space, boundary.displacement, ConstantSpace(mesh), boundary.traction
+    )
