@@ -5,6 +5,7 @@ Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on stand
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Iterator
@@ -43,14 +44,20 @@ def main(arguments: list[str] | None = None) -> None:
         _complain(" ".join(error.format_message().split()) + hint)
         code = BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        _complain("interrupted, nothing was written")
+        _complain("interrupted; no file is half written")
         code = INTERRUPTED
     except MemoryError:
         _complain("not enough memory: use fewer elements (--elements N)")
         code = BAD_INPUT
     except BrokenPipeError:  # the reader, such as head, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_stdout()
         code = PIPE_CLOSED
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EIO):
+            raise
+        _drop_stdout()  # files have their own checks, so this is the stream that the shell redirected
+        _complain(f"standard output: cannot be written ({error.strerror}): send it to another place")
+        code = BAD_INPUT
     sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -201,6 +208,11 @@ def _bad_input(prefix: str = "") -> Iterator[None]:
             raise
         message = f"{prefix}: {error}" if prefix else str(error)
         raise click.ClickException(message) from error
+
+
+def _drop_stdout() -> None:
+    """Send what is still in the buffer of standard output nowhere, or the interpreter would fail on it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _complain(message: str) -> None:

@@ -76,7 +76,8 @@ def opened(path: Path) -> Iterator[Reader]:
     try:
         size = path.stat().st_size if path.is_file() else None
         if size is None:
-            raise ResultFileError(f"{name}: no such file: give a file written by 'bemkit run -o'")
+            problem = "not a file" if path.exists() else "no such file"
+            raise ResultFileError(f"{name}: {problem}: give a file written by 'bemkit run -o'")
         file = h5py.File(str(path), "r")
     except (OSError, ValueError) as error:
         if isinstance(error, ResultFileError):

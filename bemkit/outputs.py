@@ -51,17 +51,20 @@ class Outputs:
             If a file or folder cannot be written, something of another kind stands in the way, two outputs go to one
             place, or a package for figures is missing.
         """
-        places = [str(place) for place in (self.result, self.json, self.csv) if place is not None]
-        if len(set(places)) < len(places):
-            raise OutputFileError(f"two outputs go to the same place ({', '.join(places)}): give each its own")
+        if self.result == Path(STDOUT):
+            raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
+        targets: list[str | Path] = [STDOUT for text in (self.json, self.csv) if text == STDOUT]
         if self.result is not None:
             from bemkit.io import check_result_target
 
-            check_result_target(self.result)
+            targets.append(check_result_target(self.result))
         if self.json not in (None, STDOUT):
-            check_target(Path(str(self.json)), "JSON file", _is_json)
+            targets.append(check_target(Path(str(self.json)), "JSON file", _is_json))
         if self.csv not in (None, STDOUT):
-            check_target(Path(str(self.csv)), f"CSV file of the {self.table} table", self._is_csv)
+            targets.append(check_target(Path(str(self.csv)), f"CSV file of the {self.table} table", self._is_csv))
+        if len(set(targets)) < len(targets):
+            shown = ", ".join(str(place) for place in (self.result, self.json, self.csv) if place is not None)
+            raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
         if self.plots is not None:
             self._check_plots(self.plots)
 

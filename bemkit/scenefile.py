@@ -50,7 +50,7 @@ def load_scene(source: str | Path) -> Scene:
         If there is no such file or scene, or its content is not a valid scene.
     """
     shipped = shipped_files()
-    name = _one_line(str(source))[:200]
+    name = _one_line(str(source))[:200] or "''"
     file: Traversable = shipped[str(source)] if str(source) in shipped else Path(source)
     try:
         with file.open("rb") as stream:

@@ -235,7 +235,7 @@ def _array(value: object) -> FloatArray:
 
 
 def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
-    items = _exactly(value, list, "a list")
+    items = _exactly(value, list, "a list in square brackets")
     inner = get_args(wanted)
     if len(inner) == 2 and inner[1] is Ellipsis:
         inner = (inner[0],) * len(items)

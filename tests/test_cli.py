@@ -144,6 +144,10 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--plot", "thesis.txt"], "exists and is not a folder"),
         (["run", "paper-1", "--json", "-", "--csv", "-"], "two outputs go to the same place"),
         (["run", "paper-1", "-o", "r", "--json", "r"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r", "--json", "./r"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "-"], "- is standard output.*give a file name"),
+        (["run", ""], "'': cannot be read .*give the path of a TOML file"),
+        (["show", "."], "not a file: give a file"),
         (["show", "none.h5"], "no such file"),
         (["show", "thesis.txt"], "not an HDF5 file"),
         (["show", "thesis.txt", "--json", "-", "--scene"], "give one of them"),
@@ -218,7 +222,7 @@ def test_a_real_ctrl_c_ends_with_130() -> None:
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert errors.strip() == "bemkit: error: interrupted, nothing was written"
+    assert errors.strip() == "bemkit: error: interrupted; no file is half written"
     assert os.listdir() == []
 
 
@@ -227,6 +231,18 @@ def test_a_closed_pipe_is_no_error() -> None:
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
     assert done.stdout.startswith("x,y,s")
     assert done.stderr == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no device that is always full")
+@pytest.mark.parametrize("arguments", ["run paper-1 --elements 40 --json -", "run paper-1 --elements 40", "scenes"])
+def test_a_full_disk_behind_standard_output_is_one_line(arguments: str) -> None:
+    code = "from bemkit.cli import main; main()"
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        command = [sys.executable, "-c", code, *arguments.split()]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("bemkit: error: standard output: cannot be written (")
+    assert done.stderr.count("\n") == 1
 
 
 def test_nothing_is_imported_without_need() -> None:

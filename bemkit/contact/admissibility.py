@@ -41,7 +41,7 @@ class UnsolvableLoad:
             how += " the body away from the obstacle"
         else:
             how = "slides the body along the obstacle against all the friction there is"
-        return f"the load {how} (work {self.work:.3g} on that rigid motion); change the load or hold the body"
+        return f"the load {how} (work {self.work:.3g} on that rigid motion)"
 
 
 def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:

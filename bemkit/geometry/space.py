@@ -241,10 +241,15 @@ class QuadraticSpace:
 
 
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
-    """Return the (n_nodes,) mask of nodes where the tangent turns by more than `angle` [rad]."""
+    """Return the (n_nodes,) mask of nodes where the tangent turns by more than `angle` [rad].
+
+    The direction of a short element is known only as well as its coordinates are; that round-off is added to `angle`.
+    """
     incoming, outgoing = mesh.node_elements[:, 0], mesh.node_elements[:, 1]
     before = mesh.normals_at(incoming, np.array([1.0]))[:, 0]
     after = mesh.normals_at(outgoing, np.array([-1.0]))[:, 0]
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    corners: BoolArray = np.abs(np.arctan2(cross, np.sum(before * after, axis=1))) > angle
+    shortest = np.minimum(mesh.lengths[incoming], mesh.lengths[outgoing])
+    round_off = 8.0 * np.finfo(float).eps * np.abs(mesh.nodes).max(axis=1) / shortest
+    corners: BoolArray = np.abs(np.arctan2(cross, np.sum(before * after, axis=1))) > angle + round_off
     return corners

@@ -8,9 +8,7 @@ first, in a buffer of a few rows of elements, so that the large matrix is writte
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Lock
 from typing import Protocol, TypeAlias
@@ -23,13 +21,10 @@ from bemkit.geometry.space import BoundarySpace
 from bemkit.operators import kernels
 from bemkit.operators.integrals import PairSweep
 from bemkit.operators.pairs import Degrees, PairIntegrals
+from bemkit.operators.threads import for_each_chunk
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
 """The xx, xy, yx, yy entries, each (n_rows, n_trial); None is zero."""
-
-MAX_THREADS = 8
-PAIRS_FOR_THREADS = 500_000
-"""Below this many element pairs the threads of BLAS are better left alone."""
 
 
 class Block:
@@ -116,23 +111,8 @@ def assemble_together(operators: Sequence[Assemblable]) -> list[FloatArray]:
                 with lock:  # two chunks share the rows of the node between them
                     target.add(rows, a, gathered)
 
-    n_threads = _threads(mesh.n_elements**2)
-    if n_threads == 1:
-        for rows in sweep.row_slices():
-            fill(rows)
-    else:
-        with ThreadPoolExecutor(n_threads) as pool:
-            list(pool.map(fill, sweep.row_slices()))
+    for_each_chunk(fill, sweep.row_slices(), n_pairs=mesh.n_elements**2)
     return [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
-
-
-def _threads(n_pairs: int) -> int:
-    """Return how many threads are worth their while."""
-    if n_pairs < PAIRS_FOR_THREADS:
-        return 1
-    affinity = getattr(os, "sched_getaffinity", None)
-    available = len(affinity(0)) if affinity else os.cpu_count() or 1
-    return min(available, MAX_THREADS)
 
 
 class _Target:

@@ -51,6 +51,18 @@ class Cholesky:
                 "the body free"
             )
 
+    @classmethod
+    def from_lower(cls, lower: FloatArray) -> Cholesky:
+        """Take over a factor L computed earlier."""
+        factor = cls.__new__(cls)
+        factor._factor = np.asfortranarray(lower)
+        return factor
+
+    @property
+    def lower(self) -> FloatArray:
+        """The factor L, zero above its diagonal."""
+        return np.tril(self._factor)
+
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""
         from scipy.linalg.lapack import dpotrs

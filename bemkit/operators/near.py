@@ -6,9 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
 from bemkit.operators import kernels
+from bemkit.operators.inner import N_SMOOTH, bending, far_inner, inner_integrals, local_coordinates
 from bemkit.operators.pairs import Degrees, PairIntegrals
 from bemkit.operators.panels import Panels
 
@@ -24,25 +25,30 @@ MAX_SPLITS = 60
 def integrate_separated(
     panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray, n_points: int
 ) -> PairIntegrals:
-    """Integrate pairs with an outer Gauss rule on the whole test element.
+    """Integrate pairs with a Gauss rule on the whole test element, and on the whole trial element if that is curved.
 
     Parameters
     ----------
     panels : Panels
     degrees : Degrees
     test, trial : (n,) arrays
-        Element numbers of the pairs.
+        Element numbers of the pairs; the trial elements are either all straight or all curved.
     n_points : int
-        Outer points.
+        Points on each element.
     """
     result = PairIntegrals.zeros(degrees, (test.size,))
-    points, weights = gauss_legendre(n_points)
-    for xi, weight in zip(points, weights, strict=True):
-        node = panels.start if xi < 0 else panels.end
-        offset = panels.tangent[test] * panels.half[test] * (xi + 1.0 if xi < 0 else xi - 1.0)
-        _add_points(
-            result, panels, trial, node[test], offset, degrees, np.full(test.size, weight), np.full(test.size, xi)
-        )
+    is_straight = bool(panels.is_straight[trial].all())
+    polynomials = panels.polynomials(trial)
+    for xi, weight in zip(*gauss_legendre(n_points), strict=True):
+        at_start = bool(xi < 0)
+        node = (panels.start if at_start else panels.end)[test]
+        offset = panels.offset(test, 0.5 * (1.0 - abs(xi)), at_start)
+        from_start, from_end = (node - panels.start[trial]) + offset, (node - panels.end[trial]) + offset
+        if is_straight:
+            inner = inner_integrals(panels, degrees, trial, from_start, from_end)
+        else:
+            inner = far_inner(degrees, polynomials, local_coordinates(panels, trial, from_start), n_points)
+        result.add(float(weight), float(xi), inner)
     result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
     return result
 
@@ -81,15 +87,16 @@ def _split(panels: Panels, test: IntArray, trial: IntArray, at_start: bool) -> _
     """Bisect one half of each test element until every piece may be integrated by a single rule."""
     node = (panels.start if at_start else panels.end)[test]
     number = (panels.start_node if at_start else panels.end_node)[test]
-    step = panels.tangent[test] * (2.0 * panels.half[test] * (1.0 if at_start else -1.0))
+    half = panels.half[test]
+    separation = panels.reach(SEPARATION)[test]
     to_a, to_b = node - panels.start[trial], node - panels.end[trial]
     meets_a, meets_b = number == panels.start_node[trial], number == panels.end_node[trial]
     pair = np.arange(test.size)
     low, high = np.zeros(test.size), np.full(test.size, 0.5)
     done: list[_Pieces] = []
     for split in range(MAX_SPLITS + 1):
-        centre = step[pair] * (0.5 * (low + high))
-        reach = SEPARATION * panels.half[test[pair]] * (high - low)
+        centre = panels.offset(test[pair], 0.5 * (low + high), at_start)
+        reach = (separation * half)[pair] * (high - low)
         at_node = low == 0.0
         a_is_clear, b_is_clear = np.abs(to_a[pair] + centre) >= reach, np.abs(to_b[pair] + centre) >= reach
         touches = at_node & (meets_a | meets_b)[pair]
@@ -128,43 +135,31 @@ def _integrate_pieces(
         reference, reference_weights = gauss_legendre(n_points)
         points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
     node = (panels.start if at_start else panels.end)[test]
-    step = panels.tangent[test] * (2.0 * panels.half[test] * (1.0 if at_start else -1.0))
     length = pieces.high - pieces.low
     for point, weight in zip(points, weights, strict=True):
         fraction = pieces.low + point * length
         xi = (2.0 * fraction - 1.0) * (1.0 if at_start else -1.0)
-        _add_points(sums, panels, trial, node, step * fraction, degrees, 2.0 * weight * length, xi)
+        offset = panels.offset(test, fraction, at_start)
+        from_start, from_end = (node - panels.start[trial]) + offset, (node - panels.end[trial]) + offset
+        sums.add(2.0 * weight * length, xi, inner_integrals(panels, degrees, trial, from_start, from_end))
     for target, values in ((result.log, sums.log), (result.quotient, sums.quotient), (result.double, sums.double)):
         for index in np.ndindex(*values.shape[:2]):
             np.add.at(target[index], pieces.pair, values[index])
 
 
-def _add_points(
-    result: PairIntegrals,
-    panels: Panels,
-    trial: IntArray,
-    node: ComplexArray,
-    offset: ComplexArray,
-    degrees: Degrees,
-    weight: FloatArray,
-    xi: FloatArray,
-) -> None:
-    """Add one outer point for each pair, at `node + offset`."""
-    to_local = panels.to_local[trial]
-    plus = ((node - panels.start[trial]) + offset) * to_local
-    minus = ((node - panels.end[trial]) + offset) * to_local
-    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
-    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-    result.add(weight, xi, moments, log_minus + log_plus, eta)
-
-
 def integrate_same(panels: Panels, degrees: Degrees, test: IntArray) -> PairIntegrals:
-    """Integrate elements against themselves: the double layer vanishes, the logarithm scales from the unit element."""
+    """Integrate elements against themselves: the logarithm scales from the unit element, bending adds smooth parts."""
     result = PairIntegrals.zeros(degrees, (test.size,))
-    for a in range(result.log.shape[0]):
-        for b in range(result.log.shape[1]):
-            result.log[a, b] = _unit_log(a, b)
+    if panels.bent is None or bool(panels.is_straight[test].all()):
+        for a, b in np.ndindex(*result.log.shape[:2]):
             result.quotient[a, b] = kernels.interval_moment(a) * kernels.interval_moment(b)
+    else:
+        coefficients = panels.bent.about_centre[:, test]
+        for xi, weight in zip(*gauss_legendre(N_SMOOTH), strict=True):
+            inner = bending(degrees, coefficients, np.full(test.size, xi + 0j))
+            result.add(np.full(test.size, weight), float(xi), inner)
+    for a, b in np.ndindex(*result.log.shape[:2]):
+        result.log[a, b] += _unit_log(a, b)
     result.scale(panels.half[test], panels.half[test], panels.tangent[test])
     return result
 

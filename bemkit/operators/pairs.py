@@ -22,6 +22,11 @@ class Degrees:
         return Degrees(_cover(self.log, other.log), _cover(self.double, other.double))
 
     @property
+    def trial_powers(self) -> tuple[int, int]:
+        """How many powers of the trial coordinate the two families need."""
+        return 0 if self.log is None else self.log[1] + 1, 0 if self.double is None else self.double[1] + 1
+
+    @property
     def highest_moment(self) -> int:
         """Highest T_k that the inner integrals need."""
         log = 0 if self.log is None else self.log[1] + 1
@@ -32,6 +37,41 @@ def _cover(one: tuple[int, int] | None, two: tuple[int, int] | None) -> tuple[in
     if one is None or two is None:
         return one if two is None else two
     return max(one[0], two[0]), max(one[1], two[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Inner:
+    """Inner integrals over trial elements of half length 1 whose chord is the real axis, by power b of the coordinate.
+
+    Parameters
+    ----------
+    log, quotient, double : lists of arrays
+        Integrals of t**b log|rho|, t**b rho / conj(rho) and 2 pi t**b k, seen from one outer point for each pair.
+    """
+
+    log: list[FloatArray]
+    quotient: list[ComplexArray]
+    double: list[FloatArray]
+
+    @classmethod
+    def zeros(cls, degrees: Degrees, shape: tuple[int, ...]) -> Inner:
+        """Return integrals that are all zero."""
+        n_log, n_double = degrees.trial_powers
+        return cls(
+            [np.zeros(shape) for _ in range(n_log)],
+            [np.zeros(shape, complex) for _ in range(n_log)],
+            [np.zeros(shape) for _ in range(n_double)],
+        )
+
+    @classmethod
+    def straight(cls, degrees: Degrees, moments: list[ComplexArray], log_product: FloatArray, eta: FloatArray) -> Inner:
+        """Combine the moments of straight elements (see `kernels`)."""
+        n_log, n_double = degrees.trial_powers
+        return cls(
+            [kernels.log_moment(b, moments, log_product) for b in range(n_log)],
+            [kernels.quotient_moment(b, moments, eta) for b in range(n_log)],
+            [moment.imag for moment in moments[:n_double]],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,25 +89,16 @@ class PairIntegrals:
         double = (0, 0) if degrees.double is None else (degrees.double[0] + 1, degrees.double[1] + 1)
         return cls(np.zeros(log + shape), np.zeros(log + shape, complex), np.zeros(double + shape))
 
-    def add(
-        self,
-        weight: FloatArray | float,
-        xi: FloatArray | float,
-        moments: list[ComplexArray],
-        log_product: FloatArray,
-        eta: FloatArray,
-    ) -> None:
+    def add(self, weight: FloatArray | float, xi: FloatArray | float, inner: Inner) -> None:
         """Add one outer point (or one point for each pair): `weight` at the test coordinate `xi`."""
-        for b in range(self.log.shape[1]):
-            inner = kernels.log_moment(b, moments, log_product)
-            inner_quotient = kernels.quotient_moment(b, moments, eta)
+        for b, (log, quotient) in enumerate(zip(inner.log, inner.quotient, strict=True)):
             for a in range(self.log.shape[0]):
                 factor = weight * xi**a if a else weight
-                self.log[a, b] += factor * inner
-                self.quotient[a, b] += factor * inner_quotient
-        for b in range(self.double.shape[1]):
+                self.log[a, b] += factor * log
+                self.quotient[a, b] += factor * quotient
+        for b, double in enumerate(inner.double):
             for a in range(self.double.shape[0]):
-                self.double[a, b] += (weight * xi**a / (2.0 * np.pi)) * moments[b].imag
+                self.double[a, b] += (weight * xi**a / (2.0 * np.pi)) * double
 
     def scale(self, test_half: FloatArray, half: FloatArray, tangent: ComplexArray) -> None:
         """Turn sums for half lengths 1 and a real trial axis into the integrals of the elements themselves."""
@@ -83,7 +114,7 @@ class PairIntegrals:
         if self.double.size:
             self.double[:] *= test_half
 
-    def put(self, rows: IntArray, columns: IntArray, other: PairIntegrals) -> None:
+    def put(self, rows: IntArray | slice, columns: IntArray | slice, other: PairIntegrals) -> None:
         """Overwrite the pairs (rows, columns) with those of `other`."""
         self.log[:, :, rows, columns] = other.log
         self.quotient[:, :, rows, columns] = other.quotient

@@ -49,6 +49,25 @@ class CondensedMap:
     recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
+@dataclass(frozen=True, eq=False)
+class GalerkinFactors:
+    """What a Galerkin map computes once, and what `bemkit.operators.cache` stores.
+
+    Parameters
+    ----------
+    matrix : (n_dofs, n_dofs) array [Pa]
+        S, symmetric.
+    single_layer : Cholesky
+        V = L L^T.
+    strained : (n_traction_dofs, n_dofs) array
+        L^-1 (1/2 M + K), without the part whose tractions exert a resultant.
+    """
+
+    matrix: FloatArray
+    single_layer: Cholesky
+    strained: FloatArray
+
+
 class SteklovPoincare(Protocol):
     """The elastic body seen from its boundary: weak forces = matrix @ displacements."""
 
@@ -99,8 +118,8 @@ class GalerkinMap:
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
 
     @cached_property
-    def _traction_solver(self) -> tuple[Cholesky, FloatArray, FloatArray, FloatArray]:
-        """Factor V; return it with L^-1 B, and with the part of it that carries resultants, already orthonormal."""
+    def factors(self) -> GalerkinFactors:
+        """What the map is made of, computed on first use."""
         u, t = self.displacement_space, self.traction_space
         v, k, w = (
             single_layer(t, t, self.material),
@@ -113,28 +132,19 @@ class GalerkinMap:
         motions = rigid_motions(dof_points(u), self.mesh.centre, self.mesh.diameter).reshape(u.n_dofs, 3)
         # quadrature on curved elements would leave rigid motions a little stiffness, and forces out of equilibrium
         at_rest, _ = np.linalg.qr(motions)
-        strained = _without(0.5 * identity + k.matrix(), at_rest)
-        hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
-        lower = factor.solve_lower(strained)
+        strained = factor.solve_lower(_without(0.5 * identity + k.matrix(), at_rest))
         resultant, _ = np.linalg.qr(factor.solve_lower(multiply(identity, motions)))
-        lower -= multiply(resultant, multiply(resultant.T, lower))
-        return factor, lower, resultant, hyper
+        strained -= multiply(resultant, multiply(resultant.T, strained))
+        hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
+        return GalerkinFactors(_symmetric_sum(hyper, strained), factor, strained)
 
-    @cached_property
-    def _matrix(self) -> FloatArray:
-        from scipy.linalg.blas import dsyrk
-
-        _, lower, _, w = self._traction_solver
-        matrix: FloatArray = 0.5 * (w + w.T)
-        product = dsyrk(1.0, lower, trans=1, lower=1)
-        matrix += product
-        matrix += np.tril(product, -1).T
-        read_only(matrix)
-        return matrix
+    def keep(self, factors: GalerkinFactors) -> None:
+        """Take over the factors of an equal map, so that nothing is assembled any more."""
+        self.__dict__["factors"] = factors  # where cached_property keeps its value
 
     def matrix(self) -> FloatArray:
         """Return the weak, symmetric (n_dofs, n_dofs) matrix [Pa]; its kernel are the rigid motions."""
-        return self._matrix
+        return self.factors.matrix
 
     def nodal_forces(self, elements: IntArray, traction: Field) -> FloatArray:
         """Return the consistent nodal forces of a traction field on some elements."""
@@ -169,8 +179,8 @@ class GalerkinMap:
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m]."""
-        factor, lower, _, _ = self._traction_solver
-        return factor.solve_upper(lower @ displacement.ravel()).reshape(-1, 2)
+        factors = self.factors
+        return factors.single_layer.solve_upper(factors.strained @ displacement.ravel()).reshape(-1, 2)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
@@ -300,6 +310,18 @@ def _integrate(space: BoundarySpace, elements: IntArray, field: Field) -> FloatA
     result = np.zeros((space.n_dofs // 2, 2))
     np.add.at(result, space.element_dofs[elements], local)
     return result
+
+
+def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
+    """Return the symmetric part of `hyper` plus strained^T strained, read-only."""
+    from scipy.linalg.blas import dsyrk
+
+    matrix: FloatArray = 0.5 * (hyper + hyper.T)
+    product = dsyrk(1.0, strained, trans=1, lower=1)
+    matrix += product
+    matrix += np.tril(product, -1).T
+    read_only(matrix)
+    return matrix
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:

@@ -1,12 +1,17 @@
-"""Threads of the linear algebra: one for small matrices, all for large ones."""
+"""Threads: one for small work, all for large."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 LARGE = 1500
 """Order of a matrix above which several threads factor it faster than one."""
+MANY_PAIRS = 500_000
+"""Element pairs above which several threads assemble faster than one."""
+MAX_THREADS = 8
 
 
 @contextmanager
@@ -31,3 +36,24 @@ def blas_threads_for(order: int) -> Iterator[None]:
 
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+def for_each_chunk(work: Callable[[slice], None], chunks: Iterable[slice], *, n_pairs: int) -> None:
+    """Call a function on every chunk of rows, from several threads if there are many element pairs.
+
+    Parameters
+    ----------
+    work : callable
+        Takes a slice of rows; array operations release the interpreter, so threads help although this is Python.
+    chunks : iterable of slice
+    n_pairs : int
+        Element pairs in all chunks together.
+    """
+    affinity = getattr(os, "sched_getaffinity", None)
+    available = len(affinity(0)) if affinity else os.cpu_count() or 1
+    if n_pairs < MANY_PAIRS or available == 1:
+        for chunk in chunks:
+            work(chunk)
+        return
+    with ThreadPoolExecutor(min(available, MAX_THREADS)) as pool:
+        list(pool.map(work, chunks))

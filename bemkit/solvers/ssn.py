@@ -14,6 +14,9 @@ _MOST_PATHS = 5
 """Paths followed before giving up. One is enough for bounds that are affine in the pressure; for others each path
 starts from the tangent at the end of the last."""
 
+_SOLVED = 1e-12
+"""Relative residual of (15), (16) below which only round-off is left."""
+
 
 class Phase(Enum):
     """What the next step does."""
@@ -150,6 +153,9 @@ class SemismoothNewton:
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
         repeats = not is_new and not response.is_sprung and following.merit >= 0.5 * iterate.merit
+        if repeats and size <= _SOLVED:
+            reason = "contact and friction are satisfied, the rest of the certificate is beyond this driver"
+            return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
             return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
         if following.n_in_phase >= self.full_steps:

@@ -21,8 +21,8 @@ def mesh_of(points: list[tuple[float, float]]) -> BoundaryMesh:
 def exact(mesh: BoundaryMesh, i: int, j: int) -> tuple[float, complex, float]:
     """Log, quotient and double layer of constants on two different elements: double primitives with 60 digits.
 
-    With rho = x - y, the sums run over the four pairs of end points; logarithms are taken relative to the direction of the
-    centres, which is continuous because the set of all rho is convex and does not contain zero.
+    With rho = x - y, the sums run over the four pairs of end points; logarithms are taken relative to the direction of
+    the centres, which is continuous because the set of all rho is convex and does not contain zero.
     """
     with mpmath.workdps(60):
         ends = [[mpmath.mpc(*map(float, p)) for p in (mesh.start[k], mesh.end[k])] for k in (i, j)]

@@ -1,0 +1,194 @@
+"""Curved elements as complex polynomials of the local coordinate.
+
+A curved element of constant speed is y = c + l tau p(t) with a polynomial p of small degree, exact to round-off on
+[-1, 1]. What makes it as easy as a straight one: seen from a point x with the parameter t0 (the root of p(t0) = zeta;
+complex unless x lies on the curve) the distance factors,
+
+    zeta - p(t) = (t0 - t) g(t),    g the divided difference of p, without zeros near [-1, 1],
+
+so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.mesh import BoundaryMesh
+
+MAX_DEGREE = 20
+"""Elements that need more are refused; a circular element of half a turn needs 18."""
+N_SAMPLES = 29
+MAX_BEND = 1.6
+"""Largest product of curvature and half length: elements that turn by more than about half a turn are refused."""
+ROUND_OFF = 16.0 * float(np.finfo(float).eps)
+MAX_NEWTON = 30
+ELLIPSE = 1.8
+"""Points with a parameter in the ellipse with foci -1, 1 and this semi-axis are near; Gauss rules serve the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class BentPanels:
+    """The polynomials of all elements of a mesh; straight ones are p(t) = t.
+
+    Parameters
+    ----------
+    about_centre, about_start, about_end : (n_powers, n_elements) complex arrays
+        Coefficients of p(t), p(-1 + u) - p(-1) and p(1 + v) - p(1).
+    bend : (n_elements,) array
+        Largest curvature times half length.
+    """
+
+    about_centre: ComplexArray
+    about_start: ComplexArray
+    about_end: ComplexArray
+    bend: FloatArray
+
+
+def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> BentPanels:
+    """Interpolate the curved elements of a mesh, up to the round-off of their coordinates.
+
+    Raises
+    ------
+    GeometryError
+        If an element turns too far, or is too far from a polynomial.
+    """
+    curved = np.flatnonzero(~mesh.is_straight)
+    angles, to_series = _interpolation()
+    places = mesh.points(curved, np.cos(angles))
+    places[:, 0], places[:, -1] = mesh.end[curved], mesh.start[curved]  # neighbours meet in the very same node
+    local = ((places @ np.array([1.0, 1j])) - centre[curved, None]) * (tangent[curved].conj() / half[curved])[:, None]
+    series = local @ to_series.T
+    # a short element is known to the round-off of its coordinates only: what is below that is noise
+    noise = ROUND_OFF * (1.0 + np.abs(places).max(axis=(1, 2)) / half[curved])
+    is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
+    degree = np.maximum(1, series.shape[1] - 1 - is_noise.sum(axis=1))
+    series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
+    n_powers = min(int(degree.max()), MAX_DEGREE) + 1
+    about_centre = np.zeros((n_powers, mesh.n_elements), complex)
+    about_centre[1] = 1.0
+    to_powers = np.zeros((n_powers, n_powers))
+    for k, unit in enumerate(np.eye(n_powers)):
+        to_powers[: k + 1, k] = chebyshev.cheb2poly(unit[: k + 1])
+    about_centre[:, curved] = to_powers @ series.T[:n_powers]
+    bend = np.zeros(mesh.n_elements)
+    second = about_centre[2:] * (np.arange(2, n_powers) * np.arange(1, n_powers - 1))[:, None]
+    if n_powers > 2:
+        bend[curved] = np.abs(
+            np.vander(np.linspace(-1.0, 1.0, 9), n_powers - 2, increasing=True) @ second[:, curved]
+        ).max(axis=0)
+    _check(mesh, curved, degree, bend)
+    return BentPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
+
+
+def _check(mesh: BoundaryMesh, curved: IntArray, degree: IntArray, bend: FloatArray) -> None:
+    is_bad = (degree > MAX_DEGREE) | (bend[curved] > MAX_BEND)
+    if is_bad.any():
+        element = int(curved[np.argmax(is_bad)])
+        (x, y), (x_end, y_end) = mesh.start[element], mesh.end[element]
+        msg = (
+            f"element {element} from ({x:.6g}, {y:.6g}) to ({x_end:.6g}, {y_end:.6g}) bends too much for one element "
+            f"(curvature times half length {bend[element]:.3g}): use more elements there"
+        )
+        raise GeometryError(msg)
+
+
+@lru_cache(maxsize=1)
+def _interpolation() -> tuple[FloatArray, FloatArray]:
+    """Return the angles of the Chebyshev-Lobatto points and the matrix from values to Chebyshev coefficients."""
+    angles = np.linspace(0.0, np.pi, N_SAMPLES)
+    to_series = np.cos(np.outer(np.arange(N_SAMPLES), angles)) * (2.0 / (N_SAMPLES - 1))
+    to_series[[0, -1]] *= 0.5
+    to_series[:, [0, -1]] *= 0.5
+    return angles, to_series
+
+
+def _shifted(coefficients: ComplexArray, centre: float) -> ComplexArray:
+    """Return the coefficients of p(centre + u) - p(centre)."""
+    n = coefficients.shape[0]
+    taylor = np.array([[math.comb(m, k) * centre ** (m - k) if m >= k else 0.0 for m in range(n)] for k in range(n)])
+    taylor[0] = 0.0
+    return np.asarray(taylor @ coefficients)
+
+
+def stretched(bend: FloatArray, distance: float) -> FloatArray:
+    """Return how many half lengths outside of a circular element the parameter is `distance` away from its centre."""
+    exponent = np.minimum(bend * distance, 300.0)  # beyond, no point is far enough
+    ratio = np.where(exponent > 1e-8, np.expm1(exponent) / np.maximum(exponent, 1e-8), 1.0)
+    result: FloatArray = distance * ratio
+    return result
+
+
+def evaluate(coefficients: ComplexArray, t: ComplexArray) -> ComplexArray:
+    """Evaluate polynomials (n_powers, n) at (n,) points, one each."""
+    value: ComplexArray = coefficients[-1] + np.zeros_like(t)
+    for coefficient in coefficients[-2::-1]:
+        value *= t
+        value += coefficient
+    return value
+
+
+def derivative(coefficients: ComplexArray) -> ComplexArray:
+    """Return the coefficients of the derivatives."""
+    result: ComplexArray = coefficients[1:] * np.arange(1, coefficients.shape[0])[:, None]
+    return result
+
+
+def divided_difference(coefficients: ComplexArray, root: ComplexArray) -> ComplexArray:
+    """Return the coefficients of (p(root) - p(t)) / (root - t), which are those of p divided by its linear factor."""
+    quotient = np.empty((coefficients.shape[0] - 1, root.size), complex)
+    quotient[-1] = coefficients[-1]
+    for m in range(quotient.shape[0] - 1, 0, -1):
+        quotient[m - 1] = coefficients[m] + root * quotient[m]
+    return quotient
+
+
+def find_parameters(
+    panels: BentPanels, elements: IntArray, from_start: ComplexArray, from_end: ComplexArray
+) -> tuple[ComplexArray, ComplexArray, BoolArray]:
+    """Find the complex parameters t0 of points by Newton's method, each measured from the nearer end.
+
+    Parameters
+    ----------
+    panels : BentPanels
+    elements : (n,) int array
+    from_start, from_end : (n,) complex arrays
+        Local coordinates of the points relative to either end of the element.
+
+    Returns
+    -------
+    plus, minus : (n,) complex arrays
+        t0 + 1 and t0 - 1, each with full relative accuracy near its own end.
+    is_near : (n,) bool array
+        Whether a root was found close to the element; all others are far in the sense of the parameter.
+    """
+    at_start = np.abs(from_start) < np.abs(from_end)
+    target = np.where(at_start, from_start, from_end)
+    coefficients = np.where(at_start, panels.about_start[1:, elements], panels.about_end[1:, elements])
+    guesses = np.linspace(0.0, 2.0, 5)
+    side = np.where(at_start, 1.0, -1.0)
+    distance = np.stack([np.abs(g * side * evaluate(coefficients, g * side + 0j) - target) for g in guesses])
+    u = side * guesses[np.argmin(distance, axis=0)] + 0j
+    slopes = coefficients * np.arange(1, coefficients.shape[0] + 1)[:, None]
+    change = np.full(u.shape, np.inf)
+    active = np.arange(u.size)
+    with np.errstate(all="ignore"):  # runaways end as not-a-number and are not near
+        for _ in range(MAX_NEWTON):
+            here = u[active]
+            own = coefficients[:, active]
+            step = (here * evaluate(own, here) - target[active]) / evaluate(slopes[:, active], here)
+            u[active] = here - step
+            change[active] = np.abs(step)
+            active = active[(change[active] > 1e-15 * np.abs(u[active])) & (np.abs(u[active]) < 10.0)]
+            if not active.size:
+                break
+        plus, minus = np.where(at_start, u, u + 2.0), np.where(at_start, u - 2.0, u)
+        is_near = (change <= 1e-13 * np.abs(u)) | (change == 0.0)
+        is_near &= np.abs(plus) + np.abs(minus) < 2.0 * ELLIPSE
+    return plus, minus, is_near

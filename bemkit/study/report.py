@@ -1,0 +1,64 @@
+"""What ``bemkit study`` prints: a progress bar on standard error, tables on standard output."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from typing import TextIO
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from bemkit.study.paper_tables import RHO, PaperTable, paper_tables
+
+
+def compute_with_progress(*, is_live: bool) -> tuple[PaperTable, PaperTable]:
+    """Compute the paper's tables while a bar on standard error shows how far it is."""
+    if not is_live:
+        return paper_tables()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("paper tables", total=2 * len(RHO) ** 2)
+
+        def advance(number: int, rho_1: float, rho_2: float) -> None:
+            text = f"Table {number}, rho_1 = {rho_1:.0e}, rho_2 = {rho_2:.0e}"
+            bar.update(task, advance=1, description=text)
+
+        return paper_tables(advance)
+
+
+def print_paper_tables(tables: Sequence[PaperTable], console: Console | None = None) -> None:
+    """Print ours beside the print: ``12 / 13 (28)`` is 12 outer steps here, 13 in the paper, 28 linear solves here."""
+    console = Console(highlight=False) if console is None else console
+    for table in tables:
+        shown = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        shown.add_column("rho_1 \\ rho_2", justify="right", no_wrap=True)
+        for rho in RHO:
+            shown.add_column(f"{rho:.0e}", justify="right", no_wrap=True)
+        for i, rho in enumerate(RHO):
+            shown.add_row(f"{rho:.0e}", *(_cell(table, i, j) for j in range(len(RHO))))
+        console.print(Text(f"Table {table.number}: outer steps here / in the print (linear solves here)", style="bold"))
+        console.print(shown)
+        console.print(f"semismooth Newton on the same problem: {table.newton_solves} linear solves for every rho\n")
+
+
+def write_json(tables: Sequence[PaperTable], stream: TextIO) -> None:
+    """Write the tables as one JSON object."""
+    json.dump({"tables": [table.as_dict() for table in tables]}, stream, indent=2)
+    stream.write("\n")
+
+
+def write_csv(tables: Sequence[PaperTable], stream: TextIO) -> None:
+    """Write one row for each pair of rho of both tables."""
+    rows = [row for table in tables for row in table.rows()]
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+
+
+def _cell(table: PaperTable, i: int, j: int) -> str:
+    return f"{table.outer_steps[i, j]} / {table.printed[i, j]} ({table.linear_solves[i, j]})"

@@ -1,0 +1,136 @@
+"""Condensation onto the contact boundary: what the drivers see of a body, and the way back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bemkit.contact.condensation import CondensedBody, ContactNodes, condense
+from bemkit.contact.conditions import separated, stick
+from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
+from bemkit.operators.dense import SingularMatrixError
+from bemkit.operators.material import Material
+from bemkit.operators.nodal import Support
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+
+MAPS = [GalerkinMap, CollocationMap]
+MATERIAL = Material(1.0, 0.3)
+
+
+def mesh_of(shape: Shape, n_elements: int, *sides: str) -> BoundaryMesh:
+    return discretise(shape.outline(), n_elements=n_elements, parts={side: Selection((side,)) for side in sides})
+
+
+def roller(mesh: BoundaryMesh, part: str) -> Support:
+    return Support(part, mesh.part(part), mesh.normals[mesh.part(part)][:, None, :])
+
+
+def pressed_block(kind: type, *rollers: str) -> tuple[CondensedBody, ContactNodes, SteklovPoincare]:
+    """A 2 x 1 block with a unit pressure on top."""
+    mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "top", "left")
+    elastic: SteklovPoincare = kind(mesh, MATERIAL)
+    force = elastic.nodal_forces(mesh.part("top"), lambda x: np.broadcast_to([0.0, -1.0], x.shape))
+    body, nodes = condense(elastic, [roller(mesh, part) for part in rollers], mesh.part("bottom"), force)
+    return body, nodes, elastic
+
+
+@pytest.mark.parametrize("kind", MAPS)
+@pytest.mark.parametrize(("rollers", "n_motions"), [((), 3), (("right",), 1), (("right", "top"), 0)])
+def test_motions_that_only_contact_holds(kind: type, rollers: tuple[str, ...], n_motions: int) -> None:
+    body, _, _ = pressed_block(kind, *rollers)
+    motions = body.rigid_motions()
+    assert motions.shape == (n_motions, body.n_contact, 2)
+    translations = motions if kind is GalerkinMap or n_motions == 1 else motions[:0]
+    size = np.abs(body.dense.stiffness).max()
+    for motion in translations:  # constant elements represent translations only
+        assert np.abs(body.dense.stiffness @ motion.ravel()).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_uniform_pressure_between_rollers_is_carried_uniformly(kind: type) -> None:
+    body, nodes, elastic = pressed_block(kind, "left", "right")
+    held = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
+    # the linear field sigma_yy = -1 is exact for linear elements; constants err at the corners
+    tolerance = 1e-11 if kind is GalerkinMap else 0.1
+    np.testing.assert_allclose(held.sigma_n, -1.0, atol=tolerance)
+    assert -float(np.sum(nodes.weights * held.sigma_n)) == pytest.approx(2.0, rel=1e-12)  # equilibrium
+    displacement, force = body.recover(held)
+    assert np.abs(force.sum(axis=0)).max() < 1e-12
+    assert max(body.imbalance(held)) < 1e-12
+    if kind is GalerkinMap:
+        top = np.isclose(elastic.mesh.nodes[:, 1], 1.0)  # type: ignore[attr-defined]
+        oedometric = 2.0 * MATERIAL.shear_modulus * (1 - 0.3) / (1 - 0.6)
+        np.testing.assert_allclose(displacement[top, 1], -1.0 / oedometric, rtol=1e-11)
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_recovered_fields_repeat_the_contact_state(kind: type) -> None:
+    body, nodes, elastic = pressed_block(kind, "right")
+    rng = np.random.default_rng(5)
+    state = body.respond(stick(rng.normal(size=body.n_contact), np.zeros(body.n_contact)))
+    displacement, force = body.recover(state)
+    own = np.einsum("nkc,nc->nk", nodes.frame, displacement[nodes.nodes])
+    np.testing.assert_allclose(own[:, 0], state.u_n, atol=1e-12)
+    free = np.setdiff1d(np.arange(force.shape[0]), np.append(nodes.nodes, elastic_nodes_on_right(elastic)))
+    given = elastic.nodal_forces(
+        elastic.displacement_space.mesh.part("top"), lambda x: np.broadcast_to([0.0, -1.0], x.shape)
+    )
+    np.testing.assert_allclose(force[free], given[free], atol=1e-11)
+    total = force[nodes.nodes] - given[nodes.nodes]
+    normal_force = np.einsum("nc,nc->n", total, nodes.normals)
+    np.testing.assert_allclose(normal_force, nodes.weights * state.sigma_n, atol=1e-11)
+
+
+def elastic_nodes_on_right(elastic: SteklovPoincare) -> np.ndarray:  # type: ignore[type-arg]
+    space = elastic.displacement_space
+    return np.unique(space.element_dofs[space.mesh.part("right")])
+
+
+def test_node_between_contact_and_roller_keeps_contact_and_drops_friction() -> None:
+    body, nodes, _ = pressed_block(GalerkinMap, "right")
+    corner = int(np.argmin(np.hypot(*(nodes.points - [2.0, 0.0]).T)))
+    open_state = body.respond(
+        separated(body.n_contact).replaced(
+            np.arange(2 * body.n_contact).reshape(-1, 2) == 0, stick(np.zeros(body.n_contact), np.zeros(body.n_contact))
+        )
+    )
+    assert open_state.u_t[corner] == 0.0
+    assert open_state.sigma_t[corner] == pytest.approx(0.0, abs=1e-14)
+    assert abs(open_state.sigma_t).max() < 1e-12
+
+
+def test_oblique_roller_at_the_end_of_the_contact_boundary() -> None:
+    # a triangle sliding along a wall inclined by 60 degrees: the corner node moves along the wall only, and may touch
+    triangle = Polygon(((0.0, 0.0), (2.0, 0.0), (1.0, np.sqrt(3.0))))
+    mesh = mesh_of(triangle, 36, "side-1", "side-2", "side-3")
+    elastic = GalerkinMap(mesh, MATERIAL)
+    force = elastic.nodal_forces(mesh.part("side-3"), lambda x: np.broadcast_to([0.3, -1.0], x.shape))
+    body, nodes = condense(elastic, [roller(mesh, "side-2")], mesh.part("side-1"), force)
+    assert body.rigid_motions().shape[0] == 1  # along the wall
+    held = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
+    displacement, force = body.recover(held)
+    corner = int(np.argmin(np.hypot(*(mesh.nodes - [2.0, 0.0]).T)))
+    assert np.abs(displacement[corner]).max() < 1e-13
+    assert np.abs(force.sum(axis=0)).max() < 1e-12
+    lifted = body.respond(stick(np.where(nodes.nodes == corner, -0.1, 0.0), np.zeros(body.n_contact)))
+    moved, _ = body.recover(lifted)
+    assert moved[corner, 1] == pytest.approx(0.1, rel=1e-12)  # u_n = -0.1 upwards
+    wall = mesh.normals[mesh.part("side-2")[0]]
+    assert float(moved[corner] @ wall) == pytest.approx(0.0, abs=1e-14)
+
+
+def test_contact_nodes_fixed_along_their_normal_are_left_to_the_support() -> None:
+    mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "left")
+    elastic = GalerkinMap(mesh, MATERIAL)
+    axes = np.broadcast_to(np.eye(2), (mesh.part("left").size, 2, 2))
+    clamp = Support("left", mesh.part("left"), axes)
+    _, nodes = condense(elastic, [clamp], mesh.part("bottom"), np.zeros((mesh.n_nodes, 2)))
+    assert nodes.nodes.size == mesh.part("bottom").size  # one node less than the side has
+    assert not np.any(np.isclose(nodes.points[:, 0], 0.0))
+
+
+def test_a_body_that_glued_contact_cannot_hold_is_named() -> None:
+    mesh = mesh_of(Rectangle(2.0, 1.0), 24, "bottom")
+    elastic = GalerkinMap(mesh, MATERIAL)
+    with pytest.raises(SingularMatrixError, match="the body held by its supports and its contact boundary"):
+        condense(elastic, [], mesh.part("bottom")[:0], np.zeros((mesh.n_nodes, 2)))

@@ -1,0 +1,150 @@
+"""The operators themselves: laziness, sharing, adjointness, numbering, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import bemkit as bk
+from bemkit.arrays import FloatArray
+from bemkit.geometry import BoundaryMesh, GeometryError
+from bemkit.operators.boundary import PairOperator
+from bemkit.operators.dense import Cholesky, DenseLU, SingularMatrixError, multiply
+
+MATERIAL = bk.Material(2.0, 0.25)
+
+
+def l_shape(n_elements: int = 36) -> BoundaryMesh:
+    vertices = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
+    return bk.discretise(bk.Polygon(vertices).outline(), n_elements=n_elements)
+
+
+def operators(mesh: BoundaryMesh) -> tuple[PairOperator, PairOperator, PairOperator]:
+    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    return (
+        bk.single_layer(tractions, tractions, MATERIAL),
+        bk.double_layer(displacements, tractions, MATERIAL),
+        bk.hypersingular(displacements, displacements, MATERIAL),
+    )
+
+
+def test_nothing_is_computed_before_it_is_asked_for_and_then_only_once() -> None:
+    v, _, _ = operators(l_shape())
+    assert not v.is_assembled
+    first = v.matrix()
+    assert v.is_assembled
+    assert v.matrix() is first
+    assert not first.flags.writeable
+
+
+def test_one_sweep_gives_the_same_matrices_as_three() -> None:
+    mesh = l_shape()
+    together, alone = operators(mesh), operators(mesh)
+    bk.assemble(*together)
+    bk.assemble(*together)  # assembled operators are left alone
+    for one, other in zip(together, alone, strict=True):
+        np.testing.assert_allclose(one.matrix(), other.matrix(), rtol=0.0, atol=1e-16 * np.abs(one.matrix()).max())
+
+
+def test_adjoint_is_exactly_the_transpose() -> None:
+    mesh = l_shape()
+    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    adjoint = bk.adjoint_double_layer(tractions, displacements, MATERIAL)
+    double = bk.double_layer(displacements, tractions, MATERIAL)
+    np.testing.assert_array_equal(adjoint.matrix(), double.matrix().T)
+
+
+def renumbered(mesh: BoundaryMesh, nodes: np.ndarray, elements: np.ndarray) -> BoundaryMesh:  # type: ignore[type-arg]
+    """The same mesh with node k of the new one being node nodes[k] of the old one, likewise for elements."""
+    position = np.empty(mesh.n_nodes, dtype=np.intp)
+    position[nodes] = np.arange(mesh.n_nodes)
+    return BoundaryMesh(mesh.nodes[nodes], position[mesh.elements[elements]])
+
+
+def expanded(scalar: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    return (2 * scalar[:, None] + np.arange(2)).ravel()
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=10)
+def test_results_do_not_depend_on_numbering(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mesh = l_shape(24)
+    nodes, elements = rng.permutation(mesh.n_nodes), rng.permutation(mesh.n_elements)
+    v, k, w = operators(mesh)
+    v2, k2, w2 = operators(renumbered(mesh, nodes, elements))
+    rows, columns = expanded(elements), expanded(nodes)
+    for one, two, r, c in ((v, v2, rows, rows), (k, k2, rows, columns), (w, w2, columns, columns)):
+        matrix = one.matrix()
+        np.testing.assert_allclose(two.matrix(), matrix[np.ix_(r, c)], rtol=0.0, atol=1e-14 * np.abs(matrix).max())
+
+
+def test_linear_operator_applies_the_matrix() -> None:
+    v, _, _ = operators(l_shape())
+    x = np.random.default_rng(3).normal(size=v.trial.n_dofs)
+    np.testing.assert_array_equal(v.as_linear_operator() @ x, v.matrix() @ x)
+
+
+def test_mass_integrates_products() -> None:
+    mesh = l_shape()
+    space = bk.QuadraticSpace(mesh)
+    total = np.ones(space.n_dofs // 2)
+    matrix = bk.mass(space, space).matrix()[::2, ::2]
+    assert total @ matrix @ total == pytest.approx(8.0, rel=1e-14)  # the length of the boundary
+    np.testing.assert_array_equal(matrix, matrix.T)
+
+
+def test_spaces_that_do_not_fit_are_refused() -> None:
+    mesh, other = l_shape(), l_shape()
+    tractions, displacements = bk.ConstantSpace(mesh), bk.LinearSpace(mesh)
+    with pytest.raises(GeometryError, match="live on different meshes: build both on the same BoundaryMesh"):
+        bk.single_layer(tractions, bk.ConstantSpace(other), MATERIAL)
+    with pytest.raises(GeometryError, match="hypersingular needs a continuous trial space, but ConstantSpace may jump"):
+        bk.hypersingular(tractions, displacements, MATERIAL)
+    with pytest.raises(GeometryError, match="hypersingular needs a continuous test space"):
+        bk.hypersingular(displacements, bk.LinearSpace(mesh, bk.corner_nodes(mesh)), MATERIAL)
+    with pytest.raises(GeometryError, match="double_layer needs a continuous trial space"):
+        bk.double_layer(tractions, tractions, MATERIAL)
+    here = bk.single_layer(tractions, tractions, MATERIAL)
+    there = bk.single_layer(bk.ConstantSpace(other), bk.ConstantSpace(other), MATERIAL)
+    with pytest.raises(GeometryError, match="assemble those of one mesh at a time"):
+        bk.assemble(here, there)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"youngs_modulus": -1.0}, "youngs_modulus is -1.0: give a positive"),
+        ({"poisson_ratio": 0.6}, r"poisson_ratio is 0.6: .*\(-1, 0.5\]"),
+    ],
+)
+def test_impossible_materials_are_refused(values: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        bk.Material(**({"youngs_modulus": 1.0, "poisson_ratio": 0.3} | values))
+
+
+def test_plane_stress_and_plane_strain_moduli() -> None:
+    stress, strain = bk.Material(3.0, 0.3, bk.Plane.STRESS), bk.Material(3.0, 0.3)
+    assert stress.plane_modulus == pytest.approx(3.0)
+    assert strain.plane_modulus == pytest.approx(3.0 / (1 - 0.09))
+    assert stress.kappa == pytest.approx((3 - 0.3) / 1.3)
+    assert strain.kappa == pytest.approx(3 - 1.2)
+    assert stress.shear_modulus == strain.shear_modulus == pytest.approx(3.0 / 2.6)
+
+
+def test_matrices_that_cannot_be_factored_are_named() -> None:
+    singular: FloatArray = np.ones((3, 3))
+    with pytest.raises(SingularMatrixError, match="the thing is not positive definite: check for coincident"):
+        Cholesky(singular, "the thing")
+    with pytest.raises(SingularMatrixError, match=r"the thing is singular \(reciprocal condition"):
+        DenseLU(np.asfortranarray(singular), "the thing")
+
+
+@given(st.integers(1, 6), st.integers(1, 6), st.integers(1, 6), st.booleans(), st.booleans())
+def test_multiply_is_the_matrix_product(m: int, k: int, n: int, left: bool, right: bool) -> None:
+    rng = np.random.default_rng(m + 10 * k + 100 * n)
+    a, b = rng.normal(size=(m, k)), rng.normal(size=(k, n))
+    product = multiply(a if left else np.asfortranarray(a), b if right else np.asfortranarray(b))
+    np.testing.assert_allclose(product, a @ b, rtol=1e-13, atol=1e-13)
