@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan``.
+"""The command line: ``bemkit run | show | scenes | plan | study``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 130 interrupted.
 """
@@ -167,6 +167,34 @@ def plan(scene: str, elements: int | None, discretisation: str | None, is_json: 
         from bemkit.report import print_plan
 
         print_plan(chosen.title, made)
+
+
+@commands.group()
+def study() -> None:
+    """Many runs that answer one question."""
+
+
+@study.command("paper-tables")
+@click.option("--json", "json_file", metavar="FILE", help="Write the tables as JSON; - is standard output.")
+@click.option("--csv", "csv_file", metavar="FILE", help="Write one row for each pair of rho; - is standard output.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither the progress bar nor the tables.")
+def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> None:
+    """Reproduce the source paper's Tables 1 and 2: outer steps of the augmented Lagrangian method over rho."""
+    from bemkit.outputs import STDOUT, check_text, write_text
+    from bemkit.study import report
+
+    if json_file == csv_file == STDOUT:
+        raise click.UsageError("--csv - and --json - both print to standard output: give one of them")
+    with _bad_input():
+        check_text(json_file, "JSON file", "{")
+        check_text(csv_file, "CSV file of the paper's tables", "table,rho_1")
+        tables = report.compute_with_progress(is_live=not quiet and sys.stderr.isatty())
+        if json_file is not None:
+            write_text(json_file, report.to_json(tables))
+        if csv_file is not None:
+            write_text(csv_file, report.to_csv(tables))
+    if not quiet and STDOUT not in (json_file, csv_file):
+        report.print_paper_tables(tables)
 
 
 def _load(

@@ -87,11 +87,11 @@ class Outputs:
 
             write_result(self.result, solution)
         if self.json is not None:
-            _write_text(self.json, to_json(solution) + "\n")
+            write_text(self.json, to_json(solution) + "\n")
         if self.csv is not None:
             stream = io.StringIO()
             write_csv(solution, self.table, stream)
-            _write_text(self.csv, stream.getvalue())
+            write_text(self.csv, stream.getvalue())
         if self.plots is not None:
             from bemkit.plotting import save_figures
 
@@ -121,7 +121,28 @@ def _begins_with(path: Path, start: str) -> bool:
         return stream.read(len(expected)) == expected
 
 
-def _write_text(place: str, text: str) -> None:
+def check_text(place: str | None, kind: str, start: str) -> None:
+    """Find out whether a text can be written; an existing file is replaced only if it begins like one of its kind.
+
+    Parameters
+    ----------
+    place : str or None
+        File name, or ``"-"`` for standard output, which can always be written.
+    kind : str
+        What will be written, for messages: "JSON file".
+    start : str
+        How files of this kind begin.
+
+    Raises
+    ------
+    OutputFileError
+    """
+    if place not in (None, STDOUT):
+        check_target(Path(str(place)), kind, lambda path: _begins_with(path, start))
+
+
+def write_text(place: str, text: str) -> None:
+    """Write a text to a file, all or nothing, or to standard output if the place is ``"-"``."""
     if place == STDOUT:
         sys.stdout.write(text)
         return

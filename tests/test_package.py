@@ -15,7 +15,7 @@ PACKAGE = Path(bemkit.__file__).parent
 
 # imports point up only: a module may import those of its own layer and of earlier ones
 LAYERS = [
-    {"arrays", "expression"},
+    {"arrays", "expression", "files", "hdf5"},
     {"geometry"},
     {"operators"},
     {"contact"},
@@ -23,8 +23,9 @@ LAYERS = [
     {"scene"},
     {"plan", "kinds", "model", "structuring", "shipped"},
     {"solution", "scenefile"},
-    {"files", "hdf5", "io", "tables", "plotting", "interior", "runner", "reference"},
+    {"io", "tables", "plotting", "interior", "runner", "reference"},
     {"outputs", "report", "testing"},
+    {"study"},
     {"cli"},
 ]
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")

@@ -23,7 +23,7 @@ from math import comb
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import derivative_on, evaluate_curves, point_on
 from bemkit.geometry.quadrature import gauss_legendre
@@ -87,7 +87,7 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
 
 
 def _replace_far(
-    row: list[ComplexArray], below: list[ComplexArray], zeta: ComplexArray, far: ComplexArray, order: int
+    row: list[ComplexArray], below: list[ComplexArray], zeta: ComplexArray, far: BoolArray, order: int
 ) -> None:
     """Put in the series at far points, where the upward recursion would lose digits like |zeta|^(2k)."""
     inverse = 1.0 / zeta[far]
@@ -221,7 +221,8 @@ class CurvedElements:
     def angles(self, x: ComplexArray, elements: IntArray) -> FloatArray:
         """Return the angles (n,) [rad] under which the elements are seen, anticlockwise positive."""
         (cauchy,) = self._integrate(x, elements, 0, lambda rho, tau: [tau / rho])
-        return -cauchy[0].imag
+        angles: FloatArray = -cauchy[0].imag
+        return angles
 
     def _integrate(
         self,

@@ -122,7 +122,9 @@ def paper_model(number: int) -> Model:
     scene = load_scene(f"paper-{number}")
     sides = [side for loop in scene.shape.outline().loops for side in loop]
     # as many elements on each side, whatever its length
-    density = {side.name: 1.0 / float(np.hypot(*np.ptp(side.curve.point(np.array([0.0, 1.0])), axis=0))) for side in sides}
+    density = {
+        side.name: 1.0 / float(np.hypot(*np.ptp(side.curve.point(np.array([0.0, 1.0])), axis=0))) for side in sides
+    }
     mesh = MeshOptions(elements=_N_ELEMENTS, grading=Uniform(), density=density)
     scene = replace(scene, mesh=mesh, discretisation=ConstantCollocation())
     return build_model(scene, scene.build_mesh())

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Sequence
-from typing import TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -32,33 +32,34 @@ def compute_with_progress(*, is_live: bool) -> tuple[PaperTable, PaperTable]:
 
 
 def print_paper_tables(tables: Sequence[PaperTable], console: Console | None = None) -> None:
-    """Print ours beside the print: ``12 / 13 (28)`` is 12 outer steps here, 13 in the paper, 28 linear solves here."""
+    """Print ours beside the print: ``12/13 (28)`` is 12 outer steps here, 13 in the paper, 28 linear solves here."""
     console = Console(highlight=False) if console is None else console
     for table in tables:
         shown = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-        shown.add_column("rho_1 \\ rho_2", justify="right", no_wrap=True)
+        shown.add_column("rho", justify="right", no_wrap=True)
         for rho in RHO:
             shown.add_column(f"{rho:.0e}", justify="right", no_wrap=True)
         for i, rho in enumerate(RHO):
             shown.add_row(f"{rho:.0e}", *(_cell(table, i, j) for j in range(len(RHO))))
-        console.print(Text(f"Table {table.number}: outer steps here / in the print (linear solves here)", style="bold"))
+        console.print(Text(f"Table {table.number}: outer steps here/print (linear solves here); rho_1 down, rho_2 across", style="bold"))
         console.print(shown)
         console.print(f"semismooth Newton on the same problem: {table.newton_solves} linear solves for every rho\n")
 
 
-def write_json(tables: Sequence[PaperTable], stream: TextIO) -> None:
-    """Write the tables as one JSON object."""
-    json.dump({"tables": [table.as_dict() for table in tables]}, stream, indent=2)
-    stream.write("\n")
+def to_json(tables: Sequence[PaperTable]) -> str:
+    """Return the tables as one JSON object."""
+    return json.dumps({"tables": [table.as_dict() for table in tables]}, indent=2) + "\n"
 
 
-def write_csv(tables: Sequence[PaperTable], stream: TextIO) -> None:
-    """Write one row for each pair of rho of both tables."""
+def to_csv(tables: Sequence[PaperTable]) -> str:
+    """Return one row for each pair of rho of both tables."""
     rows = [row for table in tables for row in table.rows()]
+    stream = io.StringIO()
     writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
+    return stream.getvalue()
 
 
 def _cell(table: PaperTable, i: int, j: int) -> str:
-    return f"{table.outer_steps[i, j]} / {table.printed[i, j]} ({table.linear_solves[i, j]})"
+    return f"{table.outer_steps[i, j]}/{table.printed[i, j]} ({table.linear_solves[i, j]})"

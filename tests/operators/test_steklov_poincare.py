@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry import Algebraic, BoundaryMesh, Polygon, Rectangle, Shape, Uniform, discretise
+from bemkit.geometry import Algebraic, BoundaryMesh, Geometric, Polygon, Rectangle, Shape, Uniform, discretise
 from bemkit.geometry.space import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.rigid import rigid_motions
@@ -54,6 +54,41 @@ def test_linear_patch_is_exact_on_quasi_uniform_meshes(shape: Shape, n: int) -> 
 )
 def test_linear_patch_holds_on_graded_meshes_and_thin_strips(shape: Shape, n: int, exponent: float) -> None:
     assert patch_error(GalerkinMap(mesh_of(shape, n, exponent), MATERIAL), MATERIAL) < 1e-9
+
+
+@pytest.mark.parametrize("shape", [Rectangle(1.0, 1.0), L_SHAPE], ids=["square", "L"])
+@pytest.mark.parametrize("smallest", [1e-4, 1e-8, 1e-12])
+def test_linear_patch_holds_at_any_grading(shape: Shape, smallest: float) -> None:
+    levels = round(np.log(smallest) / np.log(0.2))
+    n_sides = len(shape.outline().side_names)
+    grading = Geometric(0.2, levels)
+    mesh = discretise(shape.outline(), n_elements=2 * n_sides * (levels + 2), grading=grading)
+    assert mesh.lengths.max() / mesh.lengths.min() > 0.1 / smallest
+    assert patch_error(GalerkinMap(mesh, MATERIAL), MATERIAL) < 1e-12
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+def test_linear_patch_holds_across_a_narrow_slit(gap: float) -> None:
+    legs = (
+        (0.0, 0.0),
+        (2 + gap, 0.0),
+        (2 + gap, 2.0),
+        (1 + gap, 2.0),
+        (1 + gap, 1.0),
+        (1.0, 1.0),
+        (1.0, 2.0),
+        (0.0, 2.0),
+    )
+    assert patch_error(GalerkinMap(mesh_of(Polygon(legs), 80), MATERIAL), MATERIAL) < 1e-12
+
+
+def test_position_costs_only_the_digits_of_the_coordinates() -> None:
+    mesh = mesh_of(L_SHAPE, 48)
+    reference = GalerkinMap(mesh, MATERIAL).matrix()
+    for distance in (1.0, 1e3, 1e6):
+        moved = mesh.transformed(shift=(-distance * mesh.diameter, 0.0), factor=1.0)
+        error = np.abs(GalerkinMap(moved, MATERIAL).matrix() - reference).max() / np.abs(reference).max()
+        assert error < 1e-13 + 10.0 * np.finfo(float).eps * distance * mesh.diameter / mesh.lengths.min()
 
 
 @pytest.mark.parametrize("broken", [True, False])
