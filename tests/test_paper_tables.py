@@ -57,7 +57,6 @@ def test_example_2_has_the_pattern_of_the_print(tables: tuple[PaperTable, PaperT
 
 def test_newton_beats_every_cell(tables: tuple[PaperTable, PaperTable]) -> None:
     for table in tables:
-        assert np.all(table.linear_solves > 1.5 * table.outer_steps - 10)
         assert table.newton_solves <= 10
         assert np.all(table.newton_solves < table.linear_solves)
 

@@ -72,9 +72,9 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     stress, length = certificate_scales(problem, state)
     clearance = problem.gap - state.u_n
     slip = state.u_t - problem.slip_origin
-    held = np.abs(state.sigma_n)
-    if not problem.law.acts_across_gap:
-        held = np.maximum(held, np.abs(state.sigma_t))
+    # friction given across the gap is no sign of contact
+    shear = np.where(problem.law.acts_across_gap, 0.0, np.abs(state.sigma_t))
+    held = np.maximum(np.abs(state.sigma_n), shear)
     traction, distance = held / stress, np.abs(clearance) / length
     bound = problem.friction_bound(state.sigma_n, is_closed=traction > distance)
     against_slip = np.where(slip > 0.0, state.sigma_t + bound, state.sigma_t - bound)

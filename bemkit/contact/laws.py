@@ -6,14 +6,21 @@ traction stays within the bound, and where the node slips it has the size of the
     |sigma_t| <= bound(sigma_n),    sigma_t = -bound(sigma_n) u_t / |u_t|  where  u_t != 0.
 
 An own law is a class with `bound` and `bound_derivative`; deriving it from `FrictionLaw` supplies the rest.
+
+Coefficients may vary along the boundary: as numbers per contact node, or as formulas or functions of the coordinates,
+which `FrictionLaw.at` turns into numbers per node.
 """
 
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, fields, replace
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, read_only
+from bemkit.expression import ScalarField, check_field, evaluate_field
+
+Coefficient: TypeAlias = ScalarField | FloatArray
+"""A number, a formula or function of x and y, or one number per contact node."""
 
 
 @runtime_checkable
@@ -32,13 +39,32 @@ class FrictionLaw(Protocol):
         return False
 
     @property
-    def acts_across_gap(self) -> bool:
-        """Whether ``bound(0)`` also holds at open nodes.
+    def acts_across_gap(self) -> bool | BoolArray:
+        """Whether ``bound(0)`` also holds at open nodes (for all nodes, or node by node).
 
         False (the default): an open node carries no traction. True only for friction that is *given* on the whole
         contact boundary, which makes the problem convex (see `Tresca`). Without meaning where ``bound(0) = 0``.
         """
         return False
+
+    def at(self, points: FloatArray) -> "FrictionLaw":
+        """Return the law for given contact nodes: every formula or function of the coordinates is evaluated.
+
+        Parameters
+        ----------
+        points : (n_contact, 2) array [m]
+
+        Returns
+        -------
+        FrictionLaw
+            By default this law itself. A law of one's own whose coefficients vary along the boundary overrides it.
+
+        Raises
+        ------
+        ValueError
+            If a coefficient is not finite or out of range at a node.
+        """
+        return self
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return the largest tangential traction the nodes can carry.
@@ -103,7 +129,7 @@ class Tresca(FrictionLaw):
 
     Parameters
     ----------
-    bound_value : float or (n_contact,) array [Pa]
+    bound_value : Coefficient [Pa]
         The bound, not negative.
 
     Notes
@@ -113,7 +139,7 @@ class Tresca(FrictionLaw):
     `CohesiveCoulomb` with ``cohesion=0`` and a ``cap``.
     """
 
-    bound_value: float | FloatArray
+    bound_value: Coefficient
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bound_value", _coefficient("bound_value", self.bound_value))
@@ -121,7 +147,7 @@ class Tresca(FrictionLaw):
     @property
     def is_frictionless(self) -> bool:
         """Whether the given bound is zero."""
-        return not np.any(self.bound_value)
+        return _is_zero(self.bound_value)
 
     @property
     def acts_across_gap(self) -> bool:
@@ -130,7 +156,7 @@ class Tresca(FrictionLaw):
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return the given bound."""
-        return np.broadcast_to(self.bound_value, sigma_n.shape).astype(float)
+        return np.broadcast_to(_numbers("bound_value", self.bound_value), sigma_n.shape).astype(float)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return zeros."""
@@ -138,7 +164,11 @@ class Tresca(FrictionLaw):
 
     def scaled(self, stress_scale: float) -> "Tresca":
         """Return the law with its bound in units of `stress_scale`."""
-        return Tresca(self.bound_value / _check_scale(stress_scale))
+        return Tresca(_numbers("bound_value", self.bound_value) / _check_scale(stress_scale))
+
+    def at(self, points: FloatArray) -> "Tresca":
+        """Return the law with its bound evaluated at (n_contact, 2) points [m]."""
+        return replace(self, **_evaluated(self, points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +177,11 @@ class Coulomb(FrictionLaw):
 
     Parameters
     ----------
-    friction_coefficient : float or (n_contact,) array [-]
+    friction_coefficient : Coefficient [-]
         s, not negative.
     """
 
-    friction_coefficient: float | FloatArray
+    friction_coefficient: Coefficient
 
     def __post_init__(self) -> None:
         value = _coefficient("friction_coefficient", self.friction_coefficient)
@@ -160,20 +190,26 @@ class Coulomb(FrictionLaw):
     @property
     def is_frictionless(self) -> bool:
         """Whether the friction coefficient is zero."""
-        return not np.any(self.friction_coefficient)
+        return _is_zero(self.friction_coefficient)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``s |sigma_n|`` (zero under tension, which no solution contains)."""
-        return np.asarray(self.friction_coefficient * np.maximum(-sigma_n, 0.0))
+        s = _numbers("friction_coefficient", self.friction_coefficient)
+        return np.asarray(s * np.maximum(-sigma_n, 0.0))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``-s`` (zero under tension)."""
-        return np.where(sigma_n <= 0.0, -np.asarray(self.friction_coefficient), 0.0)
+        s = _numbers("friction_coefficient", self.friction_coefficient)
+        return np.where(sigma_n <= 0.0, -np.asarray(s), 0.0)
 
     def scaled(self, stress_scale: float) -> "Coulomb":
         """Return the law itself, which knows no stress."""
         _check_scale(stress_scale)
         return self
+
+    def at(self, points: FloatArray) -> "Coulomb":
+        """Return the law with its coefficient evaluated at (n_contact, 2) points [m]."""
+        return replace(self, **_evaluated(self, points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,11 +218,11 @@ class CohesiveCoulomb(FrictionLaw):
 
     Parameters
     ----------
-    friction_coefficient : float or (n_contact,) array [-]
+    friction_coefficient : Coefficient [-]
         s, not negative.
-    cohesion : float or (n_contact,) array [Pa]
+    cohesion : Coefficient [Pa]
         c, not negative; acts while the node is closed and ends when it opens.
-    cap : float or (n_contact,) array [Pa]
+    cap : Coefficient [Pa]
         tau_max, not below the cohesion; infinite by default.
 
     Notes
@@ -195,15 +231,15 @@ class CohesiveCoulomb(FrictionLaw):
     not have a solution; drivers then say so by their status.
     """
 
-    friction_coefficient: float | FloatArray
-    cohesion: float | FloatArray = 0.0
-    cap: float | FloatArray = float("inf")
+    friction_coefficient: Coefficient
+    cohesion: Coefficient = 0.0
+    cap: Coefficient = float("inf")
 
     def __post_init__(self) -> None:
         for name in ("friction_coefficient", "cohesion"):
             object.__setattr__(self, name, _coefficient(name, getattr(self, name)))
         object.__setattr__(self, "cap", _coefficient("cap", self.cap, may_be_infinite=True))
-        if np.any(np.asarray(self.cap) < np.asarray(self.cohesion)):
+        if not (callable(self.cap) or callable(self.cohesion)) and np.any(self.cap < np.asarray(self.cohesion)):
             raise ValueError(
                 f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
                 "the cap bounds cohesion and friction together, so give cap >= cohesion"
@@ -212,24 +248,30 @@ class CohesiveCoulomb(FrictionLaw):
     @property
     def is_frictionless(self) -> bool:
         """Whether friction coefficient and cohesion are zero, or the cap is."""
-        return not np.any(self.cap) or not (np.any(self.friction_coefficient) or np.any(self.cohesion))
+        return _is_zero(self.cap) or (_is_zero(self.friction_coefficient) and _is_zero(self.cohesion))
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``min(c + s |sigma_n|, tau_max)``."""
-        return np.minimum(self._uncapped(sigma_n), self.cap)
+        return np.minimum(self._uncapped(sigma_n), _numbers("cap", self.cap))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
-        is_rising = (self._uncapped(sigma_n) < self.cap) & (sigma_n <= 0.0)
-        return np.where(is_rising, -np.asarray(self.friction_coefficient), 0.0)
+        is_rising = (self._uncapped(sigma_n) < _numbers("cap", self.cap)) & (sigma_n <= 0.0)
+        return np.where(is_rising, -np.asarray(_numbers("friction_coefficient", self.friction_coefficient)), 0.0)
 
     def scaled(self, stress_scale: float) -> "CohesiveCoulomb":
         """Return the law with cohesion and cap in units of `stress_scale`."""
         scale = _check_scale(stress_scale)
-        return CohesiveCoulomb(self.friction_coefficient, self.cohesion / scale, self.cap / scale)
+        cohesion, cap = _numbers("cohesion", self.cohesion), _numbers("cap", self.cap)
+        return CohesiveCoulomb(self.friction_coefficient, cohesion / scale, cap / scale)
+
+    def at(self, points: FloatArray) -> "CohesiveCoulomb":
+        """Return the law with its coefficients evaluated at (n_contact, 2) points [m]."""
+        return replace(self, **_evaluated(self, points))
 
     def _uncapped(self, sigma_n: FloatArray) -> FloatArray:
-        return np.asarray(self.cohesion + self.friction_coefficient * np.maximum(-sigma_n, 0.0))
+        s = _numbers("friction_coefficient", self.friction_coefficient)
+        return np.asarray(_numbers("cohesion", self.cohesion) + s * np.maximum(-sigma_n, 0.0))
 
 
 @dataclass(frozen=True)
@@ -255,7 +297,7 @@ class RescaledLaw(FrictionLaw):
         return self.law.is_frictionless
 
     @property
-    def acts_across_gap(self) -> bool:
+    def acts_across_gap(self) -> bool | BoolArray:
         """What the law says."""
         return self.law.acts_across_gap
 
@@ -268,8 +310,11 @@ class RescaledLaw(FrictionLaw):
         return self.law.bound_derivative(sigma_n * self.stress_scale)
 
 
-def _coefficient(name: str, value: float | FloatArray, *, may_be_infinite: bool = False) -> float | FloatArray:
-    """Check a coefficient and return it as a float or a read-only array of its own."""
+def _coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:
+    """Check a coefficient and return it as a float, a read-only array of its own, or the formula it is."""
+    if callable(value):
+        check_field(value, name)
+        return value
     array = np.array(value, dtype=float)
     if array.ndim > 1:
         raise ValueError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
@@ -281,6 +326,35 @@ def _coefficient(name: str, value: float | FloatArray, *, may_be_infinite: bool 
         return float(array)
     read_only(array)
     return array
+
+
+def _numbers(name: str, value: Coefficient) -> float | FloatArray:
+    """Return a coefficient that is known in numbers."""
+    if callable(value):
+        raise ValueError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
+    return value
+
+
+def _is_zero(value: Coefficient) -> bool:
+    """Whether a coefficient is known to vanish everywhere."""
+    return not callable(value) and not np.any(value)
+
+
+def _evaluated(law: Tresca | Coulomb | CohesiveCoulomb, points: FloatArray) -> dict[str, FloatArray]:
+    """Evaluate every coefficient of a law that is a formula or function at (n_contact, 2) points [m]."""
+    values = {}
+    for entry in fields(law):
+        coefficient = getattr(law, entry.name)
+        if callable(coefficient):
+            values[entry.name] = evaluate_field(coefficient, points)
+            node = int(np.argmin(values[entry.name]))
+            if values[entry.name][node] < 0.0:
+                x, y = points[node]
+                raise ValueError(
+                    f"{entry.name} = {coefficient!r} is {values[entry.name][node]:g} at (x, y) = ({x:.6g}, {y:.6g}); "
+                    "it must be zero or positive on the whole contact part"
+                )
+    return values
 
 
 def _check_scale(stress_scale: float) -> float:

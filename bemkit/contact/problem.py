@@ -125,9 +125,9 @@ class ContactProblem:
         return self._where_acting(self._ask_law("bound_derivative", np.minimum(sigma_n, 0.0)), is_closed)
 
     def _where_acting(self, values: FloatArray, is_closed: BoolArray | None) -> FloatArray:
-        if is_closed is None or self.law.acts_across_gap:
+        if is_closed is None:
             return values
-        return np.where(is_closed, values, 0.0)
+        return np.where(is_closed | np.asarray(self.law.acts_across_gap), values, 0.0)
 
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
         name = f"friction law {type(self.law).__name__}.{method}"

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
 
@@ -128,22 +129,48 @@ class ConstantSpace:
         return np.ones((1, xi.size))
 
 
-def _endpoint_dofs(mesh: BoundaryMesh, broken: BoolArray | None) -> tuple[IntArray, int]:
-    """Give the end points of the elements their dofs, and a broken node one for each side."""
-    dofs = mesh.elements.copy()
-    n_scalar = mesh.n_nodes
-    if broken is not None and broken.any():
-        n_extra = int(broken.sum())
-        second = np.full(mesh.n_nodes, -1)
-        second[broken] = n_scalar + np.arange(n_extra)
-        incoming_end = mesh.elements[:, 1]
-        dofs[:, 1] = np.where(broken[incoming_end], second[incoming_end], incoming_end)
-        n_scalar += n_extra
-    return dofs, n_scalar
+@dataclass(frozen=True, eq=False)
+class _NodalSpace:
+    """Polynomials with a dof at each end of an element, shared with the neighbour unless the node is broken."""
+
+    mesh: BoundaryMesh
+    broken: BoolArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.broken is not None and self.broken.shape != (self.mesh.n_nodes,):
+            raise GeometryError(
+                f"broken has the shape {self.broken.shape}: give one flag for each of the {self.mesh.n_nodes} nodes"
+            )
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether no node is broken."""
+        return self.broken is None or not bool(self.broken.any())
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of vector dofs."""
+        return 2 * (int(self.element_dofs.max()) + 1)
+
+    @cached_property
+    def element_dofs(self) -> IntArray:
+        """(n_elements, n_local) array of scalar dofs."""
+        return self._end_dofs
+
+    @cached_property
+    def _end_dofs(self) -> IntArray:
+        """Dofs of the start and the end of each element; the element that ends at a broken node has one of its own."""
+        dofs = self.mesh.elements.copy()
+        if self.broken is not None:
+            own = np.full(self.mesh.n_nodes, -1)
+            own[self.broken] = self.mesh.n_nodes + np.arange(int(self.broken.sum()))
+            end = self.mesh.elements[:, 1]
+            dofs[:, 1] = np.where(self.broken[end], own[end], end)
+        return dofs
 
 
 @dataclass(frozen=True, eq=False)
-class LinearSpace:
+class LinearSpace(_NodalSpace):
     """Piecewise linear functions, continuous except at the nodes named in `broken`.
 
     Parameters
@@ -151,34 +178,17 @@ class LinearSpace:
     mesh : BoundaryMesh
     broken : (n_nodes,) bool array, optional
         Nodes where the function may jump (tractions jump at corners). `corner_nodes(mesh)` finds the corners.
-    """
 
-    mesh: BoundaryMesh
-    broken: BoolArray | None = None
+    Raises
+    ------
+    GeometryError
+        If `broken` does not have one flag for each node.
+    """
 
     @property
     def degree(self) -> int:
         """Polynomial degree 1."""
         return 1
-
-    @property
-    def is_continuous(self) -> bool:
-        """Whether no node is broken."""
-        return self.broken is None or not bool(self.broken.any())
-
-    @cached_property
-    def _numbering(self) -> tuple[IntArray, int]:
-        return _endpoint_dofs(self.mesh, self.broken)
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of vector dofs."""
-        return 2 * self._numbering[1]
-
-    @property
-    def element_dofs(self) -> IntArray:
-        """(n_elements, 2) array of scalar dofs: start, end."""
-        return self._numbering[0]
 
     @cached_property
     def local_nodes(self) -> FloatArray:
@@ -191,7 +201,7 @@ class LinearSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticSpace:
+class QuadraticSpace(_NodalSpace):
     """Piecewise quadratic functions, continuous except at the nodes named in `broken`.
 
     Parameters
@@ -199,36 +209,24 @@ class QuadraticSpace:
     mesh : BoundaryMesh
     broken : (n_nodes,) bool array, optional
         Nodes where the function may jump.
-    """
 
-    mesh: BoundaryMesh
-    broken: BoolArray | None = None
+    Raises
+    ------
+    GeometryError
+        If `broken` does not have one flag for each node.
+    """
 
     @property
     def degree(self) -> int:
         """Polynomial degree 2."""
         return 2
 
-    @property
-    def is_continuous(self) -> bool:
-        """Whether no node is broken."""
-        return self.broken is None or not bool(self.broken.any())
-
     @cached_property
-    def _numbering(self) -> tuple[IntArray, int]:
-        ends, n_ends = _endpoint_dofs(self.mesh, self.broken)
-        middle = n_ends + np.arange(self.mesh.n_elements)
-        return np.column_stack([ends[:, 0], middle, ends[:, 1]]), n_ends + self.mesh.n_elements
-
-    @property
-    def n_dofs(self) -> int:
-        """Number of vector dofs."""
-        return 2 * self._numbering[1]
-
-    @property
     def element_dofs(self) -> IntArray:
         """(n_elements, 3) array of scalar dofs: start, middle, end."""
-        return self._numbering[0]
+        ends = self._end_dofs
+        middle = int(ends.max()) + 1 + np.arange(self.mesh.n_elements)
+        return np.column_stack([ends[:, 0], middle, ends[:, 1]])
 
     @cached_property
     def local_nodes(self) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
 
 
 def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> FloatArray:
@@ -28,3 +29,20 @@ def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> Floa
     motions[:, 0, 2] = -(points[:, 1] - centre[1]) / length
     motions[:, 1, 2] = (points[:, 0] - centre[0]) / length
     return motions
+
+
+def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
+    """Return the motions of a body that cause no tractions at all.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    points : (n, 2) array [m]
+
+    Returns
+    -------
+    (2 n, n_motions) array
+        The three rigid motions, component-wise; none for an exterior, which is at rest at infinity.
+    """
+    motions = rigid_motions(points, mesh.centre, mesh.diameter).reshape(-1, 3)
+    return motions[:, :0] if mesh.is_exterior else motions

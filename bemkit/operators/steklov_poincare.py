@@ -1,8 +1,12 @@
 """Steklov-Poincare maps: from the displacement of the boundary to its tractions, by Galerkin or by collocation.
 
-Both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map does. Discretisation
-alone would break it slightly, and with it the independence of the arbitrary constant in the logarithm of the single
-layer.
+On bounded bodies both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map
+does. Discretisation alone would break it slightly, and with it the independence of the arbitrary constant in the
+logarithm of the single layer.
+
+On the exterior of a body (`BoundaryMesh.is_exterior`) no motion is free of tractions, and tractions may have a
+resultant F. The displacement then grows like F log(r / r0) with the distance r, and nothing but the choice of r0, the
+diameter of the mesh, fixes its constant; without a resultant it vanishes at infinity, rotation included.
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ from bemkit.operators.collocation import collocation_matrices
 from bemkit.operators.dense import Cholesky, DenseLU, multiply
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.rigid import rigid_motions
+from bemkit.operators.rigid import resting_motions
 
 Field = Callable[[FloatArray], FloatArray]
 """A vector field: (n, 2) points [m] -> (n, 2) values."""
@@ -42,11 +46,15 @@ class CondensedMap:
     recover : callable
         (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x
         and y.
+    under : callable
+        Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
+        nodes -> the same body under them, without another factorisation.
     """
 
     stiffness: FloatArray
     load: FloatArray
     recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    under: Callable[[FloatArray, FloatArray], CondensedMap]
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +137,13 @@ class GalerkinMap:
         assemble(v, k, w)
         identity = mass(u, t).matrix()
         factor = Cholesky(v.matrix(), "the single layer operator")
-        motions = rigid_motions(dof_points(u), self.mesh.centre, self.mesh.diameter).reshape(u.n_dofs, 3)
-        # quadrature on curved elements would leave rigid motions a little stiffness, and forces out of equilibrium
+        motions = resting_motions(self.mesh, dof_points(u))
+        # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
         at_rest, _ = np.linalg.qr(motions)
         strained = factor.solve_lower(_without(0.5 * identity + k.matrix(), at_rest))
-        resultant, _ = np.linalg.qr(factor.solve_lower(multiply(identity, motions)))
-        strained -= multiply(resultant, multiply(resultant.T, strained))
+        resultant, _ = np.linalg.qr(factor.solve_lower(identity @ motions))
+        if motions.shape[1]:
+            strained -= multiply(resultant, multiply(resultant.T, strained))
         hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
         return GalerkinFactors(_symmetric_sum(hyper, strained), factor, strained)
 
@@ -154,28 +163,33 @@ class GalerkinMap:
         """Eliminate every direction that is not open by a Schur complement."""
         n = force.shape[0]
         matrix = _rotate_rows(_rotate_columns(self.matrix(), conditions.frame), conditions.frame)
-        local_force = np.einsum("nkc,nc->nk", conditions.frame, force).ravel()
         free, is_open, fixed = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
         )
-        prescribed = conditions.displacement.ravel()[fixed]
         factor = Cholesky(matrix[np.ix_(free, free)], "the body held by its supports and its contact boundary")
-        rest = local_force[free] - matrix[np.ix_(free, fixed)] @ prescribed
         coupling = matrix[np.ix_(free, is_open)]
-        solved = factor.solve(np.column_stack([rest, coupling]))
-        at_rest, response = solved[:, 0], solved[:, 1:]
+        response = factor.solve(coupling)
         stiffness = matrix[np.ix_(is_open, is_open)] - multiply(coupling.T, response)
-        load = local_force[is_open] - matrix[np.ix_(is_open, fixed)] @ prescribed - coupling.T @ at_rest
+        stiffness = 0.5 * (stiffness + stiffness.T)
+        of_fixed = matrix[:, fixed]
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            local = np.empty(2 * n)
-            local[fixed] = prescribed
-            local[is_open] = open_displacement
-            local[free] = at_rest - response @ open_displacement
-            displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(n, 2))
-            return displacement, (self.matrix() @ displacement.ravel()).reshape(n, 2)
+        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
+            prescribed = displacement.ravel()[fixed]
+            known = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() - of_fixed @ prescribed
+            at_rest = factor.solve(known[free])
+            load = known[is_open] - coupling.T @ at_rest
 
-        return CondensedMap(0.5 * (stiffness + stiffness.T), load, recover)
+            def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+                local = np.empty(2 * n)
+                local[fixed] = prescribed
+                local[is_open] = open_displacement
+                local[free] = at_rest - response @ open_displacement
+                displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(n, 2))
+                return displacement, (self.matrix() @ displacement.ravel()).reshape(n, 2)
+
+            return CondensedMap(stiffness, load, recover, under)
+
+        return under(force, conditions.displacement)
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m]."""
@@ -219,7 +233,7 @@ class CollocationMap:
 
     @cached_property
     def _motions(self) -> FloatArray:
-        return rigid_motions(self.mesh.centres, self.mesh.centre, self.mesh.diameter).reshape(-1, 3)
+        return resting_motions(self.mesh, self.mesh.centres)
 
     @cached_property
     def _matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -234,7 +248,9 @@ class CollocationMap:
         factor = DenseLU(
             self._bordered(single, np.ones(single.shape[1], bool), self._motions), "the single layer operator"
         )
-        tractions = factor.solve(np.vstack([double, np.zeros((3, double.shape[1]))]))[:-3]
+        tractions = factor.solve(np.vstack([double, np.zeros((self._motions.shape[1], double.shape[1]))]))[
+            : len(double)
+        ]
         matrix: FloatArray = self._weights[:, None] * tractions
         read_only(matrix)
         return matrix
@@ -250,7 +266,8 @@ class CollocationMap:
     def _bordered(self, columns: FloatArray, is_traction: BoolArray, motions: FloatArray) -> FloatArray:
         """Border a system with the rigid motion c and the resultants of its traction unknowns, by the mean length."""
         n = columns.shape[0]
-        bordered = np.zeros((n + 3, n + 3), order="F")
+        order = n + self._motions.shape[1]
+        bordered = np.zeros((order, order), order="F")
         bordered[:n, :n] = columns
         bordered[:n, n:] = self._motions
         scale = self._weights / self._weights.mean()
@@ -262,38 +279,40 @@ class CollocationMap:
         n = force.shape[0]
         single, double = (_rotate_columns(matrix, conditions.frame) for matrix in self._matrices)
         motions = _rotate_columns(self._motions.T, conditions.frame).T
-        traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / self._weights
         free, is_open, fixed = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
         )
-        prescribed = conditions.displacement.ravel()[fixed]
         is_traction = ~conditions.is_free.ravel()
         factor = DenseLU(
             self._bordered(np.where(is_traction, -single, double), is_traction, motions),
             "the body held by its supports and its contact boundary",
         )
-        right = np.zeros((2 * n + 3, 1 + is_open.size), order="F")
-        right[:-3, 0] = single[:, free] @ traction[free] - double[:, fixed] @ prescribed
-        scale = self._weights / self._weights.mean()
-        right[-3:, 0] = -(scale[free, None] * motions[free]).T @ traction[free]
-        right[:-3, 1:] = -double[:, is_open]
-        solved = factor.solve(right)
-        at_rest, response = solved[:-3, 0], solved[:-3, 1:]
+        right = np.zeros((2 * n + motions.shape[1], is_open.size), order="F")
+        right[: 2 * n] = -double[:, is_open]
+        response = factor.solve(right)[: 2 * n]
+        of_traction, of_fixed, resting = single[:, free], double[:, fixed], motions[free]
+        scale = (self._weights / self._weights.mean())[free]
         weights = self._weights[is_open]
-        stiffness = weights[:, None] * response[is_open]
-        load = weights * (traction[is_open] - at_rest[is_open])
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            unknowns = at_rest + response @ open_displacement
-            local = np.where(is_traction, 0.0, unknowns)
-            local[fixed] = prescribed
-            local[is_open] = open_displacement
-            local_force = self._weights * np.where(is_traction, unknowns, traction)
-            to_plane = conditions.frame
-            displacement = np.einsum("nkc,nk->nc", to_plane, local.reshape(n, 2))
-            return displacement, np.einsum("nkc,nk->nc", to_plane, local_force.reshape(n, 2))
+        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
+            traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / self._weights
+            prescribed = displacement.ravel()[fixed]
+            known = of_traction @ traction[free] - of_fixed @ prescribed
+            at_rest = factor.solve(np.concatenate([known, -(scale * traction[free]) @ resting]))[: 2 * n]
+            load = weights * (traction[is_open] - at_rest[is_open])
 
-        return CondensedMap(stiffness, load, recover)
+            def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+                unknowns = at_rest + response @ open_displacement
+                local = np.where(is_traction, 0.0, unknowns)
+                local[fixed] = prescribed
+                local[is_open] = open_displacement
+                local_force = self._weights * np.where(is_traction, unknowns, traction)
+                displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(n, 2))
+                return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(n, 2))
+
+            return CondensedMap(weights[:, None] * response[is_open], load, recover, under)
+
+        return under(force, conditions.displacement)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) tractions."""
@@ -326,6 +345,8 @@ def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
     """Return the matrix made to vanish on some orthonormal motions (n_dofs, n_motions)."""
+    if not motions.shape[1]:
+        return matrix
     return matrix - multiply(multiply(matrix, motions), np.ascontiguousarray(motions.T))
 
 

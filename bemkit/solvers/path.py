@@ -71,7 +71,8 @@ class _Piece(NamedTuple):
 
 def path_exists(problem: ContactProblem) -> bool:
     """Return whether the law is continuous where nodes open, which following the path takes for granted."""
-    return problem.law.acts_across_gap or not problem.friction_bound(np.zeros(problem.n_contact)).any()
+    jumps = problem.friction_bound(np.zeros(problem.n_contact)) > 0.0
+    return not np.any(jumps & ~np.asarray(problem.law.acts_across_gap))
 
 
 def follow_path(problem: ContactProblem, bound: AffineBound, max_pieces: int | None = None) -> PathEnd:

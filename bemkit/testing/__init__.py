@@ -1,5 +1,8 @@
 """Checks that implementations, ours and yours, keep the promises of bemkit's protocols."""
 
-from bemkit.testing.laws import check_law
-
-__all__ = ["check_law"]
+from bemkit.testing.curves import check_curve as check_curve
+from bemkit.testing.failure import CheckFailed as CheckFailed
+from bemkit.testing.laws import check_law as check_law
+from bemkit.testing.operators import check_double_layer as check_double_layer
+from bemkit.testing.operators import check_operator as check_operator
+from bemkit.testing.spaces import check_space as check_space

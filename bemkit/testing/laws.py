@@ -4,6 +4,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
+from bemkit.testing.failure import CheckFailed, demand
 
 
 def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5, seed: int = 0) -> None:
@@ -21,7 +22,7 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
 
     Raises
     ------
-    AssertionError
+    CheckFailed
         Naming the law, the promise broken, and where.
     """
     name = type(law).__name__
@@ -34,7 +35,7 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
         _check_locality(law, name, sigma_n)
         _check_scaling(law, name, sigma_n)
     _check_values(law, name, np.zeros(n_contact))
-    _demand(isinstance(law.acts_across_gap, bool), f"{name}.acts_across_gap is no bool")
+    demand(isinstance(law.acts_across_gap, bool), f"{name}.acts_across_gap is no bool")
 
 
 def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
@@ -42,19 +43,19 @@ def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     for method in (law.bound, law.bound_derivative):
         values = method(sigma_n)
         label = f"{name}.{method.__name__}"
-        _demand(np.shape(values) == sigma_n.shape, f"{label} returns the shape {np.shape(values)} for {sigma_n.shape}")
-        _demand(bool(np.isfinite(values).all()), f"{label} is not finite at sigma_n = {sigma_n}")
-        _demand(np.array_equal(sigma_n, given), f"{label} changes its argument")
-        _demand(np.array_equal(values, method(sigma_n)), f"{label} gives two answers to one question")
-    _demand(bool((law.bound(sigma_n) >= 0.0).all()), f"{name}.bound is negative at sigma_n = {sigma_n}")
-    _demand(bool((law.bound_derivative(sigma_n) <= 0.0).all()), f"{name}.bound_derivative is positive at {sigma_n}")
+        demand(np.shape(values) == sigma_n.shape, f"{label} returns the shape {np.shape(values)} for {sigma_n.shape}")
+        demand(bool(np.isfinite(values).all()), f"{label} is not finite at sigma_n = {sigma_n}")
+        demand(np.array_equal(sigma_n, given), f"{label} changes its argument")
+        demand(np.array_equal(values, method(sigma_n)), f"{label} gives two answers to one question")
+    demand(bool((law.bound(sigma_n) >= 0.0).all()), f"{name}.bound is negative at sigma_n = {sigma_n}")
+    demand(bool((law.bound_derivative(sigma_n) <= 0.0).all()), f"{name}.bound_derivative is positive at {sigma_n}")
     is_zero = not law.bound(sigma_n).any()
-    _demand(is_zero or not law.is_frictionless, f"{name} says it is frictionless and has a bound at {sigma_n}")
+    demand(is_zero or not law.is_frictionless, f"{name} says it is frictionless and has a bound at {sigma_n}")
 
 
 def _check_monotony(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     less, more = law.bound(sigma_n), law.bound(2.0 * sigma_n)
-    _demand(bool((more >= less).all()), f"{name}.bound falls when the pressure grows from {-sigma_n} to twice that")
+    demand(bool((more >= less).all()), f"{name}.bound falls when the pressure grows from {-sigma_n} to twice that")
 
 
 def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
@@ -70,7 +71,7 @@ def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     fits = (low <= derivative) & (derivative <= high)
     if not fits.all():
         node = int(np.argmin(fits))
-        raise AssertionError(
+        raise CheckFailed(
             f"{name}.bound_derivative is {derivative[node]:g} at node {node}, sigma_n = {sigma_n[node]:g}; "
             f"differences of bound give {before[node]:g} and {after[node]:g}"
         )
@@ -80,18 +81,13 @@ def _check_locality(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     other = sigma_n.copy()
     other[1:] *= 3.0
     is_local = law.bound(other)[0] == law.bound(sigma_n)[0]
-    _demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
+    demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
 
 
 def _check_scaling(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
     unit = 1e6
     scaled = law.scaled(unit)
     agrees = np.allclose(unit * scaled.bound(sigma_n / unit), law.bound(sigma_n), rtol=1e-12, atol=0.0)
-    _demand(agrees, f"{name}.scaled({unit:g}).bound is not the bound in that unit")
+    demand(agrees, f"{name}.scaled({unit:g}).bound is not the bound in that unit")
     agrees = np.allclose(scaled.bound_derivative(sigma_n / unit), law.bound_derivative(sigma_n), rtol=1e-9, atol=1e-15)
-    _demand(agrees, f"{name}.scaled({unit:g}).bound_derivative changes with the unit")
-
-
-def _demand(is_kept: bool, message: str) -> None:
-    if not is_kept:
-        raise AssertionError(message)
+    demand(agrees, f"{name}.scaled({unit:g}).bound_derivative changes with the unit")

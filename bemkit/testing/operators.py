@@ -1,0 +1,132 @@
+"""Conformance of boundary operators."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.space import dof_points
+from bemkit.operators.boundary import BoundaryOperator, DoubleLayer, Tag, mass
+from bemkit.operators.rigid import rigid_motions
+from bemkit.testing.failure import demand
+
+
+def check_operator(
+    operator: BoundaryOperator, *, adjoint: BoundaryOperator | None = None, rtol: float = 1e-11, seed: int = 0
+) -> None:
+    """Check everything that `BoundaryOperator` promises, each of its tags included; call it on your own operator.
+
+    Parameters
+    ----------
+    operator : BoundaryOperator
+        Fresh: if it has the property `is_assembled`, as all of bemkit's own do, that must still be False, which
+        proves that the matrix is built on first use.
+    adjoint : BoundaryOperator, optional
+        Another operator that claims to be its adjoint.
+    rtol : float
+        Allowed errors, relative to the largest entry of the matrix: those of its integrals and of sums over a row.
+    seed : int
+        Of the vectors tried.
+
+    Raises
+    ------
+    CheckFailed
+        Naming the operator, the promise broken, and by how much.
+    """
+    name = type(operator).__name__
+    demand(operator.trial.mesh is operator.test.mesh, f"{name}: trial and test space live on different meshes")
+    demand(
+        isinstance(operator.tags, frozenset) and all(isinstance(tag, Tag) for tag in operator.tags),
+        f"{name}.tags is {operator.tags!r}, not a frozenset of Tag",
+    )
+    demand(
+        not getattr(operator, "is_assembled", False),
+        f"{name} is assembled before its matrix is asked for: pass a fresh one",
+    )
+    matrix = _checked_matrix(operator, name)
+    random = np.random.default_rng(seed)
+    _check_linear_operator(operator, name, matrix, rtol, random)
+    for tag in sorted(operator.tags, key=lambda tag: tag.name):
+        _check_tag(tag, operator, name, matrix, rtol)
+    if adjoint is not None:
+        other = adjoint.matrix()
+        expected = matrix.T.shape
+        demand(other.shape == expected, f"the adjoint of {name} has the shape {other.shape}, not {expected}")
+        _small(other - matrix.T, matrix, rtol, f"{type(adjoint).__name__} is not the transpose of {name}: it differs")
+
+
+def check_double_layer(operator: DoubleLayer, *, rtol: float = 1e-11) -> None:
+    """Check that a double layer turns rigid motions of the body into minus one half of themselves.
+
+    Parameters
+    ----------
+    operator : DoubleLayer
+        On the boundary of a bounded body; outside of a closed boundary the factor is plus one half.
+    rtol : float
+        Allowed error, relative to the largest entry of the matrix.
+
+    Raises
+    ------
+    CheckFailed
+        Saying by how much.
+    """
+    factor = -0.5 if operator.trial.mesh.is_exterior else 0.5
+    combined = factor * mass(operator.trial, operator.test).matrix() + operator.matrix()
+    sign = "-" if factor < 0.0 else ""
+    _small(
+        combined @ _motions(operator), combined, rtol, f"({sign}1/2 M + K) r of a rigid motion is not zero: it differs"
+    )
+
+
+def _checked_matrix(operator: BoundaryOperator, name: str) -> FloatArray:
+    matrix = operator.matrix()
+    shape = (operator.test.n_dofs, operator.trial.n_dofs)
+    demand(isinstance(matrix, np.ndarray) and matrix.dtype == np.float64, f"{name}.matrix() is not an array of doubles")
+    demand(matrix.shape == shape, f"{name}.matrix() has the shape {matrix.shape}, not (test, trial) dofs {shape}")
+    demand(bool(np.isfinite(matrix).all()), f"{name}.matrix() holds {np.sum(~np.isfinite(matrix))} entries not finite")
+    demand(not matrix.flags.writeable, f"{name}.matrix() can be written to")
+    demand(operator.matrix() is matrix, f"{name}.matrix() is built anew at every call")
+    return matrix
+
+
+def _check_linear_operator(
+    operator: BoundaryOperator, name: str, matrix: FloatArray, rtol: float, random: np.random.Generator
+) -> None:
+    linear = operator.as_linear_operator()
+    demand(linear.shape == matrix.shape, f"{name}.as_linear_operator() has the shape {linear.shape}")
+    x, y = random.normal(size=matrix.shape[1]), random.normal(size=matrix.shape[0])
+    _small(linear.matvec(x) - matrix @ x, matrix, rtol, f"{name}.as_linear_operator() is not the matrix: it differs")
+    _small(linear.rmatvec(y) - y @ matrix, matrix, rtol, f"{name}.as_linear_operator() has a wrong adjoint: it differs")
+    gap = abs(float(y @ linear.matvec(x) - linear.rmatvec(y) @ x))
+    size = float(np.abs(y) @ np.abs(matrix) @ np.abs(x))
+    demand(gap <= rtol * size, f"{name}.as_linear_operator() fails the dot test by {gap / size:.3g}")
+
+
+def _check_tag(tag: Tag, operator: BoundaryOperator, name: str, matrix: FloatArray, rtol: float) -> None:
+    label = f"{name} says it is {tag.value}: it"
+    if tag is Tag.KILLS_RIGID_MOTIONS:
+        _small(matrix @ _motions(operator), matrix, rtol, f"{label} differs")
+        return
+    if tag is Tag.KILLS_TRANSLATIONS:
+        _small(matrix @ _motions(operator)[:, :2], matrix, rtol, f"{label} differs")
+        return
+    demand(matrix.shape[0] == matrix.shape[1], f"{label} is not square")
+    if tag is Tag.SYMMETRIC:
+        _small(matrix - matrix.T, matrix, rtol, f"{label} differs")
+        return
+    eigenvalues = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+    lowest, highest = float(eigenvalues[0]), float(np.abs(eigenvalues).max())
+    # round-off may move eigenvalues by about n eps times the largest
+    floor = matrix.shape[0] * 2.3e-16 * highest if tag is Tag.POSITIVE_DEFINITE else -rtol * highest
+    demand(lowest > floor, f"{label} has the eigenvalue {lowest:.3g} next to {highest:.3g}")
+
+
+def _motions(operator: BoundaryOperator) -> FloatArray:
+    mesh = operator.trial.mesh
+    return rigid_motions(dof_points(operator.trial), mesh.centre, mesh.diameter).reshape(-1, 3)
+
+
+def _small(error: FloatArray, matrix: FloatArray, rtol: float, what: str) -> None:
+    size = float(np.abs(matrix).max())
+    worst = float(np.abs(error).max())
+    demand(worst <= rtol * size, f"{what} by {worst:.3g} where entries reach {size:.3g}")
