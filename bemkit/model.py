@@ -8,7 +8,8 @@ it is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.nodal import Support
+from bemkit.geometry.space import BoundarySpace
+from bemkit.operators.nodal import Support, supported
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 from bemkit.scene import (
     Clamped,
@@ -90,6 +92,31 @@ class Model:
     nodes: ContactNodes
     problem: ContactProblem
 
+    def under(self, scene: Scene) -> Model:
+        """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
+
+        Parameters
+        ----------
+        scene : Scene
+            Differs from this model's in numbers of its conditions, its law and its solver alone.
+
+        Raises
+        ------
+        ValueError
+            If the scene has another body, other parts, or other kinds of conditions.
+        """
+        _check_same_body(self.scene, scene)
+        space = self.elastic.displacement_space
+        prescribed = supported(space, _supports(scene, self.mesh, self.units)).displacement
+        body = self.body.under(prescribed, _nodal_forces(scene, self.mesh, self.elastic, self.units))
+        problem = _problem(scene, self.mesh, self.units, body, space)
+        return replace(self, scene=scene, body=body, problem=problem)
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], FloatArray]:
+        """The part of each contact node and its arc length along it [m]; see `contact_places`."""
+        return contact_places(self.scene, self.mesh, self.elastic.displacement_space, self.nodes)
+
     def boundary_fields(self, state: ContactState) -> tuple[FloatArray, FloatArray, float]:
         """Return the physical fields of a contact state on the whole boundary.
 
@@ -127,7 +154,7 @@ class Model:
         traction[elements] = at_nodes[space.element_dofs[elements]].mean(axis=1)
 
 
-def build_model(scene: Scene, mesh: BoundaryMesh) -> Model:
+def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Model:
     """Assemble the operators of a scene and condense the body onto its contact boundary.
 
     Parameters
@@ -135,6 +162,8 @@ def build_model(scene: Scene, mesh: BoundaryMesh) -> Model:
     scene : Scene
     mesh : BoundaryMesh
         As made by `Scene.build_mesh`, or a refinement of it.
+    units : Units, optional
+        By default `find_units` of the scene.
 
     Returns
     -------
@@ -146,23 +175,60 @@ def build_model(scene: Scene, mesh: BoundaryMesh) -> Model:
         If the supports contradict each other or do not hold the body even with glued contact, or an expression is not
         finite somewhere.
     """
-    units = _units(scene, mesh)
+    units = find_units(scene, mesh) if units is None else units
     unit_mesh = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / units.length)
     elastic = _elastic_map(scene, unit_mesh, units)
+    force = _nodal_forces(scene, mesh, elastic, units)
+    body, nodes = condense(elastic, _supports(scene, mesh, units), contact_elements(scene, mesh), force)
+    problem = _problem(scene, mesh, units, body, elastic.displacement_space)
+    return Model(scene, mesh, units, elastic, body, nodes, problem)
+
+
+def _problem(
+    scene: Scene, mesh: BoundaryMesh, units: Units, body: CondensedBody, space: BoundarySpace
+) -> ContactProblem:
+    parts, _ = contact_places(scene, mesh, space, body.nodes)
+    law = scene.law_at(parts, units.to_physical(body.nodes.points))
+    return ContactProblem(body, _gap(scene, mesh, body.nodes, space, units), law.scaled(units.stress))
+
+
+def _nodal_forces(scene: Scene, mesh: BoundaryMesh, elastic: SteklovPoincare, units: Units) -> FloatArray:
     force = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
     for part, elements, normals in _parts(scene, mesh):
         if isinstance(part.condition, Traction | Pressure):
             for chosen, normal in _by_direction(elements, normals):
                 force += elastic.nodal_forces(chosen, _dimensionless_load(part.condition, normal, units))
-    body, nodes = condense(elastic, _supports(scene, mesh, units), contact_elements(scene, mesh), force)
-    gap = _gap(scene, mesh, nodes, elastic, units)
-    problem = ContactProblem(body, gap, scene.law.scaled(units.stress))
-    return Model(scene, mesh, units, elastic, body, nodes, problem)
+    return force
 
 
 def contact_elements(scene: Scene, mesh: BoundaryMesh) -> IntArray:
     """Return the elements of all contact parts, in order along each."""
     return np.concatenate([along_boundary(mesh, mesh.part(part.name)) for part in scene.contact_parts])
+
+
+def contact_places(
+    scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, nodes: ContactNodes
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the part of each contact node and its arc length along it; a node of two parts belongs to the first.
+
+    Returns
+    -------
+    parts : tuple of n_contact str
+    arc_length : (n_contact,) array [m]
+    """
+    n_scalar = space.n_dofs // 2
+    names: list[str] = [""] * n_scalar
+    arc_length = np.full(n_scalar, np.nan)
+    for part in scene.contact_parts:
+        elements = along_boundary(mesh, mesh.part(part.name))
+        lengths = mesh.lengths[elements]
+        begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+        dofs = space.element_dofs[elements]
+        s = begin[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0)
+        for dof, place in zip(dofs.ravel().tolist(), s.ravel().tolist(), strict=True):
+            if not names[dof]:
+                names[dof], arc_length[dof] = part.name, place
+    return tuple(names[dof] for dof in nodes.nodes.tolist()), arc_length[nodes.nodes]
 
 
 def _elastic_map(scene: Scene, mesh: BoundaryMesh, units: Units) -> SteklovPoincare:
@@ -172,12 +238,28 @@ def _elastic_map(scene: Scene, mesh: BoundaryMesh, units: Units) -> SteklovPoinc
     return GalerkinMap(mesh, material)
 
 
+def _check_same_body(scene: Scene, other: Scene) -> None:
+    for name in ("shape", "material", "discretisation"):
+        if getattr(scene, name) != getattr(other, name):
+            raise ValueError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
+    for part, changed in zip_longest(scene.parts, other.parts):
+        if part is None or changed is None or _layout(part) != _layout(changed):
+            name = (part or changed).name
+            raise ValueError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
+
+
+def _layout(part: Part) -> tuple[object, ...]:
+    condition = part.condition
+    components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
+    return part.name, part.sides, part.where, type(condition), components
+
+
 def _parts(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, FloatArray]]:
     """List the parts with their elements and the outward normals of these."""
     return [(part, mesh.part(part.name), mesh.normals[mesh.part(part.name)]) for part in scene.parts]
 
 
-def _units(scene: Scene, mesh: BoundaryMesh) -> Units:
+def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
     """Choose the units by the largest load, prescribed displacement or interference."""
     modulus, length = scene.material.plane_modulus, mesh.diameter
     stresses = [0.0]
@@ -245,13 +327,13 @@ def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Ca
     return field
 
 
-def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, elastic: SteklovPoincare, units: Units) -> FloatArray:
+def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, space: BoundarySpace, units: Units) -> FloatArray:
     """Measure the gap of each contact node to the nearest obstacle among the parts it belongs to."""
-    gap = np.full(elastic.displacement_space.n_dofs // 2, np.inf)
+    gap = np.full(space.n_dofs // 2, np.inf)
     points = units.to_physical(nodes.points)
     for part in scene.contact_parts:
         if isinstance(part.condition, Contact):
-            own = np.isin(nodes.nodes, elastic.displacement_space.element_dofs[mesh.part(part.name)])
+            own = np.isin(nodes.nodes, space.element_dofs[mesh.part(part.name)])
             measured = part.condition.obstacle.gap(points[own], nodes.normals[own])
             gap[nodes.nodes[own]] = np.minimum(gap[nodes.nodes[own]], measured)
     return gap[nodes.nodes] / units.displacement

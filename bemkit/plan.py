@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.scene import Clamped, ConstantCollocation, LinearGalerkin, PrescribedDisplacement, Roller, Scene
+from bemkit.scene import Clamped, ConstantCollocation, Contact, LinearGalerkin, PrescribedDisplacement, Roller, Scene
 
 _BYTES_PER_NUMBER = 8
 # a direction counts as held when it moves the held nodes by more than round-off of the node positions
@@ -216,13 +216,19 @@ def _contact_items(scene: Scene, mesh: BoundaryMesh) -> Iterator[PlanItem]:
         if n_free
         else "the fixed parts hold all three rigid motions",
     )
-    is_frictionless = scene.law.is_frictionless
+    own = [part.condition.law for part in scene.contact_parts if isinstance(part.condition, Contact)]
+    laws = [scene.law if law is None else law for law in own]
+    names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws if not law.is_frictionless))
+    n_steps = len(scene.load_factors)
+    kind = "static" if n_steps == 1 else "incremental"
+    yield PlanItem("friction", bool(names), f"law {names}, {kind}" if names else "the law allows no tangential traction")
     yield PlanItem(
-        "friction",
-        not is_frictionless,
-        "the law allows no tangential traction" if is_frictionless else f"law {type(scene.law).__name__}, static",
+        "load history",
+        n_steps > 1,
+        f"{n_steps} load steps; slip counts from the end of the step before"
+        if n_steps > 1
+        else "the static law takes the whole load in one step",
     )
-    yield PlanItem("load history", False, "the static law takes the whole load in one step")
 
 
 def _output_items() -> Iterator[PlanItem]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.files import OutputFileError, check_target, replacing
 from bemkit.scene import ConstantCollocation
@@ -173,8 +174,9 @@ def draw_contact_traction(solution: Solution, part: str, *, units: Units | None 
     axes.plot(
         s, contact.sigma_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label=r"tangential $\sigma_t$"
     )
-    if not solution.scene.law.is_frictionless:
-        bound = _friction_bound(solution)[chosen]
+    law = _friction_law(solution)
+    if not law.is_frictionless:
+        bound = _friction_bound(solution, law)[chosen]
         axes.plot(s, bound, color="black", linestyle=":", linewidth=1.2, label="friction bound")
         axes.plot(s, -bound, color="black", linestyle=":", linewidth=1.2)
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
@@ -272,11 +274,15 @@ def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatA
     return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
 
 
-def _friction_bound(solution: Solution) -> FloatArray:
-    contact, law = solution.contact, solution.scene.law
-    bound = law.bound(np.minimum(contact.sigma_n, 0.0))
-    is_closed = np.array([word != "separated" for word in contact.status_words()])
-    return bound if law.acts_across_gap else np.where(is_closed, bound, 0.0)
+def _friction_law(solution: Solution) -> FrictionLaw:
+    contact = solution.contact
+    return solution.scene.law_at(contact.part, np.stack([contact.x, contact.y], axis=1))
+
+
+def _friction_bound(solution: Solution, law: FrictionLaw) -> FloatArray:
+    bound = law.bound(np.minimum(solution.contact.sigma_n, 0.0))
+    is_closed = np.array([word != "separated" for word in solution.contact.status_words()])
+    return np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)
 
 
 def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:

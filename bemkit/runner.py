@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.contact.admissibility import find_unsolvable_load
 from bemkit.contact.body import ContactState
+from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.order import along_boundary
 from bemkit.geometry.space import dof_points
-from bemkit.model import Model, build_model
-from bemkit.operators.threads import blas_threads_for
-from bemkit.plan import make_plan
+from bemkit.history import load_steps
+from bemkit.model import Model, build_model, find_units
+from bemkit.plan import Plan, make_plan
 from bemkit.scene import Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
-from bemkit.solvers.base import ContactSolution, StepRecord, solve
+from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
+from bemkit.warm_start import state_on
 
 
 class UnsolvableSceneError(ValueError):
@@ -26,7 +28,11 @@ class UnsolvableSceneError(ValueError):
 
 
 def run(
-    scene: Scene, *, mesh: BoundaryMesh | None = None, callback: Callable[[StepRecord], None] | None = None
+    scene: Scene,
+    *,
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
 ) -> Solution:
     """Solve a scene.
 
@@ -35,13 +41,17 @@ def run(
     scene : Scene
     mesh : BoundaryMesh, optional
         A mesh of one's own with the parts of the scene; by default the one the scene describes.
+    start : Solution, optional
+        Where to start, on any mesh; see `bemkit.cascade.run_cascade`. By default every node sticks. Where a scene has
+        several solutions the start chooses among them.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 
     Returns
     -------
     Solution
-        Look at `Solution.status` before you use it: a run that did not converge returns what it reached.
+        Look at `Solution.status` before you use it: a run that did not converge returns what it reached. Of a load
+        history this is the last step, with the linear solves and the records of all steps.
 
     Raises
     ------
@@ -50,25 +60,81 @@ def run(
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
+    steps = run_history([scene], mesh=mesh, start=start, callback=callback)
+    return steps[0] if len(scene.load_factors) == 1 else _summed(scene, steps)
+
+
+def run_history(
+    scenes: Sequence[Scene],
+    *,
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> tuple[Solution, ...]:
+    """Solve scenes that follow each other in time, slip counting from the end of the step before.
+
+    The body is factored once for all steps.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        One body under changing loads, obstacles or laws; a scene with several load factors stands for as many steps.
+    mesh, start, callback : optional
+        As for `run`.
+
+    Returns
+    -------
+    tuple of Solution
+        One for each step, up to the first that does not converge.
+
+    Raises
+    ------
+    UnsolvableSceneError, ValueError
+        As for `run`, also if the scenes differ by more than numbers.
+    """
+    steps = [step for scene in scenes for step in load_steps(scene)]
+    if not steps:
+        raise ValueError("scenes is empty: give at least one scene")
     clock = [time.perf_counter()]
-    mesh = scene.build_mesh() if mesh is None else mesh
-    plan = make_plan(scene, mesh)
+    mesh = steps[0].build_mesh() if mesh is None else mesh
+    plan = make_plan(scenes[0], mesh)
     clock.append(time.perf_counter())
-    with blas_threads_for(2 * mesh.n_elements):
-        model = build_model(scene, mesh)
+    units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
+    model = build_model(steps[0], mesh, units)
+    state = None if start is None else state_on(model, start)
+    solutions: list[Solution] = []
+    for step in steps:
+        if solutions and state is not None:
+            model = model.under(step)
+            model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
         clock.append(time.perf_counter())
-        result = solve(model.problem, scene.solver, throw=False, callback=callback)
-    if not result.history:
-        raise UnsolvableSceneError(result.message)
-    clock.append(time.perf_counter())
+        result = solve(model.problem, step.solver, start=state, throw=False, callback=callback)
+        if not result.history:
+            raise UnsolvableSceneError(_reason(model, result))
+        clock.append(time.perf_counter())
+        solutions.append(_solution(model, result, plan, clock))
+        clock = [clock[-1]] * 2  # the later steps build no mesh
+        state = result.state
+        if not result.is_converged:
+            break
+    return tuple(solutions)
+
+
+def _reason(model: Model, result: ContactSolution) -> str:
+    escape = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+    return result.message if escape is None else describe_escape(model, escape)
+
+
+def _solution(model: Model, result: ContactSolution, plan: Plan, clock: list[float]) -> Solution:
+    """Turn what the driver found into physical fields; appends to the clock when that is done."""
     fields, energy = _fields(model, result.state)
     table = _contact_table(model, result)
     clock.append(time.perf_counter())
     timings = dict(zip(("mesh", "assemble", "solve", "recover"), np.diff(clock).tolist(), strict=True))
     timings["total"] = clock[-1] - clock[0]
     return Solution(
-        scene=scene,
-        mesh=mesh,
+        scene=model.scene,
+        mesh=model.mesh,
         status=result.status,
         certificate=result.certificate,
         contact=table,
@@ -83,6 +149,27 @@ def run(
         timings=timings,
         plan=plan,
         message=result.message,
+    )
+
+
+def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
+    """Return the last step with the solves, records and times of all."""
+    records, offset, spent = [], 0, 0
+    for number, step in enumerate(steps, 1):
+        for record in step.history:
+            message = f"load step {number} of {len(scene.load_factors)}; {record.message}".rstrip("; ")
+            total = spent + record.linear_solves
+            records.append(replace(record, step=offset + record.step, linear_solves=total, message=message))
+        offset, spent = records[-1].step + 1, records[-1].linear_solves
+    last = steps[-1]
+    return replace(
+        last,
+        scene=scene,
+        history=tuple(records),
+        linear_solves=spent,
+        outer_steps=sum(step.outer_steps for step in steps),
+        timings={name: sum(step.timings[name] for step in steps) for name in last.timings},
+        message=f"load step {len(steps)} of {len(scene.load_factors)}: {last.message}",
     )
 
 
@@ -113,7 +200,7 @@ def _fields(model: Model, state: ContactState) -> tuple[BoundaryFields, float]:
 def _contact_table(model: Model, result: ContactSolution) -> ContactTable:
     units, state = model.units, result.state
     points = units.to_physical(model.nodes.points)
-    parts, lengths = _places(model)
+    parts, lengths = model.places
     gap = model.problem.gap * units.displacement
     displacement = state.displacement * units.displacement
     return ContactTable(
@@ -130,21 +217,3 @@ def _contact_table(model: Model, result: ContactSolution) -> ContactTable:
         status=np.asarray(result.node_status).copy(),
         weight=model.nodes.weights * units.length,
     )
-
-
-def _places(model: Model) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the part of each contact node and its arc length along it; a node of two parts belongs to the first."""
-    space = model.elastic.displacement_space
-    n_scalar = space.n_dofs // 2
-    names: list[str] = [""] * n_scalar
-    arc_length = np.full(n_scalar, np.nan)
-    for part in model.scene.contact_parts:
-        elements = along_boundary(model.mesh, model.mesh.part(part.name))
-        lengths = model.mesh.lengths[elements]
-        begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        dofs = space.element_dofs[elements]
-        s = begin[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0)
-        for dof, place in zip(dofs.ravel().tolist(), s.ravel().tolist(), strict=True):
-            if not names[dof]:
-                names[dof], arc_length[dof] = part.name, place
-    return tuple(names[dof] for dof in model.nodes.nodes.tolist()), arc_length[model.nodes.nodes]

@@ -7,7 +7,7 @@ form can be turned into the other. All quantities are in one consistent set of u
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -16,6 +16,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.obstacle import Obstacle
+from bemkit.contact.partwise import PartwiseLaw
 from bemkit.expression import Expression, ScalarField, check_field, closest, evaluate_field
 from bemkit.geometry.discretise import discretise
 from bemkit.geometry.grading import Grading, Uniform
@@ -138,14 +139,17 @@ class Pressure:
 
 @dataclass(frozen=True)
 class Contact:
-    """The part may touch a rigid obstacle, with the friction law of the scene.
+    """The part may touch a rigid obstacle.
 
     Parameters
     ----------
     obstacle : Obstacle
+    law : FrictionLaw, optional
+        The friction law on this part; the scene's law if left out.
     """
 
     obstacle: Obstacle
+    law: FrictionLaw | None = None
 
 
 Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
@@ -242,6 +246,11 @@ class Scene:
     parts : tuple of Part
         At least one of them in contact. They must not overlap (checked when the boundary is divided).
     law : FrictionLaw
+        On all contact parts that have no law of their own.
+    load_factors : tuple of float
+        The load history: all tractions, pressures and prescribed displacements times these numbers, one step after
+        the other. A single number (the default is 1) is the static law, which judges slip by the total displacement;
+        with several, slip counts from the end of the step before (the incremental law).
     discretisation : Discretisation
     mesh : MeshOptions
     solver : ContactSolver
@@ -251,7 +260,8 @@ class Scene:
     Raises
     ------
     ValueError
-        If the title is empty, no part is in contact, two parts share a name, or a part names an unknown side.
+        If the title is empty, no part is in contact, two parts share a name, a part names an unknown side, or a load
+        factor is missing or not finite.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -261,6 +271,7 @@ class Scene:
     material: Material
     parts: tuple[Part, ...]
     law: FrictionLaw = field(default_factory=Frictionless)
+    load_factors: tuple[float, ...] = (1.0,)
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
@@ -275,6 +286,8 @@ class Scene:
             raise ValueError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
         if not self.contact_parts:
             raise ValueError("parts: no part is in contact: give one part the condition 'contact' with an obstacle")
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise ValueError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
         names = [side.name for loop in self.shape.outline().loops for side in loop]
         for part in self.parts:
             for side in part.sides:
@@ -288,6 +301,37 @@ class Scene:
     def contact_parts(self) -> tuple[Part, ...]:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
+        """Return the friction law of given contact nodes, every coefficient in numbers.
+
+        Parameters
+        ----------
+        parts : sequence of n_contact str
+            The contact part that each node belongs to.
+        points : (n_contact, 2) array [m]
+
+        Returns
+        -------
+        FrictionLaw
+
+        Raises
+        ------
+        ValueError
+            If a coefficient is not finite or negative somewhere; the message names the part.
+        """
+        laws, nodes = [], []
+        for part in self.contact_parts:
+            own = np.flatnonzero([name == part.name for name in parts])
+            law = part.condition.law if isinstance(part.condition, Contact) else None
+            try:
+                laws.append((self.law if law is None else law).at(points[own]))
+            except ValueError as error:
+                raise ValueError(f"part {part.name!r}: friction law: {error}") from error
+            nodes.append(own)
+        if len(laws) == 1 or all(law is laws[0] for law in laws):
+            return laws[0]
+        return PartwiseLaw(laws, nodes)
 
     def build_mesh(self) -> BoundaryMesh:
         """Divide the boundary into elements, with one mesh part for each part of the scene.

@@ -23,7 +23,7 @@ MAX_BYTES = 1_000_000
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "discretisation", "solver"),
-    *("law", "shape", "material", "mesh", "parts"),
+    *("load_factors", "law", "shape", "material", "mesh", "parts"),
 )
 _PART_KEYS = ("sides", "where", "condition")
 

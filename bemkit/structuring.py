@@ -198,6 +198,8 @@ def _converter() -> Converter:
 
 
 def _family(declared: Any) -> Family | None:
+    options = _options(declared)
+    declared = options[0] if len(options) == 1 else declared
     return next((family for wanted, family in _FAMILIES if declared == wanted), None)
 
 

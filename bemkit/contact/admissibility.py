@@ -24,7 +24,7 @@ class UnsolvableLoad:
         How much faster each node leaves the obstacle than sliding at full friction would allow, ``-v_n - s |v_t|``;
         zero everywhere if the body slides, nan where a node can never touch.
     work : float [N]
-        Work of the load on it, less what friction takes up; positive.
+        Work of the load on this motion, less what friction takes up; positive.
     """
 
     motion: FloatArray
@@ -32,11 +32,16 @@ class UnsolvableLoad:
     work: float
 
     @property
+    def is_sliding(self) -> bool:
+        """Whether the body stays in touch everywhere, so that only friction could have held it."""
+        return not np.isnan(self.lift).all() and float(np.nanmax(self.lift)) <= 1e-6
+
+    @property
     def description(self) -> str:
         """One sentence that names the escape."""
         if np.isnan(self.lift).all():
             how = "moves the body where no obstacle can meet it"
-        elif np.nanmax(self.lift) > 1e-6:
+        elif not self.is_sliding:
             how = "pushes" if np.ptp(self.motion[:, 0]) < 1e-6 else "tips"
             how += " the body away from the obstacle"
         else:
@@ -79,10 +84,12 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
         motion = np.tensordot(coefficients, motions, axes=1)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
-        if work > _RELATIVE_WORK * force_scale and (best is None or work > best.work):
-            motion = motion / np.abs(motion).max()
+        if work > _RELATIVE_WORK * force_scale:
+            size = float(np.abs(motion).max())
+            motion, work = motion / size, work / size
             lift = np.where(touches, -motion[:, 0] - slope * np.abs(motion[:, 1]), np.nan)
-            best = UnsolvableLoad(motion, lift, work)
+            if best is None or work > best.work:
+                best = UnsolvableLoad(motion, lift, work)
     return best
 
 

@@ -91,6 +91,9 @@ class CondensedBody:
         Displacements of the open directions from those of the contact nodes.
     points : (n_nodes, 2) array [m]
         Where the nodal forces act.
+    conditions : NodalConditions
+        Of the displacement nodes, the contact nodes open.
+    nodes : ContactNodes
 
     Notes
     -----
@@ -104,6 +107,8 @@ class CondensedBody:
     to_open: FloatArray
     offset: FloatArray
     points: FloatArray
+    conditions: NodalConditions
+    nodes: ContactNodes
 
     @property
     def n_contact(self) -> int:
@@ -131,6 +136,27 @@ class CondensedBody:
     def rigid_load(self) -> FloatArray:
         """Return the work of the load on each of these motions."""
         return self.dense.rigid_load()
+
+    def under(self, displacement: FloatArray, force: FloatArray) -> CondensedBody:
+        """Return the same body under another load, without another factorisation.
+
+        Parameters
+        ----------
+        displacement : (n_nodes, 2) array [m]
+            Prescribed displacements in the frames of the nodes, as in `NodalConditions`.
+        force : (n_nodes, 2) array [N/m]
+            Given nodal forces.
+
+        Returns
+        -------
+        CondensedBody
+        """
+        conditions = replace(self.conditions, displacement=displacement)
+        condensed = self.condensed.under(force, displacement)
+        _, offset = _open_directions(conditions, self.nodes)
+        load = self.to_open.T @ (condensed.load - condensed.stiffness @ offset)
+        dense = replace(self.dense, load=load)
+        return replace(self, dense=dense, condensed=condensed, offset=offset, conditions=conditions)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
@@ -195,7 +221,7 @@ def condense(
     motions = _free_motions(conditions, contact, points)
     motions.reshape(len(motions), 2 * contact.nodes.size)[:, idle] = 0.0
     dense = DenseBody(stiffness, load, contact.weights, motions)
-    return CondensedBody(dense, condensed, to_open, offset, points), contact
+    return CondensedBody(dense, condensed, to_open, offset, points, conditions, contact), contact
 
 
 def _opened(conditions: NodalConditions, contact: ContactNodes) -> NodalConditions:

@@ -12,7 +12,7 @@ which `FrictionLaw.at` turns into numbers per node.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -123,8 +123,18 @@ class Frictionless(FrictionLaw):
         return self
 
 
+class _EqualByCoefficients:
+    """Laws are equal if their classes and coefficients are; arrays are compared as a whole."""
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and _compared(self) == _compared(other)
+
+    def __hash__(self) -> int:
+        return hash((type(self), _compared(self)))
+
+
 @dataclass(frozen=True, eq=False)
-class Tresca(FrictionLaw):
+class Tresca(_EqualByCoefficients, FrictionLaw):
     """Given friction: a bound that does not depend on the pressure.
 
     Parameters
@@ -172,7 +182,7 @@ class Tresca(FrictionLaw):
 
 
 @dataclass(frozen=True, eq=False)
-class Coulomb(FrictionLaw):
+class Coulomb(_EqualByCoefficients, FrictionLaw):
     """Coulomb's law: ``bound = s |sigma_n|``, equations (7) and (8) of the paper.
 
     Parameters
@@ -213,7 +223,7 @@ class Coulomb(FrictionLaw):
 
 
 @dataclass(frozen=True, eq=False)
-class CohesiveCoulomb(FrictionLaw):
+class CohesiveCoulomb(_EqualByCoefficients, FrictionLaw):
     """Coulomb's law with cohesion and cap: ``bound = min(c + s |sigma_n|, tau_max)``.
 
     Parameters
@@ -346,15 +356,21 @@ def _evaluated(law: Tresca | Coulomb | CohesiveCoulomb, points: FloatArray) -> d
     for entry in fields(law):
         coefficient = getattr(law, entry.name)
         if callable(coefficient):
-            values[entry.name] = evaluate_field(coefficient, points)
-            node = int(np.argmin(values[entry.name]))
-            if values[entry.name][node] < 0.0:
+            value = values[entry.name] = evaluate_field(coefficient, points)
+            if np.any(value < 0.0):
+                node = int(np.argmin(value))
                 x, y = points[node]
                 raise ValueError(
-                    f"{entry.name} = {coefficient!r} is {values[entry.name][node]:g} at (x, y) = ({x:.6g}, {y:.6g}); "
+                    f"{entry.name} = {coefficient!r} is {value[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); "
                     "it must be zero or positive on the whole contact part"
                 )
     return values
+
+
+def _compared(law: Any) -> tuple[object, ...]:
+    """Return the coefficients of a law in a form that compares and hashes."""
+    coefficients = [getattr(law, entry.name) for entry in fields(law)]
+    return tuple(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in coefficients)
 
 
 def _check_scale(stress_scale: float) -> float:

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from numbers import Real
 from typing import Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.arclength import ArcLength
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
@@ -18,9 +20,11 @@ _DERIVATIVE_TOLERANCE = 1e-2  # catches a wrong sign, factor or component; forgi
 
 
 class Curve(Protocol):
-    """A smooth piece of boundary, traversed with the body on its left.
+    """A smooth piece of boundary, traversed with the body on its left at constant speed.
 
-    A curve of one's own needs only these three members.
+    A curve of one's own needs only these three members. Its parameter must be proportional to the arc length, because
+    functions on curved elements are polynomials of the arc length; `ParametricCurve(curve.point, curve.derivative)`
+    makes such a curve of any other.
     """
 
     @property
@@ -54,7 +58,7 @@ class Curve(Protocol):
         Returns
         -------
         (n, 2) array [m]
-            dx/ds along the traversal, nowhere zero.
+            dx/ds along the traversal; its size is the length of the curve at every s.
         """
         ...
 
@@ -148,20 +152,24 @@ class Arc:
 
 @dataclass(frozen=True, eq=False)
 class ParametricCurve:
-    """A smooth curve given by two vectorised functions.
+    """A smooth curve given by two vectorised functions of any parameter.
 
     Parameters
     ----------
     function : callable
-        (n,) parameters in [0, 1] -> (n, 2) points [m].
+        (n,) parameters p in [0, 1] -> (n, 2) points [m].
     derivative_function : callable
-        (n,) parameters -> (n, 2) derivatives dx/ds [m]; checked against `function`.
+        (n,) parameters -> (n, 2) derivatives dx/dp [m]; checked against `function`.
 
     Raises
     ------
     GeometryError
         If a function returns another shape or something not finite, the derivative vanishes, or the
         derivative does not belong to the function.
+
+    Notes
+    -----
+    The curve itself takes the arc length, as a fraction of its total, for its parameter s: p(s) is found to round-off.
     """
 
     function: Callable[[FloatArray], FloatArray]
@@ -172,14 +180,14 @@ class ParametricCurve:
         ends = np.linspace(0.0, 1.0, _N_CHECK_INTERVALS + 1)
         half = 0.5 / _N_CHECK_INTERVALS
         s = ((ends[:-1, None] + half) + half * nodes).ravel()
-        velocity = self.derivative(s)
+        velocity = self._velocity(s)
         speed = norms(velocity)
         if not speed.min() > 0.0:
             raise GeometryError(
                 f"ParametricCurve: derivative_function vanishes at s={s[speed.argmin()]:.6g}: "
                 "choose a parameter along which the curve moves everywhere"
             )
-        steps = np.diff(self.point(ends), axis=0)
+        steps = np.diff(self._place(ends), axis=0)
         integrals = half * np.einsum("q,iqk->ik", weights, velocity.reshape(_N_CHECK_INTERVALS, _N_CHECK_POINTS, 2))
         mismatch = norms(steps - integrals)
         worst = int(mismatch.argmax())
@@ -195,13 +203,25 @@ class ParametricCurve:
         """False: a parametric curve is always treated as curved."""
         return False
 
+    @cached_property
+    def _arc_length(self) -> ArcLength:
+        return ArcLength(self._velocity)
+
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve."""
-        return _checked_values("function", self.function(np.asarray(s)), s)
+        return self._place(self._arc_length.parameter(np.asarray(s, dtype=float)))
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Differentiate the curve with respect to s."""
-        return _checked_values("derivative_function", self.derivative_function(np.asarray(s)), s)
+        velocity = self._velocity(self._arc_length.parameter(np.asarray(s, dtype=float)))
+        derivative: FloatArray = velocity * (self._arc_length.total / norms(velocity))[:, None]
+        return derivative
+
+    def _place(self, p: FloatArray) -> FloatArray:
+        return _checked_values("function", self.function(p), p)
+
+    def _velocity(self, p: FloatArray) -> FloatArray:
+        return _checked_values("derivative_function", self.derivative_function(p), p)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,12 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
-from bemkit.geometry.pieces import Pieces, evaluate_curves, point_on, resolution
+from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, point_on, resolution
 from bemkit.geometry.vectors import norms
 
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away
+_N_SPEEDS = 5
+_SPEED_TOLERANCE = 1e-10  # forgives the round-off of derivatives given as differences of large numbers, not more
 
 
 def as_index(values: npt.ArrayLike, name: str) -> IntArray:
@@ -84,6 +86,20 @@ def check_curves(
         raise GeometryError(
             f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has ends {distance[element]:.3g} away "
             f"from the points of its curve at {span[element].tolist()}: correct its nodes, curve or span"
+        )
+    _check_speed(curves, np.flatnonzero(is_curved), element_curve[is_curved], span[is_curved])
+
+
+def _check_speed(curves: tuple[Curve, ...], elements: IntArray, element_curve: IntArray, span: FloatArray) -> None:
+    """Raise unless the speed |dx/ds| is the same all over each curved element."""
+    fractions = np.linspace(0.0, 1.0, _N_SPEEDS)
+    s = span[:, :1] * (1.0 - fractions) + span[:, 1:] * fractions
+    speed = norms(evaluate_curves(curves, element_curve, s, derivative_on))
+    for k in np.flatnonzero(~(np.ptp(speed, axis=1) <= _SPEED_TOLERANCE * speed.max(axis=1))):
+        raise GeometryError(
+            f"BoundaryMesh: element {elements[k]} follows curve {element_curve[k]} with speeds |dx/ds| from "
+            f"{speed[k].min():.6g} to {speed[k].max():.6g}: the parameter must be proportional to the arc length; "
+            "use ParametricCurve(curve.point, curve.derivative)"
         )
 
 

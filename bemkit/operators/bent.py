@@ -27,7 +27,9 @@ MAX_DEGREE = 20
 N_SAMPLES = 29
 MAX_BEND = 1.6
 """Largest product of curvature and half length: elements that turn by more than about half a turn are refused."""
-ROUND_OFF = 16.0 * float(np.finfo(float).eps)
+ROUND_OFF = 4.0 * float(np.finfo(float).eps)
+UNRESOLVED = 1e3
+"""Elements whose series goes on beyond MAX_DEGREE with this many times the round-off are refused."""
 MAX_NEWTON = 30
 ELLIPSE = 1.8
 """Points with a parameter in the ellipse with foci -1, 1 and this semi-axis are near; Gauss rules serve the others."""
@@ -68,9 +70,10 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     # a short element is known to the round-off of its coordinates only: what is below that is noise
     noise = ROUND_OFF * (1.0 + np.abs(places).max(axis=(1, 2)) / half[curved])
     is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
-    degree = np.maximum(1, series.shape[1] - 1 - is_noise.sum(axis=1))
+    degree = np.clip(series.shape[1] - 1 - is_noise.sum(axis=1), 1, MAX_DEGREE)
+    is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > UNRESOLVED * noise[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
-    n_powers = min(int(degree.max()), MAX_DEGREE) + 1
+    n_powers = int(degree.max()) + 1
     about_centre = np.zeros((n_powers, mesh.n_elements), complex)
     about_centre[1] = 1.0
     to_powers = np.zeros((n_powers, n_powers))
@@ -83,12 +86,12 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
         bend[curved] = np.abs(
             np.vander(np.linspace(-1.0, 1.0, 9), n_powers - 2, increasing=True) @ second[:, curved]
         ).max(axis=0)
-    _check(mesh, curved, degree, bend)
+    _check(mesh, curved, bend, is_unresolved)
     return BentPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
 
 
-def _check(mesh: BoundaryMesh, curved: IntArray, degree: IntArray, bend: FloatArray) -> None:
-    is_bad = (degree > MAX_DEGREE) | (bend[curved] > MAX_BEND)
+def _check(mesh: BoundaryMesh, curved: IntArray, bend: FloatArray, is_unresolved: BoolArray) -> None:
+    is_bad = is_unresolved | (bend[curved] > MAX_BEND)
     if is_bad.any():
         element = int(curved[np.argmax(is_bad)])
         (x, y), (x_end, y_end) = mesh.start[element], mesh.end[element]

@@ -135,8 +135,9 @@ class SingleLayer(PairOperator):
     """V: traction -> displacement."""
 
     def __init__(self, trial: BoundarySpace, test: BoundarySpace, material: Material) -> None:
-        same = trial is test
-        tags = frozenset({Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE}) if same else frozenset[Tag]()
+        # uniform pressure does not deform an incompressible body: V n = 0
+        definite = Tag.POSITIVE_DEFINITE if material.effective_poisson_ratio < 0.5 else Tag.POSITIVE_SEMIDEFINITE
+        tags = frozenset({Tag.SYMMETRIC, definite}) if trial is test else frozenset[Tag]()
         super().__init__(trial, test, tags)
         self.material = material
 
@@ -208,7 +209,9 @@ class Hypersingular(PairOperator):
         _require_continuous(trial, "hypersingular", "trial")
         _require_continuous(test, "hypersingular", "test")
         tags = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if trial is test else set[Tag]()
-        super().__init__(trial, test, frozenset(tags | {Tag.KILLS_RIGID_MOTIONS}))
+        # the rotation of a curved element is not a polynomial, hence not in the space
+        kernel = Tag.KILLS_RIGID_MOTIONS if bool(trial.mesh.is_straight.all()) else Tag.KILLS_TRANSLATIONS
+        super().__init__(trial, test, frozenset(tags | {kernel}))
         self.material = material
 
     @property

@@ -35,7 +35,7 @@ CURVED_DISTANCE = 4.5
 """Curved elements farther than this take a Gauss rule; the distance is measured in the parameter (`Panels.reach`)."""
 CURVED_POINTS = 8
 """Points of that rule: its error is about (4.5 + sqrt(4.5^2 - 1))^-16, below 1e-15."""
-CHUNK_PAIRS = 16384
+CHUNK_PAIRS = 32768
 DEGREES = Degrees(log=(0, 0), double=(0, 0))
 
 

@@ -35,7 +35,7 @@ GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the test element] from which each is enough."""
 DENSE_DISTANCE = 45.0
 """Pairs closer than this, in half lengths of the trial element, leave the dense sweep."""
-CHUNK_PAIRS = 16384
+CHUNK_PAIRS = 32768
 """Pairs treated at once: a few complex arrays of this length stay in the cache."""
 LISTED_COST = 2.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""

@@ -159,7 +159,7 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
     coefficient = (problem.friction_bound(none - stress) - cohesion) / stress
     far = problem.friction_bound(none - 1e3 * stress)
     is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
-    if not is_affine or (cohesion.any() and not problem.law.acts_across_gap):
+    if not is_affine or np.any((cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)):
         raise ValueError(
             f"LemkePivoting cannot treat the friction law {type(problem.law).__name__}: its bound must be "
             "c + s |sigma_n| without cap, and c = 0 unless it acts across the gap; use SemismoothNewton"

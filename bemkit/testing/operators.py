@@ -61,7 +61,8 @@ def check_double_layer(operator: DoubleLayer, *, rtol: float = 1e-11) -> None:
     Parameters
     ----------
     operator : DoubleLayer
-        On the boundary of a bounded body; outside of a closed boundary the factor is plus one half.
+        On the boundary of a bounded body; outside of a closed boundary the factor is plus one half. With curved
+        elements, on which a rotation is not a polynomial, only translations are tried.
     rtol : float
         Allowed error, relative to the largest entry of the matrix.
 
@@ -73,9 +74,9 @@ def check_double_layer(operator: DoubleLayer, *, rtol: float = 1e-11) -> None:
     factor = -0.5 if operator.trial.mesh.is_exterior else 0.5
     combined = factor * mass(operator.trial, operator.test).matrix() + operator.matrix()
     sign = "-" if factor < 0.0 else ""
-    _small(
-        combined @ _motions(operator), combined, rtol, f"({sign}1/2 M + K) r of a rigid motion is not zero: it differs"
-    )
+    is_straight = bool(operator.trial.mesh.is_straight.all())
+    motions = _motions(operator) if is_straight else _motions(operator)[:, :2]
+    _small(combined @ motions, combined, rtol, f"({sign}1/2 M + K) r of a rigid motion is not zero: it differs")
 
 
 def _checked_matrix(operator: BoundaryOperator, name: str) -> FloatArray:
@@ -94,7 +95,7 @@ def _check_linear_operator(
 ) -> None:
     linear = operator.as_linear_operator()
     demand(linear.shape == matrix.shape, f"{name}.as_linear_operator() has the shape {linear.shape}")
-    x, y = random.normal(size=matrix.shape[1]), random.normal(size=matrix.shape[0])
+    x, y = np.asarray(random.normal(size=matrix.shape[1])), np.asarray(random.normal(size=matrix.shape[0]))
     _small(linear.matvec(x) - matrix @ x, matrix, rtol, f"{name}.as_linear_operator() is not the matrix: it differs")
     _small(linear.rmatvec(y) - y @ matrix, matrix, rtol, f"{name}.as_linear_operator() has a wrong adjoint: it differs")
     gap = abs(float(y @ linear.matvec(x) - linear.rmatvec(y) @ x))

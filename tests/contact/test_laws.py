@@ -4,6 +4,7 @@ import pytest
 from bemkit.contact import laws
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, RescaledLaw, Tresca
 from bemkit.contact.problem import ContactProblem, LawError
+from bemkit.expression import Expression
 from bemkit.testing import check_law
 from tests.handmade import random_problem
 
@@ -24,6 +25,23 @@ LAWS = [
 @pytest.mark.parametrize("law", LAWS, ids=repr)
 def test_conformance(law):
     check_law(law)
+
+
+@pytest.mark.parametrize(
+    ("make", "other"),
+    [
+        (lambda: Coulomb(0.5), Coulomb(0.4)),
+        (lambda: Coulomb(0.5), Tresca(0.5)),
+        (lambda: Coulomb(np.array([0.5, 0.4])), Coulomb(np.array([0.5, 0.3]))),
+        (lambda: Coulomb(np.array([0.5, 0.5])), Coulomb(0.5)),
+        (lambda: Tresca(Expression("x")), Tresca(Expression("y"))),
+        (lambda: CohesiveCoulomb(0.5, cap=2.0), CohesiveCoulomb(0.5, cap=3.0)),
+    ],
+)
+def test_laws_are_equal_by_their_coefficients(make, other):
+    assert make() == make()
+    assert hash(make()) == hash(make())
+    assert make() != other
 
 
 def test_every_law_is_checked():

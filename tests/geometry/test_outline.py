@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bemkit.geometry.curve import Arc, ParametricCurve, Segment
+from bemkit.geometry.curve import Arc, MovedCurve, ParametricCurve, Segment, reverse_curve
 from bemkit.geometry.discretise import discretise
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
@@ -86,8 +86,8 @@ def _waves(low: float, high: float, distance: float) -> tuple[Side, ...]:
     """Return a strip between two waves: they cross if `distance` is less than half the difference in height."""
     top, bottom = wavy(high, 12), wavy(low, 12)
     y_top, y_bottom = high + distance, low
-    shifted = ParametricCurve(lambda s: top.point(s) + np.array([0.0, distance]), top.derivative)
-    back = ParametricCurve(lambda s: bottom.point(1 - s), lambda s: -bottom.derivative(1 - s))
+    shifted = MovedCurve(top, (0.0, -distance))
+    back = reverse_curve(bottom)
     return (
         Side("bottom", back),
         Side("right", Segment((1.0, y_bottom), (1.0, y_top))),

@@ -1,0 +1,130 @@
+"""docs/scene-files.md says what the code does: every kind, key, default, formula word and error on it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import MISSING, fields
+from typing import get_type_hints
+
+import pytest
+import tomli_w
+
+from bemkit import expression, kinds
+from bemkit.expression import Expression
+from bemkit.operators.material import Material
+from bemkit.scene import MeshOptions, Part, Scene
+from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml
+from bemkit.structuring import structure
+from tests.docs.pages import Row, blocks, plain, read, section, table
+
+PAGE = read("scene-files.md")
+BLOCKS = blocks(PAGE)
+FAMILIES = {
+    "Conditions": kinds.CONDITIONS,
+    "Obstacles": kinds.OBSTACLES,
+    "Friction laws": kinds.LAWS,
+    "Shapes": kinds.SHAPES,
+    "Gradings": kinds.GRADINGS,
+    "Discretisations": kinds.DISCRETISATIONS,
+    "Solvers": kinds.SOLVERS,
+}
+TABLES = {"The scene": Scene, "Material": Material, "Parts": Part, "Mesh": MeshOptions}
+
+
+def as_text(fragment: str) -> str:
+    """Complete a fragment by the first scene on the page; a scene of its own, or no TOML at all, stays as it is."""
+    base = tomllib.loads(BLOCKS[0][1])
+    table = tomllib.loads(fragment)
+    if "title" in table:
+        return fragment
+    parts = base["parts"] | table.get("parts", {})
+    return tomli_w.dumps(base | table | {"parts": parts})
+
+
+EXAMPLES = [
+    (content, BLOCKS[i + 1][1].strip() if i + 1 < len(BLOCKS) and BLOCKS[i + 1][0] == "text" else "")
+    for i, (language, content) in enumerate(BLOCKS)
+    if language == "toml"
+]
+
+
+@pytest.mark.parametrize("fragment", [content for content, error in EXAMPLES if not error])
+def test_every_example_is_a_scene_that_can_be_divided(fragment: str) -> None:
+    scene = scene_from_toml(as_text(fragment))
+    assert scene.build_mesh().n_elements == scene.mesh.elements
+
+
+@pytest.mark.parametrize(("fragment", "error"), [example for example in EXAMPLES if example[1]])
+def test_every_wrong_example_gives_the_error_below_it(fragment: str, error: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        scene_from_toml(as_text(fragment))
+    assert str(caught.value) == error
+
+
+def test_there_are_examples_and_errors() -> None:
+    assert {language for language, _ in BLOCKS} == {"toml", "text"}
+    assert len(EXAMPLES) >= 12
+    assert sum(bool(error) for _, error in EXAMPLES) >= 5
+
+
+def test_a_word_alone_means_the_same_as_a_table_of_defaults() -> None:
+    first, second = (scene_from_toml(as_text(content)) for content, _ in EXAMPLES[1:3])
+    assert first.solver == second.solver
+
+
+def check_keys(owner: type, rows: list[Row]) -> None:
+    """Compare rows of key, value, default and meaning with the fields of a class."""
+    entries = {entry.name: entry for entry in fields(owner) if entry.init}
+    assert sorted(plain(row[0]) for row in rows) == sorted(entries), owner
+    hints = get_type_hints(owner)
+    for key, value, default, _ in rows:
+        entry = entries[plain(key)]
+        assert value, key
+        if default == "required":
+            assert (entry.default, entry.default_factory) == (MISSING, MISSING), key
+        elif default == "none":
+            assert entry.default is None, key
+        else:
+            documented = tomllib.loads(f"value = {plain(default)}")["value"]
+            actual = entry.default if entry.default_factory is MISSING else entry.default_factory()
+            assert structure(documented, hints[entry.name]) == actual, key
+
+
+@pytest.mark.parametrize("heading", FAMILIES)
+def test_every_kind_stands_on_the_page_with_its_keys_and_defaults(heading: str) -> None:
+    family, rows_of = FAMILIES[heading], dict[str, list[Row]]()
+    for kind, *row in table(section(PAGE, heading)):
+        rows_of[plain(kind) or list(rows_of)[-1]] = [*rows_of.get(plain(kind) or list(rows_of)[-1], []), row]
+    assert list(rows_of) == list(family.built_in)
+    for kind, rows in rows_of.items():
+        check_keys(family.find(kind), [row for row in rows if row[0]])
+
+
+def test_no_family_of_kinds_is_left_out() -> None:
+    families = [value for value in vars(kinds).values() if isinstance(value, kinds.Family)]
+    assert {family.role for family in families} == {family.role for family in FAMILIES.values()}
+    for family in families:
+        assert not family.group or f"`{family.group}`" in PAGE
+
+
+@pytest.mark.parametrize("heading", TABLES)
+def test_every_table_stands_on_the_page_with_its_keys_and_defaults(heading: str) -> None:
+    rows = table(section(PAGE, heading))
+    if heading == "Parts":
+        rows.append(["`name`", "text", "required", "stands in the heading [parts.NAME]"])
+    check_keys(TABLES[heading], rows)
+
+
+def test_formulas_and_their_limits() -> None:
+    text = section(PAGE, "Formulas")
+    words = re.findall(r"`([^`]+)`", text)
+    for name in expression._NAMES:
+        assert any(re.match(rf"{name}\b", word) for word in words), name
+    for word in re.findall(r"`([a-z0-9]+)`", re.search(r"functions of one number \|(.*)", text)[1]):  # type: ignore[index]
+        assert Expression(f"{word}(x)")
+    for word in re.findall(r"`([a-z0-9]+)`", re.search(r"functions of two numbers \|(.*)", text)[1]):  # type: ignore[index]
+        assert Expression(f"{word}(x, y)")
+    for limit in (expression.MAX_LENGTH, expression.MAX_DEPTH, MAX_BYTES):
+        assert f" {limit} " in text
+    assert float(Expression("where(x > 0, log(x), 0)")(0.0, 0.0)) == 0.0
