@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.grading import Geometric as Geometric
     from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+    from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
     from bemkit.geometry.shapes import PlateWithHole as PlateWithHole
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.space import LinearSpace as LinearSpace
     from bemkit.geometry.space import QuadraticSpace as QuadraticSpace
     from bemkit.geometry.space import corner_nodes as corner_nodes
+    from bemkit.interior import interior_fields as interior_fields
     from bemkit.io import read_result as read_result
     from bemkit.io import write_result as write_result
     from bemkit.operators.boundary import adjoint_double_layer as adjoint_double_layer
@@ -51,8 +53,11 @@ if TYPE_CHECKING:
     from bemkit.operators.boundary import single_layer as single_layer
     from bemkit.operators.material import Material as Material
     from bemkit.operators.material import Plane as Plane
+    from bemkit.operators.representation import InteriorFields as InteriorFields
     from bemkit.operators.steklov_poincare import CollocationMap as CollocationMap
     from bemkit.operators.steklov_poincare import GalerkinMap as GalerkinMap
+    from bemkit.operators.stress import principal_stresses as principal_stresses
+    from bemkit.operators.stress import von_mises as von_mises
     from bemkit.plan import make_plan as make_plan
     from bemkit.runner import run as run
     from bemkit.runner import run_all as run_all
@@ -64,6 +69,7 @@ if TYPE_CHECKING:
     from bemkit.scene import Part as Part
     from bemkit.scene import PrescribedDisplacement as PrescribedDisplacement
     from bemkit.scene import Pressure as Pressure
+    from bemkit.scene import QuadraticGalerkin as QuadraticGalerkin
     from bemkit.scene import Roller as Roller
     from bemkit.scene import Scene as Scene
     from bemkit.scene import Traction as Traction
@@ -86,8 +92,10 @@ _HOME = {
     "geometry.discretise": ("discretise",),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
+    "geometry.selection": ("Selection",),
     "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring"),
     "geometry.space": ("ConstantSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
+    "interior": ("interior_fields",),
     "io": ("read_result", "write_result"),
     "operators.boundary": (
         "adjoint_double_layer",
@@ -98,7 +106,9 @@ _HOME = {
         "single_layer",
     ),
     "operators.material": ("Material", "Plane"),
+    "operators.representation": ("InteriorFields",),
     "operators.steklov_poincare": ("CollocationMap", "GalerkinMap"),
+    "operators.stress": ("principal_stresses", "von_mises"),
     "plan": ("make_plan",),
     "runner": ("run", "run_all"),
     "scene": (
@@ -110,6 +120,7 @@ _HOME = {
         "Part",
         "PrescribedDisplacement",
         "Pressure",
+        "QuadraticGalerkin",
         "Roller",
         "Scene",
         "Traction",

@@ -74,9 +74,10 @@ def commands() -> None:
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--discretisation", metavar="WORD", help="linear or constant, instead of the scene's.")
+@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
+@click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
 def run(
     scene: str,
@@ -88,6 +89,7 @@ def run(
     discretisation: str | None,
     solver: str | None,
     rho: float | None,
+    cascade: bool,
     quiet: bool,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
@@ -98,7 +100,7 @@ def run(
         wanted.check()
         chosen = _load(scene, elements, discretisation, solver, rho)
     with _bad_input(scene):
-        solution = _solve(chosen, is_live=not quiet and sys.stderr.isatty())
+        solution = _solve(chosen, cascade=cascade, is_live=not quiet and sys.stderr.isatty())
     with _bad_input():
         wanted.write(solution)
     if not quiet and not wanted.uses_stdout:
@@ -149,7 +151,7 @@ def scenes() -> None:
 @commands.command()
 @click.argument("scene")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--discretisation", metavar="WORD", help="linear or constant, instead of the scene's.")
+@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
 def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
@@ -210,16 +212,21 @@ def _load(
     return with_overrides(scene, elements=elements, discretisation=discretisation, solver=solver, rho=rho)
 
 
-def _solve(scene: Scene, *, is_live: bool) -> Solution:
+def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
     from bemkit.plan import check_memory
     from bemkit.runner import run as solve_scene
 
     check_memory(scene)
-    if not is_live:
-        return solve_scene(scene)
-    from bemkit.report import ConvergenceTable
+    callback = None
+    if is_live:
+        from bemkit.report import ConvergenceTable
 
-    return solve_scene(scene, callback=ConvergenceTable())
+        callback = ConvergenceTable()
+    if cascade:
+        from bemkit.cascade import run_cascade
+
+        return run_cascade(scene, callback=callback)[-1]
+    return solve_scene(scene, callback=callback)
 
 
 def _path(name: str | None) -> Path | None:

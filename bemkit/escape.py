@@ -8,7 +8,8 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.admissibility import UnsolvableLoad
 from bemkit.model import Model
 
-_DIRECTIONS = ("to the right", "up and to the right", "upward", "up and to the left") + (
+_DIRECTIONS = (
+    *("to the right", "up and to the right", "upward", "up and to the left"),
     *("to the left", "down and to the left", "downward", "down and to the right"),
 )
 _STRAIGHT = 1e-6
@@ -40,7 +41,8 @@ def describe_escape(model: Model, escape: UnsolvableLoad) -> str:
                 "change the load, raise the friction or hold the body"
             )
         return f"the load pushes the body {_direction(shift)} with {net:.4g} N/m; nothing holds it"
-    x, y = units.to_physical(np.array([-shift[1], shift[0]]) / turn)
+    pivot = units.to_physical(np.array([-shift[1], shift[0]]) / turn)
+    x, y = np.where(np.abs(pivot) < 1e-9 * units.length, 0.0, pivot)
     moment = escape.work / abs(turn) * units.stress * units.length**2
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
     return f"the load turns the body {sense} about ({x:.4g}, {y:.4g}) with {moment:.4g} N m/m; contact cannot hold it"
@@ -52,7 +54,9 @@ def _rigid_motion(model: Model, escape: UnsolvableLoad) -> tuple[FloatArray, flo
     spin = frame[:, :, 1] * points[:, None, 0] - frame[:, :, 0] * points[:, None, 1]
     matrix = np.concatenate([frame, spin[:, :, None]], axis=2).reshape(-1, 3)
     moves = model.body.to_open.any(axis=0)  # where a support holds the tangent, that component says nothing
-    motion = np.linalg.lstsq(matrix[moves], escape.motion.ravel()[moves], rcond=1e-9)[0]
+    # full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle
+    velocity = escape.motion * [0.0, 1.0] if escape.is_sliding else escape.motion
+    motion = np.linalg.lstsq(matrix[moves], velocity.ravel()[moves], rcond=1e-9)[0]
     return motion[:2], float(motion[2])
 
 

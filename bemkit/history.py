@@ -9,17 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from bemkit.arrays import FloatArray
 from bemkit.expression import Expression, ScalarField
 from bemkit.scene import Condition, PrescribedDisplacement, Pressure, Scene, Traction
-
-_LOADS: tuple[tuple[type[Any], tuple[str, str]], ...] = (
-    (Traction, ("x", "y")),
-    (Pressure, ("pressure", "shear")),
-    (PrescribedDisplacement, ("x", "y")),
-)
 
 
 def load_steps(scene: Scene) -> tuple[Scene, ...]:
@@ -66,14 +59,20 @@ class _ScaledFunction:
 
 
 def _scaled(condition: Condition, factor: float) -> Condition:
-    names = next((names for kind, names in _LOADS if isinstance(condition, kind)), ())
-    given = {name: getattr(condition, name) for name in names if getattr(condition, name) is not None}
-    if factor == 1.0 or not given:
-        return condition
-    return replace(condition, **{name: _scaled_field(value, factor) for name, value in given.items()})
+    match condition:
+        case _ if factor == 1.0:
+            return condition
+        case Traction(x, y):
+            return Traction(_times(factor, x), _times(factor, y))
+        case Pressure(pressure, shear):
+            return Pressure(_times(factor, pressure), _times(factor, shear))
+        case PrescribedDisplacement(x, y):
+            scaled = [None if value is None else _times(factor, value) for value in (x, y)]
+            return PrescribedDisplacement(*scaled)
+    return condition
 
 
-def _scaled_field(value: ScalarField, factor: float) -> ScalarField:
+def _times(factor: float, value: ScalarField) -> ScalarField:
     if isinstance(value, Expression):
         return Expression(f"{factor!r} * ({value.text})")
     if callable(value):

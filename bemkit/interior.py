@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace
+from bemkit.geometry.space import ConstantSpace
 from bemkit.operators.representation import InteriorFields
-from bemkit.scene import ConstantCollocation
 from bemkit.solution import Solution
 
 
@@ -30,9 +29,7 @@ def interior_fields(solution: Solution) -> InteriorFields:
     stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
     mesh = solution.mesh
-    space: BoundarySpace = LinearSpace(mesh)
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        space = ConstantSpace(mesh)
+    space = solution.scene.discretisation.displacement_space(mesh)
     boundary = solution.boundary
     return InteriorFields(
         mesh, solution.scene.material, space, boundary.displacement, ConstantSpace(mesh), boundary.traction

@@ -146,7 +146,13 @@ LAWS = Family(
 
 DISCRETISATIONS = Family(
     "discretisation",
-    MappingProxyType({"linear": "bemkit.scene:LinearGalerkin", "constant": "bemkit.scene:ConstantCollocation"}),
+    MappingProxyType(
+        {
+            "linear": "bemkit.scene:LinearGalerkin",
+            "quadratic": "bemkit.scene:QuadraticGalerkin",
+            "constant": "bemkit.scene:ConstantCollocation",
+        }
+    ),
 )
 
 SOLVERS = Family(

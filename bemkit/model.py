@@ -20,7 +20,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace
+from bemkit.geometry.space import BoundarySpace, LinearSpace, QuadraticSpace, break_nodes, dof_points
 from bemkit.operators.nodal import Support, supported
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 from bemkit.scene import (
@@ -30,6 +30,7 @@ from bemkit.scene import (
     Part,
     PrescribedDisplacement,
     Pressure,
+    QuadraticGalerkin,
     Roller,
     Scene,
     Traction,
@@ -146,12 +147,15 @@ class Model:
         return displacement * self.units.displacement, traction, energy
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
-        """Give each contact element the mean of the tractions at its nodes."""
+        """Give each contact element the mean of the tractions that its nodes interpolate."""
         space = self.elastic.displacement_space
         at_nodes = np.zeros((space.n_dofs // 2, 2))
         at_nodes[self.nodes.nodes] = np.einsum("nk,nkc->nc", state.traction, self.nodes.frame)
         elements = contact_elements(self.scene, self.mesh)
-        traction[elements] = at_nodes[space.element_dofs[elements]].mean(axis=1)
+        xi, weights = gauss_legendre(space.degree + 1)
+        traction[elements] = np.einsum(
+            "p,epc->ec", space.basis(xi) @ weights / 2.0, at_nodes[space.element_dofs[elements]]
+        )
 
 
 def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Model:
@@ -188,7 +192,7 @@ def _problem(
     scene: Scene, mesh: BoundaryMesh, units: Units, body: CondensedBody, space: BoundarySpace
 ) -> ContactProblem:
     parts, _ = contact_places(scene, mesh, space, body.nodes)
-    law = scene.law_at(parts, units.to_physical(body.nodes.points))
+    law = scene.law_at(parts, dof_points(space, mesh)[body.nodes.nodes])
     return ContactProblem(body, _gap(scene, mesh, body.nodes, space, units), law.scaled(units.stress))
 
 
@@ -235,6 +239,8 @@ def _elastic_map(scene: Scene, mesh: BoundaryMesh, units: Units) -> SteklovPoinc
     material = scene.material.scaled(units.modulus)
     if isinstance(scene.discretisation, ConstantCollocation):
         return CollocationMap(mesh, material)
+    if isinstance(scene.discretisation, QuadraticGalerkin):
+        return GalerkinMap(mesh, material, QuadraticSpace(mesh), LinearSpace(mesh, break_nodes(mesh)))
     return GalerkinMap(mesh, material)
 
 
@@ -330,7 +336,8 @@ def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Ca
 def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, space: BoundarySpace, units: Units) -> FloatArray:
     """Measure the gap of each contact node to the nearest obstacle among the parts it belongs to."""
     gap = np.full(space.n_dofs // 2, np.inf)
-    points = units.to_physical(nodes.points)
+    # not by way of the dimensionless points: a node on the obstacle shall have the gap zero, also far from the origin
+    points = dof_points(space, mesh)[nodes.nodes]
     for part in scene.contact_parts:
         if isinstance(part.condition, Contact):
             own = np.isin(nodes.nodes, space.element_dofs[mesh.part(part.name)])

@@ -14,7 +14,17 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.scene import Clamped, ConstantCollocation, Contact, LinearGalerkin, PrescribedDisplacement, Roller, Scene
+from bemkit.geometry.space import break_nodes
+from bemkit.scene import (
+    Clamped,
+    ConstantCollocation,
+    Contact,
+    LinearGalerkin,
+    PrescribedDisplacement,
+    QuadraticGalerkin,
+    Roller,
+    Scene,
+)
 
 _BYTES_PER_NUMBER = 8
 # a direction counts as held when it moves the held nodes by more than round-off of the node positions
@@ -103,9 +113,10 @@ def check_memory(scene: Scene) -> None:
         Naming the memory needed, the memory there is, and the number of elements that fits.
     """
     available = _physical_memory()
-    needed = _N_MATRICES * _BYTES_PER_NUMBER * (2 * scene.mesh.elements) ** 2
+    per_element = 4 if isinstance(scene.discretisation, QuadraticGalerkin) else 2
+    needed = _N_MATRICES * _BYTES_PER_NUMBER * (per_element * scene.mesh.elements) ** 2
     if needed > available:
-        n_fitting = int((available / (_N_MATRICES * _BYTES_PER_NUMBER)) ** 0.5 / 2.0)
+        n_fitting = int((available / (_N_MATRICES * _BYTES_PER_NUMBER)) ** 0.5 / per_element)
         raise TooLargeError(
             f"mesh.elements is {scene.mesh.elements}: needs about {needed / 1e9:.3g} GB, this computer has "
             f"{available / 1e9:.3g} GB: use at most {n_fitting} elements"
@@ -170,11 +181,14 @@ def _matrix(name: str, reason: str, n_rows: int, n_columns: int, copies: int = 1
 def _discretisation_items(scene: Scene, mesh: BoundaryMesh) -> Iterator[PlanItem]:
     n_tractions, n_nodal = 2 * mesh.n_elements, 2 * mesh.n_nodes
     match scene.discretisation:
-        case LinearGalerkin():
+        case LinearGalerkin() | QuadraticGalerkin():
+            degrees, word = "linear displacements, constant tractions", "linear"
+            if isinstance(scene.discretisation, QuadraticGalerkin):
+                degrees, word = "quadratic displacements, linear tractions", "quadratic"
+                n_tractions = 2 * (mesh.n_nodes + int(break_nodes(mesh).sum()))
+                n_nodal = 2 * (mesh.n_nodes + mesh.n_elements)
             yield PlanItem(
-                "linear displacements, constant tractions",
-                True,
-                f"discretisation 'linear': {n_nodal} displacements at nodes, {n_tractions} tractions on elements",
+                degrees, True, f"discretisation '{word}': {n_nodal} displacements at nodes, {n_tractions} tractions"
             )
             yield _matrix("single layer", "maps tractions to displacements", n_tractions, n_tractions)
             yield _matrix("double layer", "maps displacements to displacements", n_tractions, n_nodal)
@@ -221,7 +235,8 @@ def _contact_items(scene: Scene, mesh: BoundaryMesh) -> Iterator[PlanItem]:
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws if not law.is_frictionless))
     n_steps = len(scene.load_factors)
     kind = "static" if n_steps == 1 else "incremental"
-    yield PlanItem("friction", bool(names), f"law {names}, {kind}" if names else "the law allows no tangential traction")
+    reason = f"law {names}, {kind}" if names else "the law allows no tangential traction"
+    yield PlanItem("friction", bool(names), reason)
     yield PlanItem(
         "load history",
         n_steps > 1,

@@ -257,7 +257,7 @@ def node_displacement(solution: Solution) -> FloatArray:
         before, after = mesh.node_elements.T
         share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
         return np.asarray(share * boundary.displacement[before] + (1.0 - share) * boundary.displacement[after])
-    return boundary.displacement
+    return boundary.displacement[: mesh.n_nodes]
 
 
 _LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "markersize": 2.0})

@@ -116,12 +116,18 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
         ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
         ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
         ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
+        *_estimate(solution),
         ("transitions", Text("\n".join(_transition_lines(solution)))),
         ("linear solves", Text(f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})")),
         ("certificate", Text(f"worst entry {certificate.worst:.1e} ({worst_name.replace('_', ' ')})")),
         ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
     ]
     return rows
+
+
+def _estimate(solution: Solution) -> list[tuple[str, Text]]:
+    error = solution.estimated_error
+    return [] if error is None else [("estimated error", Text(f"{error:.1e}  relative, in the energy norm"))]
 
 
 def _nan_first(value: float) -> float:

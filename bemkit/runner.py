@@ -16,6 +16,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
 from bemkit.history import load_steps
 from bemkit.model import Model, build_model, find_units
+from bemkit.operators.threads import blas_threads_for
 from bemkit.plan import Plan, make_plan
 from bemkit.scene import Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
@@ -99,6 +100,18 @@ def run_history(
     mesh = steps[0].build_mesh() if mesh is None else mesh
     plan = make_plan(scenes[0], mesh)
     clock.append(time.perf_counter())
+    with blas_threads_for(steps[0].discretisation.displacement_space(mesh).n_dofs):
+        return tuple(_solve_in_turn(steps, mesh, plan, start, callback, clock))
+
+
+def _solve_in_turn(
+    steps: Sequence[Scene],
+    mesh: BoundaryMesh,
+    plan: Plan,
+    start: Solution | None,
+    callback: Callable[[StepRecord], None] | None,
+    clock: list[float],
+) -> list[Solution]:
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
     model = build_model(steps[0], mesh, units)
     state = None if start is None else state_on(model, start)
@@ -117,7 +130,7 @@ def run_history(
         state = result.state
         if not result.is_converged:
             break
-    return tuple(solutions)
+    return solutions
 
 
 def _reason(model: Model, result: ContactSolution) -> str:
@@ -145,7 +158,7 @@ def _solution(model: Model, result: ContactSolution, plan: Plan, clock: list[flo
         force_normal=-float(np.sum(table.weight * table.sigma_n)),
         force_tangential=float(np.sum(table.weight * table.sigma_t)),
         energy=energy,
-        transitions=find_transitions(table),
+        transitions=find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement),
         timings=timings,
         plan=plan,
         message=result.message,
@@ -193,13 +206,13 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
 
 def _fields(model: Model, state: ContactState) -> tuple[BoundaryFields, float]:
     displacement, traction, energy = model.boundary_fields(state)
-    points = model.units.to_physical(dof_points(model.elastic.displacement_space))
+    points = dof_points(model.elastic.displacement_space, model.mesh)
     return BoundaryFields(points, displacement, model.mesh.centres.copy(), traction), energy
 
 
 def _contact_table(model: Model, result: ContactSolution) -> ContactTable:
     units, state = model.units, result.state
-    points = units.to_physical(model.nodes.points)
+    points = dof_points(model.elastic.displacement_space, model.mesh)[model.nodes.nodes]
     parts, lengths = model.places
     gap = model.problem.gap * units.displacement
     displacement = state.displacement * units.displacement

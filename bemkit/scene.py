@@ -23,6 +23,7 @@ from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
+from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.operators.material import Material
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -195,13 +196,34 @@ class Part:
 class LinearGalerkin:
     """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
 
+    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the space of the displacements; its nodes carry the contact conditions."""
+        return LinearSpace(mesh)
+
+
+@dataclass(frozen=True)
+class QuadraticGalerkin:
+    """Symmetric Galerkin: displacements continuous and quadratic, tractions linear on each element.
+
+    Tractions are continuous except at corners and at ends of boundary parts. Contact conditions hold at the ends and
+    the middles of elements.
+    """
+
+    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the space of the displacements; the nodes of the mesh are its first dofs."""
+        return QuadraticSpace(mesh)
+
 
 @dataclass(frozen=True)
 class ConstantCollocation:
     """Direct collocation with displacements and tractions constant on each element, as in the source paper."""
 
+    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the space of the displacements; its nodes are the centres of elements."""
+        return ConstantSpace(mesh)
 
-Discretisation: TypeAlias = LinearGalerkin | ConstantCollocation
+
+Discretisation: TypeAlias = LinearGalerkin | QuadraticGalerkin | ConstantCollocation
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -15,9 +16,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
+from bemkit.estimate import element_errors
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import Plan
-from bemkit.scene import Scene
+from bemkit.scene import ConstantCollocation, Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status, StepRecord
 
@@ -161,12 +163,14 @@ class Transition:
         }
 
 
-def find_transitions(contact: ContactTable) -> tuple[Transition, ...]:
+def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
     """Find where the status changes along each contact part.
 
     Parameters
     ----------
     contact : ContactTable
+    slip : (n_contact,) array [m], optional
+        Under the incremental law ``u_t`` less its value at the end of the step before; ``u_t`` itself by default.
 
     Returns
     -------
@@ -181,10 +185,11 @@ def find_transitions(contact: ContactTable) -> tuple[Transition, ...]:
     as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
+    slip = contact.u_t if slip is None else slip
     found = []
     for i in range(contact.n_contact - 1):
         if words[i] != words[i + 1] and _are_neighbours(contact, i):
-            s = _transition_place(contact, words, i)
+            s = _transition_place(contact, slip, words, i)
             rows = [k for k, part in enumerate(contact.part) if part == contact.part[i]]
             x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
             found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
@@ -199,7 +204,7 @@ def _are_neighbours(contact: ContactTable, i: int) -> bool:
     return contact.part[i] == contact.part[i + 1] and bool(distance <= reach)
 
 
-def _transition_place(contact: ContactTable, words: list[str], i: int) -> float:
+def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str], i: int) -> float:
     """Return the arc length of the transition between the nodes i and i + 1; see `find_transitions`."""
     looser = ("separated", "slip", "stick")
     is_forward = looser.index(words[i]) < looser.index(words[i + 1])
@@ -208,7 +213,7 @@ def _transition_place(contact: ContactTable, words: list[str], i: int) -> float:
     if not 0 <= before < contact.n_contact:
         return middle
     is_run = words[before] == words[last] and contact.part[before] == contact.part[last]
-    field = contact.clearance if words[last] == "separated" else np.abs(contact.u_t)
+    field = contact.clearance if words[last] == "separated" else np.abs(slip)
     near, far = (float(field[node]) for node in (last, before))
     if not is_run or not 0.0 <= near < far < np.inf:
         return middle
@@ -265,6 +270,21 @@ class Solution:
         """Whether the solver vouches for the result."""
         return self.status is Status.CONVERGED
 
+    @cached_property
+    def element_errors(self) -> FloatArray | None:
+        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
+        if isinstance(self.scene.discretisation, ConstantCollocation):
+            return None
+        space = self.scene.discretisation.displacement_space(self.mesh)
+        return element_errors(space, self.boundary.displacement, self.scene.material.plane_modulus)
+
+    @cached_property
+    def estimated_error(self) -> float | None:
+        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)); None for collocation."""
+        if self.element_errors is None:
+            return None
+        return float(np.sqrt(self.element_errors.sum() / (2.0 * self.energy))) if self.energy > 0.0 else 0.0
+
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
 
@@ -273,7 +293,7 @@ class Solution:
         dict
             ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
             ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
-            ``energy`` [J/m], ``transitions``, ``certificate``, ``timings`` [s], ``plan``.
+            ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``, ``timings`` [s], ``plan``.
         """
         return {
             "title": self.scene.title,
@@ -287,6 +307,7 @@ class Solution:
             "force_normal": self.force_normal,
             "force_tangential": self.force_tangential,
             "energy": self.energy,
+            "estimated_error": self.estimated_error,
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "timings": dict(self.timings),

@@ -14,7 +14,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
-from bemkit.scene import ConstantCollocation
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -89,12 +88,11 @@ def element_displacement(solution: Solution) -> FloatArray:
     Returns
     -------
     (n_elements, 2) array [m]
-        Given there directly, or the mean of both end nodes.
+        Given there directly, or interpolated.
     """
-    displacement = solution.boundary.displacement
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        return displacement
-    return np.asarray(displacement[solution.mesh.elements].mean(axis=1))
+    space = solution.scene.discretisation.displacement_space(solution.mesh)
+    at_centre = space.basis(np.zeros(1))[:, 0]
+    return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))
 
 
 def _columns(solution: Solution, table: str) -> dict[str, Any]:

@@ -95,6 +95,24 @@ def test_pressure_acts_against_the_normal_on_every_side() -> None:
     assert solution.force_tangential == pytest.approx(0.0, abs=1e-10)
 
 
+@pytest.mark.parametrize("discretisation", [bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation()])
+def test_a_body_in_contact_all_round(discretisation: object) -> None:
+    shrunk = bk.Scene(
+        title="disk in a cavity that is too small",
+        shape=bk.Disk(1.0),
+        material=bk.Material(1e4, 0.3),
+        law=bk.Coulomb(0.5),
+        parts=(bk.Part("all", bk.Contact(bk.Cavity((0.0, 0.0), 0.999))),),
+        discretisation=discretisation,  # type: ignore[arg-type]
+        mesh=bk.MeshOptions(60),
+    )
+    solution = bk.run(shrunk)
+    assert solution.is_converged
+    assert solution.contact.status_words() == ["stick"] * solution.contact.n_contact
+    # p = E delta / (R (1 + nu) (1 - 2 nu)); elements of 6 degrees are wrong by about their angle squared, 0.011
+    np.testing.assert_allclose(solution.contact.sigma_n, -1e4 * 1e-3 / (1.3 * 0.4), rtol=0.01)
+
+
 def test_several_scenes_can_run_on_an_executor() -> None:
     from concurrent.futures import ThreadPoolExecutor
 

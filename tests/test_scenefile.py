@@ -226,7 +226,7 @@ CONTACT = '{ kind = "contact", obstacle = { kind = "half-plane", point = [0.0, 0
         ("= 320", "= 1000000000", "mesh: elements is 1000000000: give a number from 3"),
         ("= 320", "= 3.5", "mesh.elements: 3.5 is not a whole number"),
         ('"uniform"', '"unifrom"', "mesh.grading.kind: unknown grading 'unifrom'.*did you mean 'uniform'"),
-        ('"constant"', '"konstant"', "discretisation.kind: unknown discretisation.*linear, constant"),
+        ('"constant"', '"konstant"', "discretisation.kind: unknown discretisation.*linear, quadratic, constant"),
         (
             '"semismooth-newton"',
             '"newton"',

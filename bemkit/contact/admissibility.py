@@ -106,9 +106,10 @@ def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, Float
 
 
 def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return (n_motions,) coefficients in [-1, 1] of the escape on which the load does most work, zeros if none.
+    """Return (n_motions,) coefficients of the escape on which the load does most work, zeros if none.
 
-    `slope` is nan at nodes that never touch.
+    Their absolute values add up to one at most, which favours escapes along a single motion: among several, the
+    simplest to name. `slope` is nan at nodes that never touch.
     """
     touches = np.isfinite(slope)
     normal, tangential = motions[:, touches, 0].T, motions[:, touches, 1].T  # (n_touching, n_motions)
@@ -122,14 +123,26 @@ def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArra
     from scipy.optimize import linprog
 
     n_touching, n_motions = normal.shape
-    # Unknowns: coefficients c and e >= |v_t|. Maximise load c - resistance e.
-    unit = np.eye(n_touching)
-    conditions = np.block([[normal, np.diag(slope)], [tangential, -unit], [-tangential, -unit]])
+    # Unknowns: coefficients c, a >= |c| and e >= |v_t|. Maximise load c - resistance e.
+    own, unit = np.eye(n_motions), np.eye(n_touching)
+    no_motion, no_node = np.zeros((n_touching, n_motions)), np.zeros((n_motions, n_touching))
+    conditions = np.block(
+        [
+            [normal, no_motion, np.diag(slope)],
+            [tangential, no_motion, -unit],
+            [-tangential, no_motion, -unit],
+            [own, -own, no_node],
+            [-own, -own, no_node],
+            [np.zeros(n_motions), np.ones(n_motions), np.zeros(n_touching)],
+        ]
+    )
+    limits = np.zeros(len(conditions))
+    limits[-1] = 1.0
     result = linprog(
-        np.concatenate([-load, resistance]),
+        np.concatenate([-load, np.zeros(n_motions), resistance]),
         A_ub=conditions,
-        b_ub=np.zeros(3 * n_touching),
-        bounds=[(-1.0, 1.0)] * n_motions + [(0.0, None)] * n_touching,
+        b_ub=limits,
+        bounds=[(None, None)] * n_motions + [(0.0, None)] * (n_motions + n_touching),
     )
     if result.x is None:  # zero is always admissible, so this is the solver's failure: do not condemn the load
         return np.zeros(n_motions)

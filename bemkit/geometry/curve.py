@@ -92,8 +92,9 @@ class Segment:
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve; both ends are met to the last digit."""
         s = np.asarray(s, dtype=float)[:, None]
-        points: FloatArray = (1.0 - s) * np.array(self.start) + s * np.array(self.end)
-        return points
+        start, end = np.array(self.start), np.array(self.end)
+        # a coordinate that does not change keeps its last digit, so a side along an axis is straight at any distance
+        return np.where(start == end, start, (1.0 - s) * start + s * end)
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Return the constant vector from start to end."""

@@ -1,33 +1,23 @@
 """From an outline to a mesh: the user's parts, the user's number of elements."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.curve import Curve
-from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.division import divide
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.grading import Grading, Uniform
-from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.outline import Outline
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.selection import N_SAMPLES, Selection, breakpoints, merge_breakpoints
+from bemkit.geometry.selection import Selection
 from bemkit.geometry.vectors import norms
 
 _N_PANELS = 256
 _N_PANEL_POINTS = 4
 _SPEED_TOLERANCE = 1e-12  # a speed that varies by less is constant up to round-off
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """A piece of a side, from one parameter to another, that lies in one part or in none."""
-
-    side: int
-    span: tuple[float, float]
-    part: str | None
 
 
 def discretise(
@@ -69,19 +59,17 @@ def discretise(
     _check_density(density, outline)
     parts = {} if parts is None else parts
     grading = Uniform() if grading is None else grading
-    _check_sides(outline, parts)
-    pieces = [piece for number, side in enumerate(outline.sides) for piece in _cut(number, side, parts)]
-    for name, selection in parts.items():
-        if not any(piece.part == name for piece in pieces):
-            raise GeometryError(_empty_part_message(name, selection, outline))
+    division = divide(outline, parts)
     rulers = [_Ruler(side.curve) for side in outline.sides]
     weights = [
-        density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span) for piece in pieces
+        density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span)
+        for piece in division.pieces
     ]
     counts = share_elements(n_elements, np.array(weights))
     positions = [_checked_positions(grading, int(count)) for count in counts]
-    parameters = [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(pieces, positions, strict=True)]
-    return _join(outline, pieces, parameters, tuple(parts))
+    return division.mesh(
+        [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(division.pieces, positions, strict=True)]
+    )
 
 
 def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
@@ -137,50 +125,6 @@ class _Ruler:
         return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
 
 
-def _cut(number: int, side: Side, parts: Mapping[str, Selection]) -> list[_Piece]:
-    """Cut a side where parts end."""
-    predicates = [
-        selection.where
-        for selection in parts.values()
-        if selection.where is not None and (not selection.sides or side.name in selection.sides)
-    ]
-    cuts = merge_breakpoints(np.concatenate([np.zeros(0), *(breakpoints(side.curve, where) for where in predicates)]))
-    ends = np.concatenate([[0.0], cuts, [1.0]])
-    middles = side.curve.point(0.5 * (ends[:-1] + ends[1:]))
-    names: list[str | None] = [None] * len(middles)
-    for name, selection in parts.items():
-        for k in np.flatnonzero(selection.holds(side.name, middles)):
-            if names[k] is not None:
-                raise GeometryError(
-                    f"discretise: parts {names[k]!r} and {name!r} overlap on side {side.name!r}, at "
-                    f"{format_point(middles[k])}: restrict one of them"
-                )
-            names[k] = name
-    spans = zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True)
-    return [_Piece(number, span, name) for span, name in zip(spans, names, strict=True)]
-
-
-def _join(
-    outline: Outline, pieces: list[_Piece], parameters: list[FloatArray], part_names: tuple[str, ...]
-) -> BoundaryMesh:
-    """Make the mesh whose elements lie between consecutive parameters of each piece."""
-    nodes = [outline.sides[piece.side].curve.point(s[:-1]) for piece, s in zip(pieces, parameters, strict=True)]
-    counts = [len(points) for points in nodes]
-    side = np.repeat([piece.side for piece in pieces], counts)
-    part = np.repeat([piece.part or "" for piece in pieces], counts)
-    loop = np.repeat(np.arange(len(outline.loops)), [len(sides) for sides in outline.loops])[side]
-    is_curved = np.array([not side.curve.is_straight for side in outline.sides])
-    return BoundaryMesh(
-        np.concatenate(nodes),
-        np.column_stack([np.arange(len(loop)), following_in_loops(np.bincount(loop))]),
-        {name: np.flatnonzero(part == name) for name in part_names},
-        tuple(side.curve for side in outline.sides if not side.curve.is_straight),
-        np.where(is_curved, np.cumsum(is_curved) - 1, -1)[side] if is_curved.any() else None,
-        np.concatenate([np.column_stack([s[:-1], s[1:]]) for s in parameters]) if is_curved.any() else None,
-        outline.is_exterior,
-    )
-
-
 def _checked_positions(grading: Grading, n: int) -> FloatArray:
     """Return the positions of a grading, which may be the user's own, or say what is wrong with them."""
     positions = np.asarray(grading.positions(n), dtype=float)
@@ -201,21 +145,3 @@ def _check_density(density: Mapping[str, float], outline: Outline) -> None:
             )
         if not 0.0 < value < np.inf:
             raise GeometryError(f"discretise: the density of side {side!r} is {value}: give a positive, finite number")
-
-
-def _check_sides(outline: Outline, parts: Mapping[str, Selection]) -> None:
-    for name, selection in parts.items():
-        for side in selection.sides:
-            if side not in outline.side_names:
-                raise GeometryError(
-                    f"discretise: part {name!r} names the side {side!r}: the sides are "
-                    f"{', '.join(repr(known) for known in outline.side_names)}"
-                )
-
-
-def _empty_part_message(name: str, selection: Selection, outline: Outline) -> str:
-    sides = ", ".join(repr(side) for side in selection.sides or outline.side_names)
-    return (
-        f"discretise: part {name!r} is empty: its predicate holds at none of {N_SAMPLES} points along each of "
-        f"the sides {sides}; widen it or name other sides"
-    )

@@ -63,11 +63,22 @@ def local_coefficients(space: BoundarySpace) -> FloatArray:
     return coefficients
 
 
-def dof_points(space: BoundarySpace) -> FloatArray:
-    """Return the (n_scalar, 2) points [m] at which the scalar dofs are function values."""
+def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatArray:
+    """Return the (n_scalar, 2) points [m] at which the scalar dofs are function values.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+    mesh : BoundaryMesh, optional
+        The same mesh in other units, to find the points there to the last digit; that of the space if left out.
+
+    Returns
+    -------
+    (n_scalar, 2) array [m]
+    """
+    mesh = space.mesh if mesh is None else mesh
     points = np.empty((space.n_dofs // 2, 2))
-    elements = np.arange(space.mesh.n_elements)
-    points[space.element_dofs] = space.mesh.points(elements, space.local_nodes)
+    points[space.element_dofs] = mesh.points(np.arange(mesh.n_elements), space.local_nodes)
     return points
 
 
@@ -236,6 +247,15 @@ class QuadraticSpace(_NodalSpace):
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the three Lagrange polynomials."""
         return np.stack([0.5 * xi * (xi - 1.0), (1.0 - xi) * (1.0 + xi), 0.5 * xi * (xi + 1.0)])
+
+
+def break_nodes(mesh: BoundaryMesh) -> BoolArray:
+    """Return the (n_nodes,) mask of nodes where tractions may jump: corners and ends of boundary parts."""
+    owner = np.full(mesh.n_elements, -1)
+    for number, name in enumerate(mesh.parts):
+        owner[mesh.part(name)] = number
+    changes = owner[mesh.node_elements[:, 0]] != owner[mesh.node_elements[:, 1]]
+    return corner_nodes(mesh) | changes
 
 
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:

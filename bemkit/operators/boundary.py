@@ -303,7 +303,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> DoubleLayer:
     """Return K, the double layer operator (paper, eq. 27); the trial space must be continuous.
 
-    On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r.
+    On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r, on that of an exterior (1/2 M + K) r = M r.
     """
     return DoubleLayer(trial, test, material)
 

@@ -8,7 +8,8 @@ another fingerprint is stale, one with another checksum is damaged; neither is e
     /                attributes format, schema_version, bemkit, checksum, and one fingerprint for each of FINGERPRINTS
     /arrays          one dataset for each array
 
-Maps by collocation are not kept: their matrices are assembled faster than a file is read.
+Maps by collocation are not kept: assembling their matrices costs no more than reading them, and what else they compute
+depends on supports.
 """
 
 from __future__ import annotations

@@ -69,10 +69,21 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
                 target[row, column] = value
         _write(single, rows, a, b)
         _write(double, rows, c, d)
+        _balance(double, rows, 0.5 if mesh.is_exterior else -0.5)
 
     step = max(1, CHUNK_PAIRS // n)
     for_each_chunk(fill, (slice(first, min(first + step, n)) for first in range(0, n, step)), n_pairs=n * n)
     return single.reshape(2 * n, 2 * n), double.reshape(2 * n, 2 * n)
+
+
+def _balance(double: FloatArray, rows: slice, constant: float) -> None:
+    """Make the double layer of a constant displacement exact in the diagonal blocks.
+
+    An element of length h at coordinates of size one has its midpoint to eps / h only; the tractions there feel that
+    divided by h again unless a translation causes none.
+    """
+    own = np.arange(rows.start, rows.stop)
+    double[own, :, own, :] += constant * np.eye(2) - double[rows].sum(axis=2)
 
 
 def _close_pairs(panels: Panels, rows: slice, distance: float) -> list[tuple[IntArray, IntArray]]:

@@ -44,8 +44,9 @@ class Cholesky:
 
         # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
         self._factor, info = dpotrf(np.array(matrix.T, order="F"), lower=1, overwrite_a=1, clean=0)
-        pivots = np.diag(self._factor)
-        if info or (pivots.size and pivots.min() <= 1e-14 * pivots.max()):
+        # each pivot by its own diagonal entry: on graded meshes these differ by the square of the grading
+        pivots, sizes = np.diag(self._factor), np.sqrt(np.abs(np.diag(matrix)))
+        if info or np.any(pivots <= 1e-14 * sizes):
             raise SingularMatrixError(
                 f"{name} is not positive definite: check for coincident elements and for supports that leave "
                 "the body free"
@@ -67,6 +68,8 @@ class Cholesky:
         """Solve A x = right."""
         from scipy.linalg.lapack import dpotrs
 
+        if not right.size:  # a body in contact all round leaves nothing else to solve for, which LAPACK does not take
+            return np.zeros(right.shape)
         return np.asarray(dpotrs(self._factor, right, lower=1)[0])
 
     def solve_lower(self, right: FloatArray) -> FloatArray:
@@ -88,7 +91,7 @@ class DenseLU:
     Parameters
     ----------
     matrix : (n, n) array
-        Overwritten if it is column-major.
+        Overwritten.
     name : str
         What the matrix stands for, for the message.
 
@@ -101,6 +104,10 @@ class DenseLU:
     def __init__(self, matrix: FloatArray, name: str) -> None:
         from scipy.linalg.lapack import dgecon, dgetrf
 
+        # columns belong to elements: on graded meshes their sizes differ by the grading, which is no singularity
+        sizes = np.abs(matrix).max(axis=0, initial=0.0)
+        self._column_sizes = np.where(sizes > 0.0, sizes, 1.0)
+        matrix /= self._column_sizes
         norm = float(np.linalg.norm(matrix, 1))
         self._factor, self._pivots, info = dgetrf(matrix, overwrite_a=1)
         reciprocal_condition = 0.0 if info else dgecon(self._factor, norm)[0]
@@ -114,4 +121,5 @@ class DenseLU:
         """Solve A x = right."""
         from scipy.linalg.lapack import dgetrs
 
-        return np.asarray(dgetrs(self._factor, self._pivots, right)[0])
+        solution = np.asarray(dgetrs(self._factor, self._pivots, right)[0])
+        return (solution.T / self._column_sizes).T

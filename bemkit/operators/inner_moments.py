@@ -35,6 +35,9 @@ SEPARATION = 3.0
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
 MAX_SPLITS = 60
+CENTRE, START, END = 0, 1, 2
+AT_END = 0.5
+"""Points closer to an end of an element than this, in half lengths, see its densities expanded about that end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +53,13 @@ class DisplacementMoments:
 
 @dataclass(frozen=True, eq=False)
 class GradientMoments:
-    """What displacement gradients and stresses need; every array is (n_powers, n_pairs)."""
+    """What displacement gradients and stresses need; every array is (n_powers, n_pairs).
 
+    Powers are those of t - e, with e = 0, -1, 1 (`CENTRE`, `START`, `END`) as `origin` (n_pairs,) says: close to an end
+    of an element the densities are expanded about it, or the two elements that meet there would cancel.
+    """
+
+    origin: IntArray
     reciprocal: ComplexArray
     spread: ComplexArray
     hyper: ComplexArray
@@ -141,15 +149,30 @@ def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArra
     """Return the moments of straight elements for gradients; parameters as in `straight_displacement_moments`."""
     plus, minus, eta = _local(panels, x, elements)
     half, tangent = panels.half[elements], panels.tangent[elements]
-    t, g, h = (np.stack(row) for row in local_moments(plus, minus, max(1, highest), 3))
+    origin = np.where(np.abs(plus) < AT_END, START, np.where(np.abs(minus) < AT_END, END, CENTRE))
+    orders = local_moments(plus, minus, max(1, highest), 3)
+    for end, zeta in ((START, plus), (END, minus)):
+        _expand_about_end(orders, zeta, np.flatnonzero(origin == end), end)
+    t, g, h = (np.stack(row)[: highest + 1] for row in orders)
     cube = tangent * tangent * tangent
-    chosen = slice(0, highest + 1)
     return GradientMoments(
-        reciprocal=tangent.conj() * t[chosen],
-        spread=cube * (t[chosen].conj() + 2j * eta * g[chosen].conj()),
-        hyper=(tangent.conj() / half) * g[chosen],
-        twist=(-cube / half) * (g[chosen].conj() + 4j * eta * h[chosen].conj()),
+        origin=origin,
+        reciprocal=tangent.conj() * t,
+        spread=cube * (t.conj() + 2j * eta * g.conj()),
+        hyper=(tangent.conj() / half) * g,
+        twist=(-cube / half) * (g.conj() + 4j * eta * h.conj()),
     )
+
+
+def _expand_about_end(orders: list[list[ComplexArray]], zeta: ComplexArray, chosen: IntArray, end: int) -> None:
+    """Replace the powers of t by those of t - e at some points; `zeta` is their coordinate from that end."""
+    for k in range(1, len(orders[0])):
+        # the integral of (t - e)**(k - 1) over [-1, 1]
+        moment = 2.0**k / k if end == START else -((-2.0) ** k) / k
+        below: ComplexArray | float = moment
+        for row in orders:
+            row[k][chosen] = zeta[chosen] * row[k - 1][chosen] - below
+            below = row[k - 1][chosen]
 
 
 def _local(panels: Panels, x: ComplexArray, elements: IntArray) -> tuple[ComplexArray, ComplexArray, FloatArray]:
@@ -216,7 +239,7 @@ class CurvedElements:
                 (tau - 2.0 * rho * tau.conj() / conjugate) / squared,
             ]
 
-        return GradientMoments(*self._integrate(x, elements, highest, integrands))
+        return GradientMoments(np.full(x.size, CENTRE), *self._integrate(x, elements, highest, integrands))
 
     def angles(self, x: ComplexArray, elements: IntArray) -> FloatArray:
         """Return the angles (n,) [rad] under which the elements are seen, anticlockwise positive."""

@@ -63,6 +63,11 @@ class Material:
         return self.poisson_ratio
 
     @property
+    def is_incompressible(self) -> bool:
+        """Whether the volume cannot change at all: plane strain with Poisson's ratio 1/2 to the last digits."""
+        return self.effective_poisson_ratio > 0.5 - 1e-12
+
+    @property
     def kappa(self) -> float:
         """Kolosov's constant [-]: 3 - 4 nu in plane strain, (3 - nu) / (1 + nu) in plane stress."""
         return 3.0 - 4.0 * self.effective_poisson_ratio

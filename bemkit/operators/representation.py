@@ -13,6 +13,7 @@ With complex displacements u = u_x + i u_y and z = x + i y, the formula is diffe
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import comb
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, local_coefficients
 from bemkit.operators.inner_moments import (
+    CENTRE,
+    END,
+    START,
     CurvedElements,
     DisplacementMoments,
     GradientMoments,
@@ -64,12 +68,13 @@ class InteriorFields:
 
     All integrals are exact to round-off: straight elements are integrated in closed form, curved ones by a rule that
     follows the distance d of the point, and the displacement of the nearest boundary point is subtracted before the
-    strongly singular kernels act. On straight sides that holds at any distance; near curved elements the round-off of
-    the coordinates enters stresses as eps L / d (L the diameter of the body). What limits the accuracy is the boundary data: the result is
-    the exact field of the given piecewise polynomials. Where these jump or kink, at a node between constant or linear
-    elements, stresses of that field grow like log(d) (jumps of tractions or kinks of displacements) or 1 / d (jumps
-    of displacements) with the distance d. Closer than about one element length, stresses of discrete solutions are
-    therefore to be read opposite the middle of elements, or on the boundary itself.
+    strongly singular kernels act. On straight sides that holds at any distance; near curved elements the round-off
+    of the coordinates enters stresses as eps L / d (L the diameter of the body).
+
+    What limits the accuracy is the boundary data: the result is the exact field of the given piecewise polynomials.
+    Where these jump or kink, at a node between constant or linear elements, stresses of that field grow like log(d)
+    (jumps of tractions or kinks of displacements) or 1 / d (jumps of displacements). Closer to the boundary than
+    about one element length, stresses of discrete solutions are therefore to be read opposite the middle of elements.
     """
 
     def __init__(
@@ -162,8 +167,8 @@ class InteriorFields:
         location = self._locator.locate(points)
         _require_inside(location, points)
         relative = points - self.mesh.centre
-        powers = location.xi[:, None] ** np.arange(self._displacement.shape[1])
-        reference = np.sum(self._displacement[location.element] * powers, axis=1)
+        powers = location.xi[:, None] ** np.arange(self._displacement.shape[2])
+        reference = np.sum(self._displacement[CENTRE, location.element] * powers, axis=1)
         step = max(1, CHUNK_PAIRS // self.mesh.n_elements)
         for first in range(0, len(points), step):
             rows = slice(first, min(first + step, len(points)))
@@ -179,7 +184,7 @@ class InteriorFields:
     @property
     def _highest(self) -> int:
         """Highest power of the local coordinate in the densities."""
-        return int(max(self._displacement.shape[1], self._traction.shape[1])) - 1
+        return int(max(self._displacement.shape[2], self._traction.shape[2])) - 1
 
     def _displacement_moments(self, x: ComplexArray, element: IntArray, is_curved: bool) -> DisplacementMoments:
         """Evaluate the inner integrals of displacements."""
@@ -200,11 +205,11 @@ class InteriorFields:
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         result = np.zeros(element.size, complex)
-        for k, p in enumerate(self._traction[element].T):
+        for k, p in enumerate(self._traction[CENTRE, element].T):
             diagonal = 0.5 * moments.measure[k] - kappa * moments.log[k]
             single = diagonal * p + 0.5 * moments.quotient[k] * p.conj()
             result += (0.5 * factor / self.material.shear_modulus) * single
-        for k, v in enumerate(self._displacement[element].T):
+        for k, v in enumerate(self._displacement[CENTRE, element].T):
             v = v - reference if k == 0 else v
             own = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
             result += (0.5j * factor) * (own * v - moments.turn[k] * v.conj())
@@ -217,11 +222,11 @@ class InteriorFields:
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
-        for k, p in enumerate(self._traction[element].T):
+        for k, p in enumerate(self._traction[moments.origin, element].T):
             potential -= (0.5 * factor) * moments.reciprocal[k] * p
             shear -= (0.5 * factor) * (kappa * moments.reciprocal[k].conj() * p + moments.spread[k] * p.conj())
         double = 1j * factor * self.material.shear_modulus
-        for k, v in enumerate(self._displacement[element].T):
+        for k, v in enumerate(self._displacement[moments.origin, element].T):
             v = v - reference if k == 0 else v
             potential -= double * moments.hyper[k] * v
             shear += double * (moments.hyper[k].conj() * v - moments.twist[k] * v.conj())
@@ -247,7 +252,7 @@ def _require_inside(location: Location, points: FloatArray) -> None:
 
 
 def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatArray, name: str) -> ComplexArray:
-    """Return the (n_elements, degree + 1) complex monomial coefficients of a boundary field."""
+    """Return the (3, n_elements, degree + 1) complex coefficients of a boundary field about centre, start and end."""
     if space.mesh is not mesh:
         raise GeometryError(f"{name}_space lives on another mesh: build it on the BoundaryMesh object given as mesh")
     dofs = np.asarray(dofs, dtype=np.float64)
@@ -258,5 +263,13 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
             f"give {shape} finite numbers, one row for each scalar dof"
         )
     values: ComplexArray = dofs[:, 0] + 1j * dofs[:, 1]
-    coefficients: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
-    return coefficients
+    about_centre: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
+    powers = range(space.degree + 1)
+    result = np.zeros((3, *about_centre.shape), complex)
+    for origin, e in ((CENTRE, 0.0), (START, -1.0), (END, 1.0)):
+        for k in powers:
+            for j in range(k + 1):
+                result[origin, :, j] += comb(k, j) * e ** (k - j) * about_centre[:, k]
+    # the very value at the node, so that two elements agree there to the last bit
+    result[[START, END], :, 0] = (values[space.element_dofs] @ space.basis(np.array([-1.0, 1.0]))).T
+    return result

@@ -41,7 +41,8 @@ def print_paper_tables(tables: Sequence[PaperTable], console: Console | None = N
             shown.add_column(f"{rho:.0e}", justify="right", no_wrap=True)
         for i, rho in enumerate(RHO):
             shown.add_row(f"{rho:.0e}", *(_cell(table, i, j) for j in range(len(RHO))))
-        console.print(Text(f"Table {table.number}: outer steps here/print (linear solves here); rho_1 down, rho_2 across", style="bold"))
+        heading = f"Table {table.number}: outer steps here/print (linear solves here); rho_1 down, rho_2 across"
+        console.print(Text(heading, style="bold"))
         console.print(shown)
         console.print(f"semismooth Newton on the same problem: {table.newton_solves} linear solves for every rho\n")
 

@@ -35,7 +35,8 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
         _check_locality(law, name, sigma_n)
         _check_scaling(law, name, sigma_n)
     _check_values(law, name, np.zeros(n_contact))
-    demand(isinstance(law.acts_across_gap, bool), f"{name}.acts_across_gap is no bool")
+    acts = np.asarray(law.acts_across_gap)
+    demand(acts.dtype == bool and acts.shape in ((), (n_contact,)), f"{name}.acts_across_gap is no bool")
 
 
 def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 import shlex
-from doctest import ELLIPSIS, NORMALIZE_WHITESPACE, OutputChecker
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,23 @@ def run_command(line: str) -> None:
     assert program == "bemkit"
     with pytest.raises(SystemExit):
         main(arguments)
+
+
+def matches(shown: str, printed: str) -> bool:
+    """Compare line by line; a line ``...`` stands for any lines, ``...`` within a line for any rest of it."""
+    pattern = ""
+    for line in shown.strip().splitlines():
+        inner = ".*".join(re.escape(" ".join(piece.split())) for piece in line.split("..."))
+        pattern += r"(.*\n)*" if line.strip() == "..." else f" ?{inner.replace('.*', ' ?.*')} ?\n"
+    squeezed = "".join(" ".join(line.split()) + "\n" for line in printed.strip().splitlines())
+    return re.fullmatch(pattern, squeezed) is not None
+
+
+def test_the_comparison_can_fail() -> None:
+    assert matches("a  1\n...\nb ... c\n", "a 1\nx\ny\nb 2  c\n")
+    assert matches("a\n...\n", "a\n")
+    assert not matches("a 1\n...\nb\n", "a 2\nb\n")
+    assert not matches("a\nb\n", "a\nx\nb\n")
 
 
 @pytest.mark.parametrize("page", ["tutorials/first-steps.md", "command-line.md"])
@@ -39,6 +56,6 @@ def test_shown_output(
         output = capsys.readouterr()
         if language in ("python", "sh") and next_language == "text":
             printed = output.out + output.err
-            assert OutputChecker().check_output(shown, printed, ELLIPSIS | NORMALIZE_WHITESPACE), printed
+            assert matches(shown, printed), printed
             n_checked += 1
     assert n_checked >= 4

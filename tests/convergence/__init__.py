@@ -1,0 +1,1 @@
+"""Convergence to closed forms: observed orders and error ceilings."""

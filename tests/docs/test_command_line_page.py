@@ -1,0 +1,91 @@
+"""docs/command-line.md lists every command, option, exit code, JSON field and column there is."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from bemkit import cli
+from bemkit.solvers.base import Status
+from bemkit.tables import TABLES
+from tests.docs.pages import plain, read, section, table
+
+PAGE = read("command-line.md")
+
+
+def leaves(command: click.Command, path: str = "bemkit") -> Iterator[tuple[str, click.Command]]:
+    if not isinstance(command, click.Group):
+        yield path, command
+        return
+    for name, inner in command.commands.items():
+        yield from leaves(inner, f"{path} {name}")
+
+
+COMMANDS = dict(leaves(cli.commands))
+
+
+def names_in(cell: str) -> list[str]:
+    return [plain(name) for name in cell.split(", ")]
+
+
+def all_names(text: str) -> list[str]:
+    return [name for row in table(text) for name in names_in(row[0])]
+
+
+def test_every_command_has_a_section() -> None:
+    assert sorted(re.findall(r"^## (bemkit .*)$", PAGE, re.MULTILINE)) == sorted(COMMANDS)
+
+
+@pytest.mark.parametrize("path", COMMANDS)
+def test_every_option_is_listed_and_accepted(path: str) -> None:
+    command, text = COMMANDS[path], section(PAGE, path)
+    for parameter in command.params:
+        if isinstance(parameter, click.Argument):
+            assert f"`{path} {parameter.human_readable_name}`" in text
+    options = [name for parameter in command.params if isinstance(parameter, click.Option) for name in parameter.opts]
+    assert sorted(all_names(text) if "| option |" in text else []) == sorted(options)
+    shown = CliRunner().invoke(cli.commands, [*path.split()[1:], "--help"])
+    assert shown.exit_code == 0
+    for option in options:
+        assert option in shown.output
+
+
+def test_exit_codes() -> None:
+    codes = [0, cli.NOT_CONVERGED, cli.BAD_INPUT, cli.INTERRUPTED, cli.PIPE_CLOSED]
+    assert [int(row[0]) for row in table(section(PAGE, "Exit codes"))] == codes
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("result") / "result.h5"
+    ran = CliRunner().invoke(cli.commands, ["run", "paper-1", "--elements", "40", "-q", "-o", str(path)])
+    assert ran.exit_code == 0
+    return path
+
+
+def test_json_fields() -> None:
+    text = section(PAGE, "JSON fields")
+    summary = json.loads(CliRunner().invoke(cli.commands, ["run", "paper-1", "--elements", "40", "--json", "-"]).output)
+    assert all_names(text) == list(summary)
+    assert all_names(text.partition("Each of the `transitions`")[2]) == list(summary["transitions"][0])
+    assert all_names(text.partition("The `certificate`")[2]) == list(summary["certificate"])
+    rows = {plain(row[0]): row[-1] for row in table(text)}
+    assert re.findall(r"`(\w+)`", rows["status"]) == [status.name.lower() for status in Status]
+    assert re.findall(r"`(\w+)`", rows["timings"]) == list(summary["timings"])
+    plan_words = [*summary["plan"], *summary["plan"]["items"][0]]
+    assert re.findall(r"`(\w+)`", rows["plan"]) == plan_words
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_columns(name: str, result: Path) -> None:
+    text = section(PAGE, "Tables").partition(f"`{name}` has one row per")[2]
+    printed = CliRunner().invoke(cli.commands, ["show", str(result), "--csv", name]).output
+    assert all_names(text) == next(csv.reader(io.StringIO(printed)))

@@ -1,0 +1,35 @@
+"""Every Python block of the documentation and the README runs, page by page, in a folder of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from sybil import Sybil
+from sybil.parsers.markdown import PythonCodeBlockParser
+
+from tests.docs.pages import DOCS
+
+ROOT = DOCS.parent
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if "```python" in page.read_text("utf-8")], ids=lambda page: page.stem
+)
+def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    document = Sybil(parsers=[PythonCodeBlockParser()]).parse(page)  # one namespace for the page
+    examples = list(document.examples())
+    assert len(examples) == page.read_text("utf-8").count("\n```python\n")
+    for example in examples:
+        example.evaluate()
+
+
+def test_a_block_that_is_wrong_fails(tmp_path: Path) -> None:
+    page = tmp_path / "wrong.md"
+    page.write_text("Text.\n\n```python\nvalue = 1\n```\n\nMore text.\n\n```python\nassert value == 2\n```\n")
+    first, second = Sybil(parsers=[PythonCodeBlockParser()]).parse(page).examples()
+    first.evaluate()
+    with pytest.raises(AssertionError):
+        second.evaluate()

@@ -1,0 +1,373 @@
+"""Integrals on curved elements: against mpmath, composite rules and Duffy's trick; what closed boundaries obey."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from functools import partial
+
+import mpmath
+import numpy as np
+import pytest
+
+from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.geometry import (
+    Algebraic,
+    Arc,
+    BoundaryMesh,
+    Disk,
+    ExteriorOf,
+    GeometryError,
+    Outline,
+    ParametricCurve,
+    PlateWithHole,
+    Ring,
+    Segment,
+    Side,
+    Uniform,
+    discretise,
+)
+from bemkit.geometry.space import corner_nodes
+from bemkit.operators.collocation import collocation_matrices
+from bemkit.operators.inner import inner_integrals, inner_on_element
+from bemkit.operators.integrals import PairSweep
+from bemkit.operators.material import Material
+from bemkit.operators.pairs import Degrees, PairIntegrals
+from bemkit.operators.panels import Panels
+from bemkit.operators.rigid import rigid_motions
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+
+DEGREES = Degrees(log=(1, 1), double=(1, 2))
+
+
+def ellipse(a: float, b: float) -> Outline:
+    curve = ParametricCurve(
+        lambda p: np.column_stack([a * np.cos(2 * np.pi * p), b * np.sin(2 * np.pi * p)]),
+        lambda p: 2 * np.pi * np.column_stack([-a * np.sin(2 * np.pi * p), b * np.cos(2 * np.pi * p)]),
+    )
+    return Outline(((Side("rim", curve),),))
+
+
+def dome() -> Outline:
+    """Return a half disk: arcs and a straight side that meet at right angles."""
+    arcs = [Side(f"arc-{k}", Arc((0.0, 0.0), 1.0, k * np.pi / 2, (k + 1) * np.pi / 2)) for k in range(2)]
+    return Outline(((*arcs, Side("floor", Segment((-1.0, 0.0), (1.0, 0.0)))),))
+
+
+MESHES: dict[str, Callable[[], BoundaryMesh]] = {
+    "disk of four elements": lambda: discretise(Disk(1.3).outline(), n_elements=4),
+    "disk far from the origin": lambda: discretise(Disk(0.5, (3.0, -2.0)).outline(), n_elements=24),
+    "ring": lambda: discretise(Ring(0.6, 1.0).outline(), n_elements=32),
+    "thin ring": lambda: discretise(Ring(0.999, 1.0).outline(), n_elements=32),
+    "plate with hole": lambda: discretise(PlateWithHole(2.0, 1.0, 0.3).outline(), n_elements=36),
+    "narrow bridge": lambda: discretise(PlateWithHole(2.0, 1.0, 0.4999).outline(), n_elements=40),
+    "dome": lambda: discretise(dome(), n_elements=12),
+    "graded dome": lambda: discretise(dome(), n_elements=30, grading=Algebraic(6.0)),
+    "ellipse": lambda: discretise(ellipse(2.0, 1.0), n_elements=24),
+    "outside of a disk": lambda: discretise(ExteriorOf(Disk(0.7)).outline(), n_elements=16),
+}
+
+
+def swept(mesh: BoundaryMesh) -> PairIntegrals:
+    return PairSweep(mesh, DEGREES).chunk(slice(0, mesh.n_elements))
+
+
+# --- inner integrals, one point and one arc, against extended precision ---
+
+POINTS = [  # parameters of points seen from an arc: next to it on both sides, at and beyond its end, far away
+    *[(0.23, 1e-10), (0.23, -1e-3), (0.23, 0.9), (0.23, -0.9)],
+    *[(1.0 + 1e-12, 0.0), (1.0, 1e-6), (1.0 + 1e-3, 0.0), (2.5, -1.0), (1.0, -9.0)],
+]
+
+
+INTEGRANDS = (
+    lambda place, x, bend, b, t: t**b * mpmath.log(abs(x - place(t))),
+    lambda place, x, bend, b, t: t**b * (x - place(t)) / mpmath.conj(x - place(t)),
+    lambda place, x, bend, b, t: t**b * mpmath.im(mpmath.expj(bend * t) / (x - place(t))),
+)
+
+
+@pytest.mark.parametrize("n_elements", [4, 64])
+def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
+    panels = Panels(discretise(Disk(1.3).outline(), n_elements=n_elements))
+    with mpmath.workdps(25):
+        bend = mpmath.pi / n_elements
+        scale = mpmath.mpc(0, 1) * bend * mpmath.mpf(1.3) * mpmath.expj(bend)
+
+        def place(t: mpmath.mpc) -> mpmath.mpc:
+            return (mpmath.expj(bend * t) - 1) / (mpmath.mpc(0, 1) * bend)
+
+        for real, imaginary in POINTS:
+            x = place(mpmath.mpc(real, imaginary))
+            from_ends = [np.array([complex((x - place(end)) * scale)]) for end in (-1, 1)]
+            inner = inner_integrals(panels, Degrees(log=(0, 1), double=(0, 2)), np.array([0]), *from_ends)
+            ends = [-1, real, 1] if -1 < real < 1 else [-1, 1]
+            # the arc is known to the round-off of its coordinates, eps R / half length = eps n / pi
+            tolerance = 2e-15 * (n_elements + 10)
+            for b in (0, 1):
+                log, quotient, angle = (mpmath.quad(partial(f, place, x, bend, b), ends) for f in INTEGRANDS)
+                assert inner.log[b][0] == pytest.approx(float(log), abs=tolerance)
+                assert inner.quotient[b][0] == pytest.approx(complex(quotient), abs=tolerance)
+                assert inner.double[b][0] == pytest.approx(float(angle), abs=tolerance)
+
+
+def test_principal_values_on_the_element_itself() -> None:
+    # on a circle k is the constant -1 / (4 pi R), and log|x - y| = log(2 R |sin|)
+    panels = Panels(discretise(Disk(1.3).outline(), n_elements=8))
+    bend = np.pi / 8
+    for xi in (0.0, 0.6, -0.9):
+        inner = inner_on_element(panels, Degrees(log=(0, 1), double=(0, 2)), np.array([2]), xi)
+        assert inner.double[0][0] == pytest.approx(-bend, abs=1e-14)  # 2 pi k times the length 2 R bend / half
+        assert inner.double[1][0] == pytest.approx(0.0, abs=1e-14)
+        distance, weight = graded(60)
+        pieces = [
+            np.sum(weight * side * np.log(2 * np.sin(bend * side * distance / 2) / bend)) for side in (1 - xi, 1 + xi)
+        ]
+        assert inner.log[0][0] == pytest.approx(sum(pieces), abs=4e-14)  # the rule of the reference
+
+
+# --- pairs of elements against rules that know nothing of the method ---
+
+
+def trace(mesh: BoundaryMesh, element: int, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return points and derivatives dx/dxi of an element as complex numbers."""
+    unit = np.array([1.0, 1j])
+    elements = np.array([element])
+    return mesh.points(elements, xi)[0] @ unit, mesh.derivatives(elements, xi)[0] @ unit
+
+
+def summed(mesh: BoundaryMesh, i: int, j: int, xi: FloatArray, t: FloatArray, weight: FloatArray) -> PairIntegrals:
+    """Sum the integrands over points (xi, t) of the square."""
+    (x, dx), (y, dy) = trace(mesh, i, xi), trace(mesh, j, t)
+    rho = x - y
+    measure = weight * np.abs(dx) * np.abs(dy)
+    result = PairIntegrals.zeros(DEGREES, ())
+    for a, b in np.ndindex(2, 3):
+        power = measure * xi**a * t**b
+        if b < 2:
+            result.log[a, b] = np.sum(power * np.log(np.abs(rho)))
+            result.quotient[a, b] = np.sum(power * rho / rho.conj())
+        result.double[a, b] = np.sum(power * (dy / rho).imag / np.abs(dy)) / (2 * np.pi)
+    return result
+
+
+def check_pair(mesh: BoundaryMesh, computed: PairIntegrals, i: int, j: int, expected: PairIntegrals) -> None:
+    size = mesh.lengths[i] * mesh.lengths[j]
+    # round-off of a few hundred points of the reference, relative to the largest the pair can contribute
+    for name, scale in (("log", size), ("quotient", size), ("double", mesh.lengths[i])):
+        difference = getattr(computed, name)[:, :, i, j] - getattr(expected, name)
+        assert np.abs(difference).max() < 2e-14 * scale, name
+
+
+def composite(n_pieces: int) -> tuple[FloatArray, FloatArray]:
+    points, weights = np.polynomial.legendre.leggauss(20)
+    edges = np.linspace(-1.0, 1.0, n_pieces + 1)
+    half = 1.0 / n_pieces
+    return (edges[:-1, None] + half * (points + 1.0)).ravel(), np.tile(weights * half, n_pieces)
+
+
+def graded(n_points: int) -> tuple[FloatArray, FloatArray]:
+    """Return a rule on [0, 1] for r log r and the like."""
+    points, weights = np.polynomial.legendre.leggauss(n_points)
+    v = 0.5 * (points + 1.0)
+    return v**6, 3.0 * weights * v**5
+
+
+def duffy(corner_xi: float, corner_t: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a rule on the square whose singular point is one corner."""
+    r, weight_r = graded(50)
+    s, weight_s = composite(2)
+    s, weight_s = 0.5 * (s + 1.0), 0.5 * weight_s
+    near, far = (2.0 * r[:, None] * s).ravel(), np.repeat(2.0 * r, s.size)
+    # next to the corner the weights are below 1e-24, and points coincide
+    weight = 4.0 * (weight_r[:, None] * r[:, None] * weight_s).ravel()
+    near, far, weight = (values[far > 1e-14] for values in (near, far, weight))
+    u, v = np.concatenate([near, far]), np.concatenate([far, near])
+    return corner_xi - np.sign(corner_xi) * u, corner_t - np.sign(corner_t) * v, np.tile(weight, 2)
+
+
+@pytest.mark.parametrize("name", ["ring", "dome", "ellipse", "disk of four elements"])
+def test_touching_pairs_against_duffy(name: str) -> None:
+    mesh = MESHES[name]()
+    computed = swept(mesh)
+    for i in range(0, mesh.n_elements, max(1, mesh.n_elements // 6)):
+        j = int(mesh.node_elements[mesh.elements[i, 1], 1])
+        check_pair(mesh, computed, i, j, summed(mesh, i, j, *duffy(1.0, -1.0)))
+        check_pair(mesh, computed, j, i, summed(mesh, j, i, *duffy(-1.0, 1.0)))
+
+
+@pytest.mark.parametrize("n_elements", [4, 12])
+def test_elements_of_a_circle_against_themselves(n_elements: int) -> None:
+    # x - y = 2 i R sin(bend (xi - t) / 2) exp(i (middle angle + bend (xi + t) / 2)); k = -1 / (4 pi R)
+    radius, bend = 1.3, np.pi / n_elements
+    mesh = discretise(Disk(radius).outline(), n_elements=n_elements)
+    computed = swept(mesh)
+    distance, weight = graded(60)
+    s, weight_s = composite(2)
+    r = np.repeat(2.0 * distance, s.size)
+    middle = (s * (1.0 - distance[:, None])).ravel()
+    w = 2.0 * (weight[:, None] * (1.0 - distance[:, None]) * weight_s).ravel()
+    size = (radius * bend) ** 2
+    tolerance = 1e-13 * size  # a sum of 2400 terms in the reference
+    for i, (a, b) in itertools.product(range(n_elements), np.ndindex(2, 2)):
+        power = (middle - 0.5 * r) ** a * (middle + 0.5 * r) ** b + (middle + 0.5 * r) ** a * (middle - 0.5 * r) ** b
+        log = size * np.sum(w * power * np.log(2 * radius * np.sin(0.5 * bend * r)))
+        turn = np.exp(2j * (bend * middle + (2 * i + 1) * bend))
+        assert computed.log[a, b, i, i] == pytest.approx(log, abs=tolerance)
+        assert computed.quotient[a, b, i, i] == pytest.approx(-size * np.sum(w * power * turn), abs=tolerance)
+        k = -1.0 / (4.0 * np.pi * radius) * (2.0 / (a + 1) if a == 0 else 0.0) * (2.0 if b == 0 else 0.0)
+        assert computed.double[a, b, i, i] == pytest.approx(k * size / (radius * bend) * radius * bend, abs=tolerance)
+
+
+@pytest.mark.parametrize("name", ["ring", "plate with hole", "dome", "disk far from the origin"])
+def test_separated_pairs_against_a_composite_rule(name: str) -> None:
+    mesh = MESHES[name]()
+    computed = swept(mesh)
+    points, weights = composite(3)
+    xi, t = np.repeat(points, points.size), np.tile(points, points.size)
+    rng = np.random.default_rng(3)
+    for i, j in rng.integers(0, mesh.n_elements, (30, 2)).tolist():
+        if i == j or set(mesh.elements[i]) & set(mesh.elements[j]):
+            continue
+        check_pair(mesh, computed, i, j, summed(mesh, i, j, xi, t, np.outer(weights, weights).ravel()))
+
+
+# --- what every closed boundary obeys ---
+
+
+@pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
+def test_pairs_are_symmetric(make: Callable[[], BoundaryMesh]) -> None:
+    # test and trial elements are integrated by different means: this compares them
+    mesh = make()
+    integrals = swept(mesh)
+    size = mesh.lengths[:, None] * mesh.lengths
+    # elements are known to the round-off of their coordinates
+    tolerance = size * (2e-14 + 4e-16 * mesh.diameter / np.minimum(mesh.lengths[:, None], mesh.lengths))
+    for values in (integrals.log, integrals.quotient):
+        assert (np.abs(values - values.transpose(1, 0, 3, 2)) / tolerance).max() < 1.0
+
+
+@pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
+def test_halves_add_up(make: Callable[[], BoundaryMesh]) -> None:
+    mesh = make()
+    whole, halves = swept(mesh), swept(mesh.refined(np.arange(mesh.n_elements)))
+    tolerance = mesh.lengths[:, None] * mesh.lengths * (1e-13 + 1e-15 * mesh.diameter / mesh.lengths.min())
+    n = mesh.n_elements
+    for name in ("log", "quotient", "double"):
+        values = getattr(halves, name)[0, 0].reshape(n, 2, n, 2).sum(axis=(1, 3))
+        scale = tolerance if name != "double" else tolerance / mesh.lengths
+        assert (np.abs(values - getattr(whole, name)[0, 0]) / scale).max() < 1.0, name
+
+
+@pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
+def test_the_boundary_is_seen_under_half_a_turn(make: Callable[[], BoundaryMesh]) -> None:
+    mesh = make()
+    seen = swept(mesh).double[:, 0].sum(axis=2)
+    expected = 0.5 if mesh.is_exterior else -0.5
+    # of the thin ring, a millionth of the coordinates' size apart, the angle is known to 1e-16 / 1e-3
+    np.testing.assert_allclose(seen[0], expected * mesh.lengths, rtol=1e-12)
+    np.testing.assert_allclose(seen[1], 0.0, atol=1e-12 * mesh.lengths.max())
+
+
+@pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)
+def test_collocation_keeps_translations(make: Callable[[], BoundaryMesh]) -> None:
+    mesh = make()
+    _, double = collocation_matrices(mesh, Material(1.0, 0.3))
+    translations = np.tile(np.eye(2), (mesh.n_elements, 1))
+    expected = 0.5 if mesh.is_exterior else -0.5
+    np.testing.assert_allclose(double @ translations, expected * translations, rtol=0.0, atol=1e-12)
+
+
+def test_collocation_against_the_kernels_of_kelvin() -> None:
+    material = Material(2.0, 0.3)
+    mu, nu = material.shear_modulus, 0.3
+    mesh = MESHES["plate with hole"]()
+    single, double = (m.reshape(36, 2, 36, 2) for m in collocation_matrices(mesh, material))
+    points, weights = composite(20)
+    for j in range(36):
+        elements = np.array([j])
+        y, normal = mesh.points(elements, points)[0], mesh.normals_at(elements, points)[0]
+        measure = weights * mesh.jacobian(elements, points)[0]
+        for i in range(36):
+            if i == j:
+                continue
+            r = y - mesh.centres[i]
+            d = np.hypot(*r.T)
+            q = np.einsum("pi,pj->ijp", r, r) / d**2
+            across = np.einsum("pi,pi->p", r, normal) / d
+            turned = np.einsum("pi,pj->ijp", r / d[:, None], normal)
+            log = -(3 - 4 * nu) * np.log(d / mesh.diameter)
+            u = (log * np.eye(2)[:, :, None] + q) / (8 * np.pi * mu * (1 - nu))
+            # Somigliana: row i belongs to the load at x, column j to the displacement at y
+            t = across * ((1 - 2 * nu) * np.eye(2)[:, :, None] + 2 * q) - (1 - 2 * nu) * (
+                turned - turned.swapaxes(0, 1)
+            )
+            t = -t / (4 * np.pi * (1 - nu) * d)
+            np.testing.assert_allclose(single[i, :, j], u @ measure, rtol=0.0, atol=1e-14)
+            np.testing.assert_allclose(double[i, :, j], t @ measure, rtol=0.0, atol=1e-13)
+
+
+def test_a_straight_curve_has_the_integrals_of_straight_elements() -> None:
+    corners = [(0.0, 0.0), (1.0, 0.0), (0.4, 0.8)]
+
+    def side(k: int, is_curve: bool) -> Side:
+        segment = Segment(corners[k], corners[(k + 1) % 3])
+        # an uneven parameter, so that the arc length has something to do
+        curve = ParametricCurve(
+            lambda p: segment.point(p * (0.5 + 0.5 * p)), lambda p: segment.derivative(p) * (0.5 + p)[:, None]
+        )
+        return Side(f"side-{k}", curve if is_curve else segment)
+
+    straight, curved = (
+        discretise(Outline((tuple(side(k, is_curve) for k in range(3)),)), n_elements=18, grading=Uniform())
+        for is_curve in (False, True)
+    )
+    assert straight.is_straight.all()
+    assert not curved.is_straight.any()
+    one, other = swept(straight), swept(curved)
+    for name in ("log", "quotient", "double"):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=0.0, atol=1e-15)
+
+
+def test_elements_that_bend_too_much_are_refused() -> None:
+    three = Outline(
+        ((Side("long", Arc((0.0, 0.0), 1.0, 0.0, 4.5)), Side("rest", Arc((0.0, 0.0), 1.0, 4.5, 2 * np.pi))),)
+    )
+    mesh = discretise(three, n_elements=2)
+    with pytest.raises(GeometryError, match=r"element 0 from \(1, .*bends too much .*: use more elements there"):
+        PairSweep(mesh, DEGREES)
+    PairSweep(discretise(three, n_elements=4), DEGREES)
+
+
+def test_only_true_corners_are_corners() -> None:
+    mesh = discretise(PlateWithHole(2.0, 1.0, 0.3).outline(), n_elements=36)
+    assert corner_nodes(mesh).sum() == 4
+    mesh = discretise(dome(), n_elements=9)
+    corners = mesh.nodes[corner_nodes(mesh)]
+    np.testing.assert_allclose(np.sort(corners[:, 0]), [-1.0, 1.0], atol=1e-15)
+
+
+# --- the maps on curved elements ---
+
+
+@pytest.mark.parametrize("name", ["ring", "dome", "ellipse"])
+def test_the_map_kills_rigid_motions_and_is_in_equilibrium(name: str) -> None:
+    mesh = MESHES[name]()
+    elastic = GalerkinMap(mesh, Material(1.0, 0.3))
+    matrix = elastic.matrix()
+    motions = rigid_motions(mesh.nodes, mesh.centre, mesh.diameter).reshape(-1, 3)
+    # the rotation is no polynomial of the arc length: its interpolant is made the rigid motion
+    assert np.abs(matrix @ motions).max() < 1e-13
+    np.testing.assert_allclose(matrix, matrix.T, rtol=0.0, atol=1e-15)
+    assert np.linalg.eigvalsh(matrix)[3] > 1e-3
+
+
+@pytest.mark.parametrize("kind", [GalerkinMap, CollocationMap])
+@pytest.mark.parametrize("name", ["plate with hole", "outside of a disk"])
+def test_maps_do_not_depend_on_units_or_position(kind: type[GalerkinMap | CollocationMap], name: str) -> None:
+    mesh = MESHES[name]()
+    matrix = kind(mesh, Material(1.0, 0.3)).matrix()
+    for shift, factor in (((0.0, 0.0), 1e-6), ((0.0, 0.0), 1e6), ((3.0, -2.0), 1.0)):
+        moved = kind(mesh.transformed(shift, factor), Material(1.0, 0.3)).matrix()
+        # round-off of the integrals times the condition of V
+        np.testing.assert_allclose(moved, matrix, rtol=0.0, atol=1e-11 * np.abs(matrix).max())

@@ -1,0 +1,132 @@
+"""Poisson's ratio 1/2 exactly: pressures cause no displacement, and only motions that keep the volume are possible."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.arrays import FloatArray
+from bemkit.contact.condensation import condense
+from bemkit.contact.conditions import separated, stick
+from bemkit.geometry import BoundaryMesh, Selection
+from bemkit.geometry.space import dof_points
+from bemkit.operators.dense import SingularMatrixError
+from bemkit.operators.nodal import NodalConditions, Support
+
+RUBBER = bk.Material(3.0, 0.5)  # shear modulus 1
+PURE_SHEAR = np.array([[0.4, 0.3], [-0.1, -0.4]])
+
+
+def block(n_elements: int = 48) -> BoundaryMesh:
+    sides = {name: Selection((name,)) for name in ("bottom", "right", "top", "left")}
+    return bk.discretise(bk.Rectangle(2.0, 1.0).outline(), n_elements=n_elements, parts=sides)
+
+
+def annulus(n_elements: int = 64) -> BoundaryMesh:
+    return bk.discretise(bk.Ring(1.0, 2.0).outline(), n_elements=n_elements)
+
+
+def roller(mesh: BoundaryMesh, part: str) -> Support:
+    return Support(part, mesh.part(part), mesh.normals[mesh.part(part)][:, None, :])
+
+
+@pytest.mark.parametrize("quadratic", [False, True])
+def test_patch_of_a_field_that_keeps_the_volume(quadratic: bool) -> None:
+    mesh = block()
+    spaces = (bk.QuadraticSpace(mesh), bk.LinearSpace(mesh, bk.corner_nodes(mesh))) if quadratic else ()
+    elastic = bk.GalerkinMap(mesh, RUBBER, *spaces)
+    stress = PURE_SHEAR + PURE_SHEAR.T  # 2 mu strain; the pressure is free
+    expected = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
+    for element in range(mesh.n_elements):
+        traction = stress @ mesh.normals[element]
+        expected += elastic.nodal_forces(np.array([element]), lambda x, t=traction: np.broadcast_to(t, x.shape))
+    displacement = (dof_points(elastic.displacement_space) - mesh.centre) @ PURE_SHEAR.T
+    miss = expected.ravel() - elastic.matrix() @ displacement.ravel()
+    normals = elastic.nodal_forces(np.arange(0), lambda x: x).ravel()
+    for side in ("bottom", "right", "top", "left"):
+        normal = mesh.normals[mesh.part(side)[0]]
+        normals += elastic.nodal_forces(mesh.part(side), lambda x, n=normal: np.broadcast_to(n, x.shape)).ravel()
+    pressure = miss @ normals / (normals @ normals)
+    assert np.abs(miss - pressure * normals).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_a_pressed_block_bulges_without_changing_its_volume() -> None:
+    mesh = block()
+    elastic = bk.GalerkinMap(mesh, RUBBER)
+    force = elastic.nodal_forces(mesh.part("top"), lambda x: np.broadcast_to([0.0, -1.0], x.shape))
+    body, nodes = condense(elastic, [roller(mesh, "right")], mesh.part("bottom"), force)
+    glide = np.zeros((body.n_contact, 2), bool)
+    glide[:, 0] = True
+    n = body.n_contact
+    state = body.respond(separated(n).replaced(glide, stick(np.zeros(n), np.zeros(n))))
+    np.testing.assert_allclose(state.sigma_n, -1.0, rtol=1e-11)
+    # sigma_yy = -1, sigma_xx = 0 in plane strain: strain = 1 / (4 mu) (1, -1)
+    displacement, total = body.recover(state)
+    points = dof_points(elastic.displacement_space)
+    np.testing.assert_allclose(displacement[:, 0], 0.25 * (points[:, 0] - 2.0), atol=1e-12)
+    np.testing.assert_allclose(displacement[:, 1], -0.25 * points[:, 1], atol=1e-12)
+    tractions = elastic.element_tractions(displacement, total)
+    np.testing.assert_allclose(
+        tractions[mesh.part("top")], np.broadcast_to([0.0, -1.0], (len(mesh.part("top")), 2)), atol=1e-11
+    )
+    np.testing.assert_allclose(tractions[mesh.part("left")], 0.0, atol=1e-11)
+    np.testing.assert_allclose(nodes.weights.sum(), 2.0)
+
+
+def test_a_ring_under_inner_pressure_has_the_lame_solution() -> None:
+    """Free of supports but for its symmetry: sigma_r = A - B / r^2, u_r = B / (2 mu r), volume kept."""
+    inner, outer, pressure = 1.0, 2.0, 1.0
+    b = pressure * inner**2 * outer**2 / (outer**2 - inner**2)
+    errors = []
+    for n_elements in (32, 64, 128):
+        mesh = annulus(n_elements)
+        elastic = bk.GalerkinMap(mesh, RUBBER)
+        radius = np.hypot(*mesh.nodes.T)
+        unit = mesh.nodes / radius[:, None]
+        inside = np.flatnonzero(np.hypot(*mesh.centres.T) < 1.5)
+        force = elastic.nodal_forces(inside, lambda x: pressure * x / np.hypot(*x.T)[:, None])
+        # three displacements hold the rigid motions, at points that symmetry keeps at rest
+        fixed = np.zeros((mesh.n_nodes, 2), bool)
+        fixed[np.argmin(np.hypot(*(mesh.nodes - [2.0, 0.0]).T)), 1] = True
+        fixed[np.argmin(np.hypot(*(mesh.nodes - [-2.0, 0.0]).T)), 1] = True
+        fixed[np.argmin(np.hypot(*(mesh.nodes - [0.0, 2.0]).T)), 0] = True
+        frame = np.broadcast_to(np.eye(2), (mesh.n_nodes, 2, 2)).copy()
+        conditions = NodalConditions(frame, fixed, np.zeros((mesh.n_nodes, 2)), np.zeros((mesh.n_nodes, 2), bool))
+        displacement, _ = elastic.condense(conditions, force).recover(np.zeros(0))
+        radial = np.sum(displacement * unit, axis=1)
+        errors.append(float(np.abs(radial * radius * 2.0 / b - 1.0).max()))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 2e-3
+    assert 1.7 < orders[-1] < 3.3
+
+
+@pytest.mark.parametrize("discretisation", [bk.LinearGalerkin(), bk.ConstantCollocation()])
+def test_example_1_has_a_smooth_incompressible_limit(discretisation: object) -> None:
+    import dataclasses
+
+    def forces(nu: float) -> FloatArray:
+        scene = bk.load_scene("paper-1")
+        options = dataclasses.replace(scene.mesh, elements=96)
+        scene = dataclasses.replace(scene, mesh=options, material=bk.Material(1e4, nu), discretisation=discretisation)
+        solution = bk.run(scene)
+        assert solution.is_converged
+        assert solution.certificate.worst < 1e-8
+        return np.array([solution.force_tangential, solution.energy * 1e4])
+
+    limit = forces(0.5)
+    for distance in (1e-3, 1e-5, 1e-7):
+        # the solution is smooth in nu; its derivative there is of order one; V loses 1 / distance of its digits
+        np.testing.assert_allclose(forces(0.5 - distance), limit, rtol=10 * distance + 1e-15 / distance * 1e2)
+
+
+def test_a_body_without_room_to_yield_is_named() -> None:
+    mesh = block(24)
+    elastic = bk.GalerkinMap(mesh, RUBBER)
+    everywhere = np.broadcast_to(np.eye(2), (mesh.n_elements, 2, 2))
+    # all sides but the bottom are clamped, and the bottom is the contact boundary
+    clamped = np.setdiff1d(np.arange(mesh.n_elements), mesh.part("bottom"))
+    with pytest.raises(SingularMatrixError, match="has no free boundary to make room: leave a part free"):
+        condense(
+            elastic, [Support("rest", clamped, everywhere[clamped])], mesh.part("bottom"), np.zeros((mesh.n_nodes, 2))
+        )
