@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from bemkit.adaptive import run_adaptive
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
+
+
+class CascadeError(ValueError):
+    """A scene that cannot be solved on one mesh after the other."""
 
 
 def run_cascade(
@@ -35,20 +40,23 @@ def run_cascade(
 
     Raises
     ------
+    CascadeError
+        If the scene has a load history, whose memory belongs to one mesh.
     ValueError
-        If `coarsest` is too small for any mesh or the scene has a load history, whose memory belongs to one mesh; or
-        for the reasons of `bemkit.run`.
+        If `coarsest` is too small for any mesh, or for the reasons of `bemkit.run`.
     """
     if coarsest < 3:
         raise ValueError(f"coarsest = {coarsest}: give at least 3 elements")
     if len(scene.load_factors) > 1:
-        raise ValueError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
-    counts = [scene.mesh.elements]
+        raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
+    if scene.mesh.accuracy is not None:
+        return run_adaptive(scene, callback=callback)
+    counts = [scene.mesh.n_elements]
     while counts[-1] // 2 >= coarsest:
         counts.append(counts[-1] // 2)
     solutions: list[Solution] = []
     for count in reversed(counts):
-        level = scene if count == scene.mesh.elements else replace(scene, mesh=replace(scene.mesh, elements=count))
+        level = scene if count == counts[0] else replace(scene, mesh=replace(scene.mesh, elements=count))
         start = solutions[-1] if solutions and solutions[-1].is_converged else None
         solutions.append(run(level, start=start, callback=callback))
     return tuple(solutions)

@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study``.
+"""The command line: ``bemkit run | show | scenes | plan | study | stability``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 130 interrupted.
 """
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit import __version__
+from bemkit.stability.command import stability
 
 if TYPE_CHECKING:
     from bemkit.scene import Scene
@@ -74,6 +75,7 @@ def commands() -> None:
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
 @click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
@@ -86,6 +88,7 @@ def run(
     csv_file: str | None,
     folder: str | None,
     elements: int | None,
+    accuracy: float | None,
     discretisation: str | None,
     solver: str | None,
     rho: float | None,
@@ -98,7 +101,7 @@ def run(
     with _bad_input():
         wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
         wanted.check()
-        chosen = _load(scene, elements, discretisation, solver, rho)
+        chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
     with _bad_input(scene):
         solution = _solve(chosen, cascade=cascade, is_live=not quiet and sys.stderr.isatty())
     with _bad_input():
@@ -171,6 +174,9 @@ def plan(scene: str, elements: int | None, discretisation: str | None, is_json: 
         print_plan(chosen.title, made)
 
 
+commands.add_command(stability)
+
+
 @commands.group()
 def study() -> None:
     """Many runs that answer one question."""
@@ -205,11 +211,14 @@ def _load(
     discretisation: str | None,
     solver: str | None = None,
     rho: float | None = None,
+    accuracy: float | None = None,
 ) -> Scene:
     from bemkit.scenefile import load_scene, with_overrides
 
     scene = load_scene(source)
-    return with_overrides(scene, elements=elements, discretisation=discretisation, solver=solver, rho=rho)
+    return with_overrides(
+        scene, elements=elements, accuracy=accuracy, discretisation=discretisation, solver=solver, rho=rho
+    )
 
 
 def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:

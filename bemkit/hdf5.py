@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 _MAX_TEXT = 10_000
 _MAX_ENTRIES_PER_GROUP = 1000
+_SEAL = "sha256"
 
 
 class ResultFileError(ValueError):
@@ -44,6 +46,12 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
         group.create_dataset(name, data=data)
 
 
+def seal(file: h5py.File) -> None:
+    """Store a checksum of everything in a file, which `Reader.check_seal` compares."""
+    file.flush()
+    file.attrs[_SEAL] = Reader("the new file", file.id.get_filesize(), file).checksum()
+
+
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
     # fixed length: texts of variable length let a small hostile file expand without limit
     import h5py
@@ -54,12 +62,14 @@ def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Reader]:
+def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
     """Open an HDF5 file for careful reading.
 
     Parameters
     ----------
     path : Path
+    made_by : str
+        The command that writes such files, for messages.
 
     Yields
     ------
@@ -77,13 +87,13 @@ def opened(path: Path) -> Iterator[Reader]:
         size = path.stat().st_size if path.is_file() else None
         if size is None:
             problem = "not a file" if path.exists() else "no such file"
-            raise ResultFileError(f"{name}: {problem}: give a file written by 'bemkit run -o'")
+            raise ResultFileError(f"{name}: {problem}: give a file written by '{made_by}'")
         file = h5py.File(str(path), "r")
     except (OSError, ValueError) as error:
         if isinstance(error, ResultFileError):
             raise
         reason = error.strerror if isinstance(error, PermissionError) else "not an HDF5 file, or a broken one"
-        raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by 'bemkit run -o'") from error
+        raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by '{made_by}'") from error
     with file:
         yield Reader(name, size, file)
 
@@ -167,6 +177,39 @@ class Reader:
             raise self.error(f"the columns of {group} differ in length")
         return columns
 
+    def check_seal(self) -> None:
+        """Compare the content of the file with the checksum that `seal` stored.
+
+        Raises
+        ------
+        ResultFileError
+            If they differ: a bit has changed somewhere.
+        """
+        if self.attributes("/").get(_SEAL) != self.checksum():
+            raise self.error("its content does not match its checksum")
+
+    def checksum(self) -> str:
+        """Return the SHA-256 of all names, attributes and arrays of the file in hexadecimal digits."""
+        import h5py
+
+        names: list[str] = ["/"]
+        try:
+            self._file.visit(names.append)
+            groups = [name for name in names if isinstance(self._file[name], h5py.Group)]
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            raise self.error("its list of contents cannot be read") from error
+        total = hashlib.sha256()
+        for name in sorted(names):
+            total.update(name.encode("utf-8", "surrogateescape"))
+            if name in groups:
+                attributes = {key: value for key, value in self.attributes(name).items() if key != _SEAL}
+                total.update(repr(sorted(attributes.items())).encode("utf-8", "surrogateescape"))
+            else:
+                stored = self._array(name, None)
+                total.update(f"{stored.dtype.str}{stored.shape}".encode())
+                total.update(stored.tobytes())
+        return total.hexdigest()
+
     def _decoded(self, path: str, stored: bytes) -> str:
         try:
             return stored.decode("utf-8")
@@ -181,7 +224,8 @@ class Reader:
             raise self.error(f"{path} is not a group")
         return found
 
-    def _array(self, path: str, kind: str) -> npt.NDArray[Any]:
+    def _array(self, path: str, kind: str | None) -> npt.NDArray[Any]:
+        """Return an array of some kind of numbers or texts, of any kind if that is None."""
         import h5py
 
         found: Any = self._follow(path)
@@ -192,7 +236,8 @@ class Reader:
             # compressed, virtual or never written data take less room in the file than in memory
             if found.external is not None or found.nbytes > min(self._size, found.id.get_storage_size()):
                 raise self.error(f"{path} is not stored plainly in the file")
-            if found.dtype.kind != kind or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
+            kind = found.dtype.kind if kind is None else kind
+            if found.dtype.kind != kind or kind not in "fiS" or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
                 raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")
             return np.asarray(found[()])
         except (OSError, RuntimeError, TypeError, MemoryError) as error:

@@ -3,7 +3,7 @@
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
 stranger runs no code. The layout, version 1:
 
-    /                attributes format = "bemkit-result" and schema_version
+    /                attributes format = "bemkit-result", schema_version, and sha256: a checksum of all the rest
     /scene           text, the scene as TOML
     /provenance, /summary, /certificate, /timings     attributes
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior;
@@ -28,7 +28,7 @@ import bemkit
 from bemkit.contact.certificate import Certificate
 from bemkit.files import OutputFileError, check_target, replacing
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.hdf5 import Reader, ResultFileError, opened, write_attributes, write_table, write_text
+from bemkit.hdf5 import Reader, ResultFileError, opened, seal, write_attributes, write_table, write_text
 from bemkit.plan import Plan, PlanItem
 from bemkit.scene import Scene
 from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
@@ -103,6 +103,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
         write_table(file.create_group("history"), history_columns(solution.history))
         write_table(file.create_group("plan"), _plan_columns(solution.plan))
+        seal(file)
 
 
 def read_result(path: str | Path) -> Solution:
@@ -128,9 +129,11 @@ def read_result(path: str | Path) -> Solution:
         except SceneError as error:
             raise reader.error(str(error)) from error
         try:
-            return _read_solution(reader, scene)
+            solution = _read_solution(reader, scene)
         except (ValueError, KeyError, OverflowError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
+        reader.check_seal()
+    return solution
 
 
 def provenance() -> dict[str, str]:

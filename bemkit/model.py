@@ -37,6 +37,14 @@ from bemkit.scene import (
 )
 
 
+_FARTHEST = 1e7
+"""Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
+
+
+class TooFarError(ValueError):
+    """A body whose coordinates are so large that they no longer hold its shape."""
+
+
 @dataclass(frozen=True)
 class Units:
     """The physical size of one dimensionless unit.
@@ -175,10 +183,13 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) ->
 
     Raises
     ------
+    TooFarError
+        If the body lies so far from the origin that its coordinates no longer hold its shape.
     ConflictingSupportsError, SingularMatrixError, ValueError
         If the supports contradict each other or do not hold the body even with glued contact, or an expression is not
         finite somewhere.
     """
+    _check_position(mesh)
     units = find_units(scene, mesh) if units is None else units
     unit_mesh = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / units.length)
     elastic = _elastic_map(scene, unit_mesh, units)
@@ -186,6 +197,17 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) ->
     body, nodes = condense(elastic, _supports(scene, mesh, units), contact_elements(scene, mesh), force)
     problem = _problem(scene, mesh, units, body, elastic.displacement_space)
     return Model(scene, mesh, units, elastic, body, nodes, problem)
+
+
+def _check_position(mesh: BoundaryMesh) -> None:
+    """Refuse a body so far from the origin that its coordinates hold too few digits of its shape."""
+    distance = float(np.abs(mesh.nodes).max()) / mesh.diameter
+    if distance > _FARTHEST:
+        x, y = mesh.centre.tolist()
+        raise TooFarError(
+            f"the body lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits of "
+            f"its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
+        )
 
 
 def _problem(

@@ -114,11 +114,11 @@ def check_memory(scene: Scene) -> None:
     """
     available = _physical_memory()
     per_element = 4 if isinstance(scene.discretisation, QuadraticGalerkin) else 2
-    needed = _N_MATRICES * _BYTES_PER_NUMBER * (per_element * scene.mesh.elements) ** 2
+    needed = _N_MATRICES * _BYTES_PER_NUMBER * (per_element * scene.mesh.n_elements) ** 2
     if needed > available:
         n_fitting = int((available / (_N_MATRICES * _BYTES_PER_NUMBER)) ** 0.5 / per_element)
         raise TooLargeError(
-            f"mesh.elements is {scene.mesh.elements}: needs about {needed / 1e9:.3g} GB, this computer has "
+            f"mesh.elements is {scene.mesh.n_elements}: needs about {needed / 1e9:.3g} GB, this computer has "
             f"{available / 1e9:.3g} GB: use at most {n_fitting} elements"
         )
 

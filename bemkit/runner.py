@@ -41,7 +41,8 @@ def run(
     ----------
     scene : Scene
     mesh : BoundaryMesh, optional
-        A mesh of one's own with the parts of the scene; by default the one the scene describes.
+        A mesh of one's own with the parts of the scene; by default the one the scene describes, or as many as its
+        accuracy needs.
     start : Solution, optional
         Where to start, on any mesh; see `bemkit.cascade.run_cascade`. By default every node sticks. Where a scene has
         several solutions the start chooses among them.
@@ -61,6 +62,10 @@ def run(
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
+    if scene.mesh.accuracy is not None and mesh is None:
+        from bemkit.adaptive import run_adaptive  # which calls this function for each of its meshes
+
+        return run_adaptive(scene, callback=callback)[-1]
     steps = run_history([scene], mesh=mesh, start=start, callback=callback)
     return steps[0] if len(scene.load_factors) == 1 else _summed(scene, steps)
 

@@ -7,7 +7,7 @@ form can be turned into the other. All quantities are in one consistent set of u
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -17,13 +17,13 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.obstacle import Obstacle
 from bemkit.contact.partwise import PartwiseLaw
+from bemkit.contact.problem import LawError
 from bemkit.expression import Expression, ScalarField, check_field, closest, evaluate_field
-from bemkit.geometry.discretise import discretise
-from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.mesh_options import MeshOptions as MeshOptions
 from bemkit.operators.material import Material
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -226,34 +226,6 @@ class ConstantCollocation:
 Discretisation: TypeAlias = LinearGalerkin | QuadraticGalerkin | ConstantCollocation
 
 
-@dataclass(frozen=True)
-class MeshOptions:
-    """How the boundary is divided.
-
-    Parameters
-    ----------
-    elements : int
-        Number of boundary elements in total.
-    grading : Grading
-        Distribution along each piece between corners and ends of parts.
-    density : mapping of str to float
-        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than 3 elements or more than a million.
-    """
-
-    elements: int = 320
-    grading: Grading = field(default_factory=Uniform)
-    density: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if not 3 <= self.elements <= 1_000_000:
-            raise ValueError(f"elements is {self.elements}: give a number from 3 to 1000000")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Scene:
     """One contact problem: everything that determines its solution.
@@ -282,8 +254,8 @@ class Scene:
     Raises
     ------
     ValueError
-        If the title is empty, no part is in contact, two parts share a name, a part names an unknown side, or a load
-        factor is missing or not finite.
+        If the title is empty, no part is in contact, two parts share a name, a part names an unknown side, a load
+        factor is missing or not finite, or an accuracy is asked of collocation or of a load history.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -310,6 +282,8 @@ class Scene:
             raise ValueError("parts: no part is in contact: give one part the condition 'contact' with an obstacle")
         if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
             raise ValueError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        if self.mesh.accuracy is not None:
+            self._check_accuracy(self.mesh.accuracy)
         names = [side.name for loop in self.shape.outline().loops for side in loop]
         for part in self.parts:
             for side in part.sides:
@@ -319,10 +293,27 @@ class Scene:
                         f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
                     )
 
+    def _check_accuracy(self, accuracy: float) -> None:
+        if isinstance(self.discretisation, ConstantCollocation):
+            raise ValueError(
+                f"mesh.accuracy is {accuracy}: collocation has no error estimate: choose the discretisation "
+                "'quadratic' or 'linear', or give elements"
+            )
+        if len(self.load_factors) > 1:
+            raise ValueError(
+                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
+                "belongs to one mesh: give elements"
+            )
+
     @property
     def contact_parts(self) -> tuple[Part, ...]:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    @property
+    def selections(self) -> dict[str, Selection]:
+        """The pieces of the outline that the parts cover, by name."""
+        return {part.name: part.selection for part in self.parts}
 
     def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
         """Return the friction law of given contact nodes, every coefficient in numbers.
@@ -339,7 +330,7 @@ class Scene:
 
         Raises
         ------
-        ValueError
+        LawError
             If a coefficient is not finite or negative somewhere; the message names the part.
         """
         laws, nodes = [], []
@@ -349,7 +340,7 @@ class Scene:
             try:
                 laws.append((self.law if law is None else law).at(points[own]))
             except ValueError as error:
-                raise ValueError(f"part {part.name!r}: friction law: {error}") from error
+                raise LawError(f"part {part.name!r}: friction law: {error}") from error
             nodes.append(own)
         if len(laws) == 1 or all(law is laws[0] for law in laws):
             return laws[0]
@@ -367,10 +358,4 @@ class Scene:
         GeometryError
             If parts overlap or are empty, or there are too few elements.
         """
-        return discretise(
-            self.shape.outline(),
-            n_elements=self.mesh.elements,
-            parts={part.name: part.selection for part in self.parts},
-            grading=self.mesh.grading,
-            density=self.mesh.density,
-        )
+        return self.mesh.divide(self.shape.outline(), self.selections)

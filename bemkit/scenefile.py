@@ -13,6 +13,7 @@ from typing import Any, cast
 
 from bemkit.expression import closest
 from bemkit.kinds import SOLVERS
+from bemkit.mesh_options import MeshOptions
 from bemkit.scene import Discretisation, Scene
 from bemkit.shipped import shipped_files
 from bemkit.solvers.base import ContactSolver
@@ -133,6 +134,7 @@ def with_overrides(
     scene: Scene,
     *,
     elements: int | None = None,
+    accuracy: float | None = None,
     discretisation: str | None = None,
     solver: str | None = None,
     rho: float | None = None,
@@ -143,6 +145,8 @@ def with_overrides(
     ----------
     scene : Scene
     elements : int, optional
+    accuracy : float, optional
+        Instead of a number of elements.
     discretisation, solver : str, optional
         Words as in scene files.
     rho : float, optional
@@ -157,11 +161,16 @@ def with_overrides(
     SceneError
         If a word is unknown, a number out of range, or the solver has no penalty.
     """
+    if elements is not None and accuracy is not None:
+        raise SceneError(f"elements is {elements} and accuracy is {accuracy}: give one of them, the other follows")
     try:
         if elements is not None:
-            scene = replace(scene, mesh=replace(scene.mesh, elements=elements))
+            options = MeshOptions() if scene.mesh.elements is None else scene.mesh
+            scene = replace(scene, mesh=replace(options, elements=elements))
         if discretisation is not None:
             scene = replace(scene, discretisation=structure(discretisation, cast(Any, Discretisation)))
+        if accuracy is not None:
+            scene = replace(scene, mesh=MeshOptions(accuracy=accuracy))
         if solver is not None:
             scene = replace(scene, solver=structure(solver, cast(Any, ContactSolver)))
         if rho is not None:

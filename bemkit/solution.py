@@ -163,6 +163,12 @@ class Transition:
         }
 
 
+_POLLUTED = 2
+"""Nodes next to a transition whose values are the least accurate."""
+_CLOSE = 0.02
+"""Distance, relative to the size of the zone, up to which the powers of the distance hold closely."""
+
+
 def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
     """Find where the status changes along each contact part.
 
@@ -181,7 +187,8 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     -----
     Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
     end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
-    at the transition; on the paper's examples this is within a quarter of the node distance. Where that says nothing,
+    at the transition; on the paper's examples this is within a quarter of the node distance. On meshes that are fine
+    there the two nodes next to the transition, where the computed solution is least true, are passed over. Where that says nothing,
     as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
@@ -208,19 +215,26 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
     """Return the arc length of the transition between the nodes i and i + 1; see `find_transitions`."""
     looser = ("separated", "slip", "stick")
     is_forward = looser.index(words[i]) < looser.index(words[i + 1])
-    last, tighter, before = (i, i + 1, i - 1) if is_forward else (i + 1, i, i + 2)
+    last, tighter, step = (i, i + 1, -1) if is_forward else (i + 1, i, 1)
     middle = float(contact.s[i] + contact.s[i + 1]) / 2.0
-    if not 0 <= before < contact.n_contact:
+    zone = [last]
+    while 0 <= (k := zone[-1] + step) < contact.n_contact and (words[k], contact.part[k]) == (
+        words[last],
+        contact.part[last],
+    ):
+        zone.append(k)
+    if len(zone) < 2:
         return middle
-    is_run = words[before] == words[last] and contact.part[before] == contact.part[last]
+    s = np.abs(contact.s[zone] - contact.s[last])
+    is_fine = len(zone) > _POLLUTED + 1 and s[_POLLUTED + 1] < _CLOSE * s[-1]
+    near, far = (_POLLUTED, _POLLUTED + 1) if is_fine else (0, 1)
     field = contact.clearance if words[last] == "separated" else np.abs(slip)
-    near, far = (float(field[node]) for node in (last, before))
-    if not is_run or not 0.0 <= near < far < np.inf:
+    at_near, at_far = (float(field[zone[k]]) ** (2.0 / 3.0) if field[zone[k]] >= 0.0 else np.inf for k in (near, far))
+    if not 0.0 <= at_near < at_far < np.inf:
         return middle
-    slope = (near ** (2.0 / 3.0) - far ** (2.0 / 3.0)) / (contact.s[last] - contact.s[before])
-    distance = -(near ** (2.0 / 3.0)) / slope
-    step = contact.s[tighter] - contact.s[last]
-    return float(contact.s[last] + np.clip(distance / step, 0.0, 2.0) * step)
+    distance = at_near * (s[far] - s[near]) / (at_far - at_near) - s[near]
+    gap = contact.s[tighter] - contact.s[last]
+    return float(contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap)
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +307,8 @@ class Solution:
         dict
             ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
             ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
-            ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``, ``timings`` [s], ``plan``.
+            ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``,
+            ``timings`` [s], ``plan``.
         """
         return {
             "title": self.scene.title,

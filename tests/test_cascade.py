@@ -84,7 +84,8 @@ def test_a_mesh_that_fails_is_no_start() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"), [({"coarsest": 2}, "coarsest = 2"), ({"load_factors": (0.5, 1.0)}, "load history of 2 steps")]
+    ("options", "message"),
+    [({"coarsest": 2}, "coarsest = 2"), ({"load_factors": (0.5, 1.0)}, "load history of 2 steps")],
 )
 def test_refusals(options: dict[str, object], message: str) -> None:
     scene = example(1, "linear", 40)

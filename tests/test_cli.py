@@ -186,6 +186,26 @@ def test_a_bad_scene_is_one_line_that_names_the_file(
     assert message in error
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "arguments", "message"),
+    [
+        ("friction_coefficient = 0.5", 'friction_coefficient = "x - 0.5"', [], "must be zero or positive"),
+        ("friction_coefficient = 0.5", 'friction_coefficient = "log(x - 0.5)"', [], "is nan at"),
+        ('"coulomb"', '"cohesive-coulomb"\ncap = 0.1', ["--solver", "lemke"], "use SemismoothNewton"),
+        ("title =", "load_factors = [0.5, 1.0]\ntitle =", ["--cascade"], "run it on one mesh"),
+    ],
+)
+def test_what_shows_only_while_solving_is_one_line_too(
+    old: str, new: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    assert old in text
+    Path("my.toml").write_text(text.replace(old, new), "utf-8")
+    error = one_line_error(capsys, "run", "my.toml", "-o", "r.h5", *SMALL, *arguments)
+    assert error.startswith("bemkit: error: my.toml: ")
+    assert message in error
+
+
 def test_defects_of_bemkit_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*arguments: object, **options: object) -> None:
         raise ValueError("not an input error")

@@ -113,7 +113,9 @@ def test_an_elastic_step_back_and_forth_changes_nothing() -> None:
     np.testing.assert_allclose(back.contact.sigma_t, there.contact.sigma_t, atol=1e-9)
 
 
-@pytest.mark.parametrize("discretisation", [bk.LinearGalerkin(), bk.ConstantCollocation()], ids=lambda d: type(d).__name__)
+@pytest.mark.parametrize(
+    "discretisation", [bk.LinearGalerkin(), bk.ConstantCollocation()], ids=lambda d: type(d).__name__
+)
 def test_the_body_is_assembled_once_and_loads_are_exact(
     discretisation: bk.Discretisation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -129,7 +131,9 @@ def test_the_body_is_assembled_once_and_loads_are_exact(
     moved = model.under(second)
     fresh = build_model(second, mesh, model.units)
     assert len(calls) == 2
-    np.testing.assert_allclose(moved.body.dense.load, fresh.body.dense.load, atol=1e-12 * np.abs(fresh.body.dense.load).max())
+    np.testing.assert_allclose(
+        moved.body.dense.load, fresh.body.dense.load, atol=1e-12 * np.abs(fresh.body.dense.load).max()
+    )
     state = fresh.problem.glued_state
     for one, other in zip(moved.boundary_fields(state), fresh.boundary_fields(state), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(other)))

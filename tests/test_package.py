@@ -20,13 +20,13 @@ LAYERS = [
     {"operators"},
     {"contact"},
     {"solvers"},
-    {"scene"},
+    {"mesh_options", "scene"},
     {"estimate", "plan", "kinds", "model", "history", "structuring", "shipped"},
     {"solution", "scenefile", "escape"},
     {"warm_start"},
-    {"io", "tables", "plotting", "interior", "runner", "reference"},
+    {"io", "tables", "plotting", "interior", "runner", "adaptive", "reference"},
     {"outputs", "report", "testing", "cascade"},
-    {"study"},
+    {"study", "stability"},
     {"cli"},
 ]
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")

@@ -33,7 +33,9 @@ def test_a_formula_for_the_coefficient() -> None:
     assert np.all(np.abs(contact.sigma_t) <= coefficient * -contact.sigma_n + 1e-9)
 
 
-@pytest.mark.parametrize("law", [bk.Tresca(bk.Expression("0.3 * x")), bk.CohesiveCoulomb(0.4, 0.0, bk.Expression("0.1 + x"))])
+@pytest.mark.parametrize(
+    "law", [bk.Tresca(bk.Expression("0.3 * x")), bk.CohesiveCoulomb(0.4, 0.0, bk.Expression("0.1 + x"))]
+)
 def test_formulas_for_stresses_are_in_the_users_units(law: bk.FrictionLaw) -> None:
     solution = bk.run(dataclasses.replace(scene_from_toml(PAPER_1), law=law))
     contact = solution.contact
@@ -45,7 +47,8 @@ def test_formulas_for_stresses_are_in_the_users_units(law: bk.FrictionLaw) -> No
 
 
 def test_each_part_may_have_its_own_law() -> None:
-    condition = f"condition = {{ kind = 'contact', obstacle = {OBSTACLE}, law = {{ kind = 'coulomb', friction_coefficient = 0.1 }} }}"
+    law = "{ kind = 'coulomb', friction_coefficient = 0.1 }"
+    condition = f"condition = {{ kind = 'contact', obstacle = {OBSTACLE}, law = {law} }}"
     scene = scene_from_toml(PAPER_1.replace(WALL, condition))
     assert scene_from_toml(scene_to_toml(scene)).parts[1].condition.law.friction_coefficient == 0.1
     model = build_model(scene, scene.build_mesh())
@@ -60,7 +63,7 @@ def test_each_part_may_have_its_own_law() -> None:
     assert pressed.any()
     assert np.all(np.abs(solution.contact.sigma_t[pressed]) <= 0.1 * -solution.contact.sigma_n[pressed] * (1 + 1e-9))
     # a frictionless wall, either by its own law or as a roller that happens to stay in touch, gives one answer
-    frictionless = scene_from_toml(PAPER_1.replace(WALL, condition.replace("coulomb', friction_coefficient = 0.1 }", "frictionless' }")))
+    frictionless = scene_from_toml(PAPER_1.replace(WALL, condition.replace(law, "'frictionless'")))
     assert {type(law).__name__ for law in build_model(frictionless, frictionless.build_mesh()).problem.law.laws} == {
         "Coulomb",
         "Frictionless",
@@ -83,7 +86,7 @@ def test_bad_values_name_part_and_place(value: str, message: str) -> None:
 
 @pytest.mark.parametrize("value", ['"z"', "true", '"x > 0.5"', "-0.5"])
 def test_what_is_no_coefficient_is_refused_at_once(value: str) -> None:
-    with pytest.raises(SceneError, match="law.friction_coefficient|friction_coefficient"):
+    with pytest.raises(SceneError, match="friction_coefficient"):
         scene_from_toml(PAPER_1.replace(COEFFICIENT, f"friction_coefficient = {value}"))
 
 

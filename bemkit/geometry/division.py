@@ -71,7 +71,7 @@ class Division:
     @property
     def piece_lengths(self) -> FloatArray:
         """(n_pieces,) array [m]: lengths of the pieces, to a few digits."""
-        middles = (np.arange(32) + 0.5) / 32.0
+        middles = np.linspace(0.5, 31.5, 32) / 32.0
         return np.array(
             [
                 np.diff(piece.span)[0]

@@ -185,7 +185,7 @@ def _long_elements(lengths: Sequence[FloatArray], loops: IntArray) -> list[BoolA
     """Mark the elements of each piece that are too long beside one of their neighbours along the loop."""
     result: list[BoolArray] = []
     for loop in np.unique(loops):
-        pieces = [lengths[k] for k in np.flatnonzero(loops == loop)]
+        pieces = [lengths[k] for k in np.flatnonzero(loops == loop).tolist()]
         along = np.concatenate(pieces)
         is_long = along > STEEPEST * np.minimum(np.roll(along, 1), np.roll(along, -1))
         result += np.split(is_long, np.cumsum([len(piece) for piece in pieces])[:-1])

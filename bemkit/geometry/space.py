@@ -255,7 +255,8 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
     for number, name in enumerate(mesh.parts):
         owner[mesh.part(name)] = number
     changes = owner[mesh.node_elements[:, 0]] != owner[mesh.node_elements[:, 1]]
-    return corner_nodes(mesh) | changes
+    breaks: BoolArray = corner_nodes(mesh) | changes
+    return breaks
 
 
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:

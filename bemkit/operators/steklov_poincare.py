@@ -49,12 +49,16 @@ class CondensedMap:
     under : callable
         Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
         nodes -> the same body under them, without another factorisation.
+    sensitivity : (n_nodes, 2) array, optional
+        Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
+        above the forces themselves, which then are differences and carry its round-off.
     """
 
     stiffness: FloatArray
     load: FloatArray
     recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     under: Callable[[FloatArray, FloatArray], CondensedMap]
+    sensitivity: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,6 +204,7 @@ class GalerkinMap:
         stiffness = matrix[np.ix_(is_open, is_open)] + multiply(coupling.T, response) + volume[is_open] @ pressures
         stiffness = 0.5 * (stiffness + stiffness.T)
         of_fixed = matrix[:, fixed]
+        sensitivity = np.abs(self.matrix()).sum(axis=0).reshape(n, 2)
 
         def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
             prescribed = displacement.ravel()[fixed]
@@ -217,7 +222,7 @@ class GalerkinMap:
                 force += self._volume @ (pressure + pressures @ open_displacement)
                 return displacement, force.reshape(n, 2)
 
-            return CondensedMap(stiffness, load, recover, under)
+            return CondensedMap(stiffness, load, recover, under, sensitivity)
 
         return under(force, conditions.displacement)
 

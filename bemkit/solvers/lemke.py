@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import stick
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.options import check_max_steps
 
@@ -160,7 +160,7 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
     far = problem.friction_bound(none - 1e3 * stress)
     is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
     if not is_affine or np.any((cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)):
-        raise ValueError(
+        raise LawError(
             f"LemkePivoting cannot treat the friction law {type(problem.law).__name__}: its bound must be "
             "c + s |sigma_n| without cap, and c = 0 unless it acts across the gap; use SemismoothNewton"
         )

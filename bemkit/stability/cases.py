@@ -41,9 +41,7 @@ class Similarity:
     def apply(self, scene: Scene) -> Scene:
         """Return the similar scene."""
         stretch = Stretch((self.length, self.length), self.shift)
-        return moved_scene(
-            scene, stretch, stress=self.stress, displacement=self.displacement, modulus=self.modulus
-        )
+        return moved_scene(scene, stretch, stress=self.stress, displacement=self.displacement, modulus=self.modulus)
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ class Case:
 
     value: float
     scene: Scene
-    similarity: Similarity = Similarity()  # noqa: RUF009 - frozen
+    similarity: Similarity = Similarity()
     levels: int = 0
     precision: float = PRECISION
     drift_limit: float = float("inf")

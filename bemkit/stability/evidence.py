@@ -129,7 +129,11 @@ def _contact_normals(solution: Solution) -> FloatArray:
     elements = np.concatenate(list(_contact_elements(solution).values()))
     points = np.column_stack([table.x, table.y])
     if isinstance(solution.scene.discretisation, ConstantCollocation):
-        places, normals, lengths = mesh.centres[elements], mesh.normals_at(elements, np.zeros(1))[:, 0], mesh.lengths[elements]
+        places, normals, lengths = (
+            mesh.centres[elements],
+            mesh.normals_at(elements, np.zeros(1))[:, 0],
+            mesh.lengths[elements],
+        )
     else:
         places = np.concatenate([mesh.start[elements], mesh.end[elements]])
         both_ends = mesh.normals_at(elements, np.array([-1.0, 1.0]))

@@ -84,7 +84,7 @@ class MovedObstacle:
     """An obstacle whose gap is ``factor`` times the gap of the original body, plus ``offset`` [m]."""
 
     obstacle: Obstacle
-    stretch: Stretch = Stretch()  # noqa: RUF009 - frozen
+    stretch: Stretch = Stretch()
     factor: float = 1.0
     offset: float = 0.0
 
@@ -135,7 +135,9 @@ class MovedShape:
     def outline(self) -> Outline:
         """Return the moved boundary, its sides under their names."""
         outline = self.shape.outline()
-        loops = tuple(tuple(Side(side.name, _moved_curve(side.curve, self.stretch)) for side in loop) for loop in outline.loops)
+        loops = tuple(
+            tuple(Side(side.name, _moved_curve(side.curve, self.stretch)) for side in loop) for loop in outline.loops
+        )
         return Outline(loops, outline.is_exterior)
 
 
@@ -171,9 +173,11 @@ def with_gap_offset(scene: Scene, offset: float) -> Scene:
     """Return a scene whose obstacles stand further away by `offset` [m], nearer if it is negative."""
     return with_conditions(
         scene,
-        lambda condition: replace(condition, obstacle=MovedObstacle(condition.obstacle, offset=offset))
-        if isinstance(condition, Contact)
-        else condition,
+        lambda condition: (
+            replace(condition, obstacle=MovedObstacle(condition.obstacle, offset=offset))
+            if isinstance(condition, Contact)
+            else condition
+        ),
     )
 
 
@@ -197,7 +201,9 @@ def with_conditions(scene: Scene, change: Callable[[Condition], Condition]) -> S
     return replace(scene, parts=tuple(replace(part, condition=change(part.condition)) for part in scene.parts))
 
 
-def _combined(a: ScalarField, factor_a: float, b: ScalarField, factor_b: float) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def _combined(
+    a: ScalarField, factor_a: float, b: ScalarField, factor_b: float
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
     def field(x: FloatArray, y: FloatArray) -> FloatArray:
         points = np.column_stack([x, y])
         return factor_a * evaluate_field(a, points) + factor_b * evaluate_field(b, points)

@@ -207,9 +207,7 @@ def compute(axis: str, case: Case, reference: Solution | None) -> Row:
     )
 
 
-def difference(
-    reference: Solution, solution: Solution, similarity: Similarity, *, in_mean: bool = False
-) -> float:
+def difference(reference: Solution, solution: Solution, similarity: Similarity, *, in_mean: bool = False) -> float:
     """Return the largest difference of two contact tables after scaling the second back.
 
     Parameters
@@ -255,9 +253,10 @@ def condition_number(scene: Scene, case: Case) -> float:
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(scene, mesh).body
-        scale = 1.0 / np.sqrt(np.abs(np.diagonal(body.dense.stiffness)))
+        diagonal = np.abs(np.diagonal(body.dense.stiffness))
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         singular = np.linalg.svd(scale[:, None] * body.dense.stiffness * scale, compute_uv=False)
-    smallest = float(singular[singular.size - 1 - len(body.rigid_motions())])
+    smallest = float(singular[max(singular.size - 1 - len(body.rigid_motions()), 0)])
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 
 

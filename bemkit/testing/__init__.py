@@ -5,4 +5,5 @@ from bemkit.testing.failure import CheckFailed as CheckFailed
 from bemkit.testing.laws import check_law as check_law
 from bemkit.testing.operators import check_double_layer as check_double_layer
 from bemkit.testing.operators import check_operator as check_operator
+from bemkit.testing.solvers import check_solver as check_solver
 from bemkit.testing.spaces import check_space as check_space

@@ -47,7 +47,10 @@ def test_laws_without_formulas_are_themselves_everywhere():
     ("call", "message"),
     [
         (lambda: Coulomb(Expression("x > 1")), "friction_coefficient = 'x > 1' is a condition"),
-        (lambda: Coulomb(Expression("0.5 - x")).at(POINTS), r"is -0.5 at \(x, y\) = \(1, 2\); it must be zero or positive"),
+        (
+            lambda: Coulomb(Expression("0.5 - x")).at(POINTS),
+            r"is -0.5 at \(x, y\) = \(1, 2\); it must be zero or positive",
+        ),
         (lambda: Coulomb(Expression("x")).bound(PRESSURE), r"friction_coefficient is a function .*law.at\(points\)"),
         (lambda: Tresca(Expression("x")).scaled(2.0), "bound_value is a function of the coordinates"),
         (lambda: CohesiveCoulomb(0.1, Expression("x"), 0.5).at(POINTS), "cap = 0.5 lies below cohesion = 1"),

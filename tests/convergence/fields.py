@@ -11,7 +11,7 @@ from bemkit.geometry import BoundaryMesh
 from bemkit.geometry.space import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid import resting_motions
-from bemkit.operators.steklov_poincare import GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 
 
 def quadratic_map(mesh: BoundaryMesh, material: Material) -> GalerkinMap:
@@ -32,12 +32,15 @@ def forces(elastic: SteklovPoincare, traction: Callable[[FloatArray, FloatArray]
     return total
 
 
-def neumann(elastic: SteklovPoincare, force: FloatArray) -> FloatArray:
+def neumann(elastic: GalerkinMap | CollocationMap, force: FloatArray) -> FloatArray:
     """Return the (n_nodes, 2) displacements under nodal forces; the least of those that differ by rigid motions."""
     mesh = elastic.displacement_space.mesh
-    motions = resting_motions(mesh, dof_points(elastic.displacement_space))
-    n, m = motions.shape
-    bordered = np.block([[elastic.matrix(), motions], [motions.T, np.zeros((m, m))]])
+    held = resting_motions(mesh, dof_points(elastic.displacement_space))
+    if elastic.material.effective_poisson_ratio == 0.5 and not mesh.is_exterior:
+        # the map leaves out the pressure that keeps the volume
+        held = np.column_stack([held, forces(elastic, lambda _, normal: normal).ravel()])
+    n, m = held.shape
+    bordered = np.block([[elastic.matrix(), held], [held.T, np.zeros((m, m))]])
     return np.linalg.solve(bordered, np.concatenate([force.ravel(), np.zeros(m)]))[:n].reshape(-1, 2)
 
 

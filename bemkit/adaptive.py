@@ -1,0 +1,167 @@
+"""Meshes that follow the solution until a wished accuracy is reached.
+
+Each mesh is made anew from the solution before it: its pieces end where the contact status changes, so that these
+points are nodes and the mesh is graded towards them; elements are shared by the estimated errors, and half of them lie
+on the contact boundary in any case. Solves start from the solution before, so that few Newton steps are needed. The
+few meshes grow like 1, 2, 4, ..., so that the last one costs more than all others together.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.order import along_boundary
+from bemkit.geometry.partition import SPREAD, Partition, better_partition, first_partition
+from bemkit.mesh_options import FIRST_ELEMENTS, MOST_ELEMENTS
+from bemkit.runner import run
+from bemkit.scene import Scene
+from bemkit.solution import Solution
+from bemkit.solvers.base import StepRecord
+
+LARGEST_GROWTH = 2.0
+"""Factor between the numbers of elements of two meshes: the places where the status changes must keep up."""
+SMALLEST_GROWTH = 1.1
+"""A mesh that is hardly larger would hardly be better."""
+TRANSITION = 10.0
+"""Length of the element in which the status changes, in units of the accuracy times the length of the part."""
+SAFETY = 0.8
+"""The next mesh is planned for this part of the wished error."""
+
+
+def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None = None) -> tuple[Solution, ...]:
+    """Solve a scene on meshes of growing size until the estimated error is below the accuracy of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `MeshOptions.accuracy`.
+    callback : callable, optional
+        Receives a record of every step on every mesh.
+
+    Returns
+    -------
+    tuple of Solution
+        One for each mesh; the best one comes last. Its timings are those of all meshes together. If the accuracy is out
+        of reach within the elements or the time allowed, its message says so, and `Solution.estimated_error` what was
+        reached.
+
+    Raises
+    ------
+    ValueError
+        If the scene has no accuracy, or for the reasons of `bemkit.run`.
+    """
+    options = scene.mesh
+    if options.accuracy is None:
+        raise ValueError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
+    begin = time.perf_counter()
+    partition = first_partition(scene.shape.outline(), scene.selections, FIRST_ELEMENTS)
+    solutions: list[Solution] = []
+    most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
+    while True:
+        started = time.perf_counter()
+        solution = run(scene, mesh=partition.mesh, start=solutions[-1] if solutions else None, callback=callback)
+        solutions.append(solution)
+        now = time.perf_counter()
+        if not solution.is_converged:
+            return _ending(solutions, f"the solve on {solution.mesh.n_elements} elements failed")
+        if _error(solution) <= options.accuracy and _resolves_transitions(solution, options.accuracy):
+            return _ending(solutions)
+        n_elements = _next_size(solution, options.accuracy)
+        if n_elements > most_elements:
+            return _ending(solutions, f"more than {most_elements} elements would be needed")
+        growth = n_elements / solution.mesh.n_elements
+        expected = (now - started) * growth**2
+        if options.most_seconds is not None and now - begin + expected > options.most_seconds:
+            return _ending(solutions, f"more than {options.most_seconds:g} s would be needed")
+        partition = better_partition(
+            partition,
+            _wish(solution),
+            n_elements,
+            cuts=_cuts(partition, solution),
+            spread_over=[part.name for part in scene.contact_parts],
+        )
+
+
+def _error(solution: Solution) -> float:
+    return float("inf") if solution.estimated_error is None else solution.estimated_error
+
+
+def _rate(solution: Solution) -> int:
+    """Return the power of element lengths in the squared energy error: 2 p + 1 for displacements of degree p."""
+    return 2 * solution.scene.discretisation.displacement_space(solution.mesh).degree + 1
+
+
+def _wish(solution: Solution) -> FloatArray:
+    """Return how many elements should replace each one.
+
+    The squared error of an element cut into m falls like m**-rate; for the smallest sum over a given number of elements
+    m is proportional to the squared error to the power of 1 / (rate + 1).
+    """
+    errors = solution.element_errors
+    if errors is None:
+        raise ValueError("collocation has no error estimate: choose a Galerkin discretisation")
+    return np.asarray(errors ** (1.0 / (_rate(solution) + 1)))
+
+
+def _next_size(solution: Solution, accuracy: float) -> int:
+    """Return the number of elements that the accuracy needs, or a step towards it."""
+    rate, wish = _rate(solution), _wish(solution)
+    allowed = (SAFETY * accuracy) ** 2 * 2.0 * solution.energy
+    needed = (wish.sum() / allowed) ** (1.0 / rate) * wish.sum() / (1.0 - SPREAD) if allowed > 0.0 else 0.0
+    n_elements = solution.mesh.n_elements
+    smallest = SMALLEST_GROWTH if _error(solution) > accuracy else 1.0
+    return int(np.clip(needed, smallest * n_elements, LARGEST_GROWTH * n_elements))
+
+
+def _resolves_transitions(solution: Solution, accuracy: float) -> bool:
+    """Tell whether the elements in which the status changes are as short as the accuracy asks for.
+
+    Tractions there behave like square roots; an element of length h leaves a relative error of about h / (10 l) in a
+    contact part of length l. The energy hardly notices.
+    """
+    mesh = solution.mesh
+    for found in solution.transitions:
+        elements = along_boundary(mesh, mesh.part(found.part))
+        ends = np.cumsum(mesh.lengths[elements])
+        length = mesh.lengths[elements[min(int(np.searchsorted(ends, found.s)), elements.size - 1)]]
+        if length > TRANSITION * accuracy * ends[-1]:
+            return False
+    return True
+
+
+def _cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
+    """Return where the status changes, as parameters by the number of the side.
+
+    A zone that a single node stands for is not resolved yet: its ends are left alone.
+    """
+    table, mesh = solution.contact, solution.mesh
+    cuts: dict[int, list[float]] = {}
+    for part in dict.fromkeys(table.part):
+        nodes = table.s[[name == part for name in table.part]]
+        places = np.array([found.s for found in solution.transitions if found.part == part])
+        zone_sizes = np.histogram(nodes, np.concatenate([[-np.inf], places, [np.inf]]))[0]
+        elements = along_boundary(mesh, mesh.part(part))
+        ends = np.cumsum(mesh.lengths[elements])
+        for place in places[(zone_sizes[:-1] > 1) & (zone_sizes[1:] > 1)].tolist():
+            k = min(int(np.searchsorted(ends, place)), elements.size - 1)
+            start, end = partition.spans[elements[k]].tolist()
+            fraction = 1.0 - (ends[k] - place) / mesh.lengths[elements[k]]
+            cuts.setdefault(int(partition.sides[elements[k]]), []).append(float(start + fraction * (end - start)))
+    return cuts
+
+
+def _ending(solutions: list[Solution], obstacle: str = "") -> tuple[Solution, ...]:
+    """Put the best solution last, with the times of all and the reason why its accuracy is not what was wished."""
+    best = min((solution for solution in solutions if solution.is_converged), key=_error, default=solutions[-1])
+    message = f"{len(solutions)} meshes, the last with {best.mesh.n_elements} elements. {best.message}"
+    if obstacle:
+        wished = best.scene.mesh.accuracy
+        message = f"The accuracy {wished:g} was not reached: {obstacle}; estimated error {_error(best):.1e}. {message}"
+    timings = {name: sum(solution.timings[name] for solution in solutions) for name in best.timings}
+    others = [solution for solution in solutions if solution is not best]
+    return (*others, replace(best, timings=timings, message=message))

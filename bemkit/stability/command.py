@@ -1,0 +1,121 @@
+"""The command ``bemkit stability``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from bemkit.scene import Scene
+    from bemkit.stability.cases import Axis
+    from bemkit.stability.sweep import Row
+
+
+@click.command()
+@click.argument("scene", default="paper-1")
+@click.option("--axis", "names", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
+@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("--csv", "csv_file", metavar="FILE", help="Write the rows as CSV; - is standard output.")
+@click.option("--markdown", "markdown", metavar="FILE", help="Write tables as Markdown; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw one figure for each axis into a folder.")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
+def stability(
+    scene: str,
+    names: tuple[str, ...],
+    output: str | None,
+    csv_file: str | None,
+    markdown: str | None,
+    folder: str | None,
+    elements: int | None,
+    discretisation: str | None,
+    quiet: bool,
+) -> int:
+    """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
+
+    The exit code is 0 if every row is right, coarse, ambiguous or named, 1 if one is wrong.
+    """
+    from bemkit.scenefile import load_scene, with_overrides
+    from bemkit.stability.axes import all_axes
+    from bemkit.stability.cases import find_axes
+
+    uses_stdout = "-" in (csv_file, markdown)
+    if csv_file == markdown == "-":
+        raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
+    try:
+        _check_outputs(output, csv_file, markdown)
+        chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation)
+        axes = find_axes(all_axes(), names)
+        rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
+        _write(axes, rows, csv_file, markdown, folder)
+    except (ValueError, OSError) as error:
+        if not type(error).__module__.startswith("bemkit."):
+            raise
+        raise click.ClickException(str(error)) from error
+    if not quiet and not uses_stdout:
+        from bemkit.stability.report import print_verdicts
+
+        print_verdicts(rows)
+    return int(any(row.verdict == "wrong" for row in rows))
+
+
+def _computed(
+    scene: Scene, axes: tuple[Axis, ...], output: str | None, *, is_quiet: bool, shows_tables: bool
+) -> list[Row]:
+    """Compute what is missing; with an output file every finished row is on the disk at once."""
+    from bemkit.scenefile import scene_to_toml
+    from bemkit.stability.files import finished_rows, write_rows
+    from bemkit.stability.report import print_axis
+    from bemkit.stability.sweep import sweep
+
+    text = scene_to_toml(scene) if output else ""
+    known = finished_rows(output, text) if output else {}
+    rows: list[Row] = []
+
+    def announce(axis: Axis, value: float) -> None:
+        if not is_quiet and sys.stderr.isatty():
+            click.echo(f"\r\x1b[K{axis.name} {value:.6g}", nl=False, err=True)
+
+    for row in sweep(scene, axes, finished=known, begins=announce):
+        rows.append(row)
+        if output and (row.axis, row.value) not in known:
+            known[row.axis, row.value] = row
+            write_rows(output, text, list(known.values()))
+        axis = next(axis for axis in axes if axis.name == row.axis)
+        if shows_tables and row.value == axis.values[-1]:
+            if sys.stderr.isatty():
+                click.echo("\r\x1b[K", nl=False, err=True)
+            print_axis(axis, [other for other in rows if other.axis == axis.name])
+    return rows
+
+
+def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> None:
+    from bemkit.outputs import check_text
+    from bemkit.stability.files import CSV_START, MARKDOWN_START, check_rows_target, read_rows
+
+    if output is not None and Path(output).is_file():
+        read_rows(output)  # says more about a broken file than that it stands in the way
+    if output is not None:
+        check_rows_target(output)
+    check_text(csv_file, "CSV file of stability rows", CSV_START)
+    check_text(markdown, "Markdown file of stability tables", MARKDOWN_START)
+
+
+def _write(
+    axes: tuple[Axis, ...], rows: list[Row], csv_file: str | None, markdown: str | None, folder: str | None
+) -> None:
+    from bemkit.outputs import write_text
+    from bemkit.stability.files import to_csv, to_markdown
+
+    if csv_file is not None:
+        write_text(csv_file, to_csv(rows))
+    if markdown is not None:
+        write_text(markdown, to_markdown(axes, rows))
+    if folder is not None:
+        from bemkit.stability.plots import save_plots
+
+        save_plots(axes, rows, Path(folder))
