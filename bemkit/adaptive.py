@@ -16,8 +16,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.order import along_boundary
-from bemkit.geometry.partition import SPREAD, Partition, better_partition, first_partition
-from bemkit.mesh_options import FIRST_ELEMENTS, MOST_ELEMENTS
+from bemkit.geometry.partition import SPREAD, Partition, better_partition
+from bemkit.mesh_options import MOST_ELEMENTS
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
@@ -59,7 +59,8 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     if options.accuracy is None:
         raise ValueError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
     begin = time.perf_counter()
-    partition = first_partition(scene.shape.outline(), scene.selections, FIRST_ELEMENTS)
+    contact = [part.name for part in scene.contact_parts]
+    partition = options.first_partition(scene.shape.outline(), scene.selections, contact)
     solutions: list[Solution] = []
     most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
     while True:
@@ -83,7 +84,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             _wish(solution),
             n_elements,
             cuts=_cuts(partition, solution),
-            spread_over=[part.name for part in scene.contact_parts],
+            spread_over=contact,
         )
 
 

@@ -27,6 +27,8 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
     tuple of Scene
         As many as there are load factors.
     """
+    if scene.load_factors == (1.0,):
+        return (scene,)
     return tuple(with_scaled_loads(scene, factor) for factor in scene.load_factors)
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from bemkit.geometry.discretise import discretise
 from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline
-from bemkit.geometry.partition import first_partition
+from bemkit.geometry.partition import Partition, first_partition
 from bemkit.geometry.selection import Selection
 
 DEFAULT_ELEMENTS = 320
@@ -84,8 +84,12 @@ class MeshOptions:
         """Number of elements to begin with: `elements`, or those of the first mesh if the accuracy decides."""
         return FIRST_ELEMENTS if self.elements is None else self.elements
 
-    def divide(self, outline: Outline, parts: Mapping[str, Selection]) -> BoundaryMesh:
-        """Divide an outline, for the first time if the accuracy decides."""
+    def first_partition(self, outline: Outline, parts: Mapping[str, Selection], contact: Collection[str]) -> Partition:
+        """Divide an outline for the first time if the accuracy decides; `contact` names the contact parts."""
+        return first_partition(outline, parts, FIRST_ELEMENTS, even=contact)
+
+    def divide(self, outline: Outline, parts: Mapping[str, Selection], contact: Collection[str]) -> BoundaryMesh:
+        """Divide an outline, for the first time if the accuracy decides; `contact` names the contact parts."""
         if self.elements is None:
-            return first_partition(outline, parts, FIRST_ELEMENTS).mesh
+            return self.first_partition(outline, parts, contact).mesh
         return discretise(outline, n_elements=self.elements, parts=parts, grading=self.grading, density=self.density)

@@ -22,7 +22,7 @@ from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, LinearSpace, QuadraticSpace, break_nodes, dof_points
 from bemkit.operators.nodal import Support, supported
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare, TractionField
 from bemkit.scene import (
     Clamped,
     ConstantCollocation,
@@ -35,7 +35,6 @@ from bemkit.scene import (
     Scene,
     Traction,
 )
-
 
 _FARTHEST = 1e7
 """Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
@@ -142,9 +141,9 @@ class Model:
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
         traction *= self.units.stress
-        for part, elements, normals in _parts(self.scene, self.mesh):
+        for part, elements, _ in _parts(self.scene, self.mesh):
             if isinstance(part.condition, Traction | Pressure):
-                traction[elements] = _mean_load(part.condition, self.mesh, elements, normals)
+                traction[elements] = _mean_load(part.condition, self.mesh, elements)
         is_loose = np.ones(self.mesh.n_elements, bool)
         for _, elements, _ in _parts(self.scene, self.mesh):
             is_loose[elements] = False
@@ -205,8 +204,8 @@ def _check_position(mesh: BoundaryMesh) -> None:
     if distance > _FARTHEST:
         x, y = mesh.centre.tolist()
         raise TooFarError(
-            f"the body lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits of "
-            f"its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
+            f"the body lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
+            f"of its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
         )
 
 
@@ -220,10 +219,9 @@ def _problem(
 
 def _nodal_forces(scene: Scene, mesh: BoundaryMesh, elastic: SteklovPoincare, units: Units) -> FloatArray:
     force = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
-    for part, elements, normals in _parts(scene, mesh):
+    for part, elements, _ in _parts(scene, mesh):
         if isinstance(part.condition, Traction | Pressure):
-            for chosen, normal in _by_direction(elements, normals):
-                force += elastic.nodal_forces(chosen, _dimensionless_load(part.condition, normal, units))
+            force += elastic.nodal_forces(elements, _dimensionless_load(part.condition, units))
     return force
 
 
@@ -307,27 +305,19 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
     return Units(mesh.centre, length, modulus, stress)
 
 
-def _by_direction(elements: IntArray, normals: FloatArray) -> list[tuple[IntArray, FloatArray]]:
-    """Group elements by their normal, so that a pressure field is evaluated once for each straight side."""
-    unique, group = np.unique(normals, axis=0, return_inverse=True)
-    return [(elements[group.ravel() == k], normal) for k, normal in enumerate(unique)]
-
-
-def _dimensionless_load(
-    load: Traction | Pressure, normal: FloatArray, units: Units
-) -> Callable[[FloatArray], FloatArray]:
-    def field(points: FloatArray) -> FloatArray:
-        normals = np.broadcast_to(normal, points.shape)
+def _dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField:
+    def field(points: FloatArray, normals: FloatArray) -> FloatArray:
         return load.at(units.to_physical(points), normals) / units.stress
 
     return field
 
 
-def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray, normals: FloatArray) -> FloatArray:
+def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray) -> FloatArray:
     xi, weights = gauss_legendre(5)
-    points = mesh.points(elements, xi)
-    values = [0.5 * weight * load.at(points[:, k], normals) for k, weight in enumerate(weights)]
-    return np.sum(values, axis=0)  # type: ignore[no-any-return]
+    points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
+    values = [0.5 * weight * load.at(points[:, k], normals[:, k]) for k, weight in enumerate(weights)]
+    mean: FloatArray = np.sum(values, axis=0)
+    return mean
 
 
 def _supports(scene: Scene, mesh: BoundaryMesh, units: Units) -> list[Support]:

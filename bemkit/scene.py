@@ -358,4 +358,4 @@ class Scene:
         GeometryError
             If parts overlap or are empty, or there are too few elements.
         """
-        return self.mesh.divide(self.shape.outline(), self.selections)
+        return self.mesh.divide(self.shape.outline(), self.selections, [part.name for part in self.contact_parts])

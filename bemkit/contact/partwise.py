@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.laws import FrictionLaw, RescaledLaw
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +66,12 @@ class PartwiseLaw(FrictionLaw):
         for value, (_, nodes) in zip(values, self._pairs, strict=True):
             result[nodes] = value
         return result
+
+
+def law_name(law: FrictionLaw) -> str:
+    """Return the name of the class that the user gave, also of a law wrapped by others, for messages."""
+    if isinstance(law, RescaledLaw):
+        return law_name(law.law)
+    if isinstance(law, PartwiseLaw):
+        return " or ".join(dict.fromkeys(law_name(part) for part in law.laws))
+    return type(law).__name__

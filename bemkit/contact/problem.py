@@ -10,6 +10,7 @@ from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import stick
 from bemkit.contact.dense import DenseBody
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.partwise import law_name
 
 __all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]
 
@@ -62,7 +63,7 @@ class ContactProblem:
         missing = [member for member in _LAW_MEMBERS if not hasattr(self.law, member)]
         if missing:
             raise LawError(
-                f"friction law {type(self.law).__name__} has no {', '.join(missing)}; "
+                f"friction law {law_name(self.law)} has no {', '.join(missing)}; "
                 "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
             )
         self.friction_bound(np.zeros(n_contact))
@@ -115,7 +116,7 @@ class ContactProblem:
         if np.any(bound < 0.0):
             node = int(np.argmin(bound))
             raise LawError(
-                f"friction law {type(self.law).__name__}.bound is {bound[node]:g} at contact node {node} "
+                f"friction law {law_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
                 f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
             )
         return self._where_acting(bound, is_closed)
@@ -130,7 +131,7 @@ class ContactProblem:
         return np.where(is_closed | np.asarray(self.law.acts_across_gap), values, 0.0)
 
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
-        name = f"friction law {type(self.law).__name__}.{method}"
+        name = f"friction law {law_name(self.law)}.{method}"
         try:
             values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
         except Exception as error:  # whatever an own law raises must surface with the law's name

@@ -63,7 +63,9 @@ class Partition:
         return np.concatenate([np.column_stack([s[:-1], s[1:]]) for s in self.parameters])
 
 
-def first_partition(outline: Outline, parts: Mapping[str, Selection], n_elements: int) -> Partition:
+def first_partition(
+    outline: Outline, parts: Mapping[str, Selection], n_elements: int, *, even: Collection[str] = ()
+) -> Partition:
     """Divide an outline of whose solution nothing is known.
 
     Parameters
@@ -73,6 +75,8 @@ def first_partition(outline: Outline, parts: Mapping[str, Selection], n_elements
         Boundary parts by name.
     n_elements : int
         About so many elements, more where `LEAST` or `STEEPEST` ask for them.
+    even : collection of str
+        Parts with elements of equal length: on a contact boundary anything may happen anywhere.
 
     Returns
     -------
@@ -82,14 +86,11 @@ def first_partition(outline: Outline, parts: Mapping[str, Selection], n_elements
     base = divide(outline, parts)
     shares = np.sqrt(base.piece_lengths)
     counts = share_elements(max(n_elements, LEAST * len(shares)), shares)
-    return _balanced(
-        base,
-        base,
-        [
-            piece.at(_stretched(np.linspace(0.0, 1.0, max(LEAST, int(count)) + 1)))
-            for piece, count in zip(base.pieces, counts, strict=True)
-        ],
-    )
+    parameters = []
+    for piece, count in zip(base.pieces, counts.tolist(), strict=True):
+        y = np.linspace(0.0, 1.0, max(LEAST, count) + 1)
+        parameters.append(piece.at(y if piece.part in even else _stretched(y)))
+    return _balanced(base, base, parameters)
 
 
 def better_partition(

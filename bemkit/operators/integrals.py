@@ -120,11 +120,11 @@ class PairSweep:
         is_straight = self.panels.is_straight[trial]
         for kind in (is_straight, ~is_straight):
             for number, (n_points, _) in enumerate(GAUSS_LEVELS):
-                for chosen in _batches(np.flatnonzero(kind & (level == number)), CHUNK_PAIRS):
+                for chosen in _batches(np.flatnonzero(kind & (level == number)), 2 * CHUNK_PAIRS // n_points):
                     values = integrate_separated(self.panels, self.degrees, test[chosen], trial[chosen], n_points)
                     _assign(result, chosen, values)
             near = np.flatnonzero(kind & (level == len(GAUSS_LEVELS)) & ~is_same)
-            for chosen in _batches(near, CHUNK_PAIRS // 16):
+            for chosen in _batches(near, CHUNK_PAIRS // 32):
                 _assign(result, chosen, integrate_near(self.panels, self.degrees, test[chosen], trial[chosen]))
             same = np.flatnonzero(kind & is_same)
             _assign(result, same, integrate_same(self.panels, self.degrees, test[same]))

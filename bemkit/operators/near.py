@@ -39,16 +39,22 @@ def integrate_separated(
     result = PairIntegrals.zeros(degrees, (test.size,))
     is_straight = bool(panels.is_straight[trial].all())
     polynomials = panels.polynomials(trial)
-    for xi, weight in zip(*gauss_legendre(n_points), strict=True):
-        at_start = bool(xi < 0)
+    points, weights = gauss_legendre(n_points)
+    for at_start in (True, False):
+        half = points < 0.0 if at_start else points >= 0.0
+        xi, weight = points[half, None], weights[half, None]
         node = (panels.start if at_start else panels.end)[test]
-        offset = panels.offset(test, 0.5 * (1.0 - abs(xi)), at_start)
-        from_start, from_end = (node - panels.start[trial]) + offset, (node - panels.end[trial]) + offset
+        # all points at once, the pairs of one point after those of the other: few long arrays
+        own, other = np.tile(test, xi.size), np.tile(trial, xi.size)
+        offset = panels.offset(own, np.repeat(0.5 * (1.0 - np.abs(xi)), test.size), at_start)
+        from_start = np.tile(node - panels.start[trial], xi.size) + offset
+        from_end = np.tile(node - panels.end[trial], xi.size) + offset
         if is_straight:
-            inner = inner_integrals(panels, degrees, trial, from_start, from_end)
+            inner = inner_integrals(panels, degrees, other, from_start, from_end)
         else:
-            inner = far_inner(degrees, polynomials, local_coordinates(panels, trial, from_start), n_points)
-        result.add(float(weight), float(xi), inner)
+            zeta = local_coordinates(panels, other, from_start)
+            inner = far_inner(degrees, np.tile(polynomials, xi.size), zeta, n_points)
+        result.add_points(weight, xi, inner)
     result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
     return result
 
@@ -136,12 +142,14 @@ def _integrate_pieces(
         points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
     node = (panels.start if at_start else panels.end)[test]
     length = pieces.high - pieces.low
-    for point, weight in zip(points, weights, strict=True):
-        fraction = pieces.low + point * length
-        xi = (2.0 * fraction - 1.0) * (1.0 if at_start else -1.0)
-        offset = panels.offset(test, fraction, at_start)
-        from_start, from_end = (node - panels.start[trial]) + offset, (node - panels.end[trial]) + offset
-        sums.add(2.0 * weight * length, xi, inner_integrals(panels, degrees, trial, from_start, from_end))
+    fraction = pieces.low + points[:, None] * length
+    xi = (2.0 * fraction - 1.0) * (1.0 if at_start else -1.0)
+    own, other = np.tile(test, n_points), np.tile(trial, n_points)
+    offset = panels.offset(own, fraction.ravel(), at_start)
+    from_start = np.tile(node - panels.start[trial], n_points) + offset
+    from_end = np.tile(node - panels.end[trial], n_points) + offset
+    inner = inner_integrals(panels, degrees, other, from_start, from_end)
+    sums.add_points(2.0 * weights[:, None] * length, xi, inner)
     for target, values in ((result.log, sums.log), (result.quotient, sums.quotient), (result.double, sums.double)):
         for index in np.ndindex(*values.shape[:2]):
             np.add.at(target[index], pieces.pair, values[index])

@@ -100,6 +100,18 @@ class PairIntegrals:
             for a in range(self.double.shape[0]):
                 self.double[a, b] += (weight * xi**a / (2.0 * np.pi)) * double
 
+    def add_points(self, weight: FloatArray, xi: FloatArray, inner: Inner) -> None:
+        """Add several outer points: weights and test coordinates (n_points, n or 1), integrals (n_points * n,)."""
+        for a in range(max(self.log.shape[0], self.double.shape[0])):
+            factor = weight * xi**a if a else weight
+            if a < self.log.shape[0]:
+                for b, (log, quotient) in enumerate(zip(inner.log, inner.quotient, strict=True)):
+                    self.log[a, b] += (factor * log.reshape(len(weight), -1)).sum(axis=0)
+                    self.quotient[a, b] += (factor * quotient.reshape(len(weight), -1)).sum(axis=0)
+            if a < self.double.shape[0]:
+                for b, double in enumerate(inner.double):
+                    self.double[a, b] += (factor / (2.0 * np.pi) * double.reshape(len(weight), -1)).sum(axis=0)
+
     def scale(self, test_half: FloatArray, half: FloatArray, tangent: ComplexArray) -> None:
         """Turn sums for half lengths 1 and a real trial axis into the integrals of the elements themselves."""
         log_half = np.log(half)

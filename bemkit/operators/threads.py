@@ -6,6 +6,11 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 LARGE = 1500
 """Order of a matrix above which several threads factor it faster than one."""
@@ -31,11 +36,17 @@ def blas_threads_for(order: int) -> Iterator[None]:
     if order > LARGE:
         yield
         return
-    import scipy.linalg.lapack  # noqa: F401 - the limit only reaches libraries that are loaded
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _blas_libraries().limit(limits=1):
         yield
+
+
+@cache
+def _blas_libraries() -> ThreadpoolController:
+    """Find the BLAS libraries of numpy and scipy; that takes as long as the LU of a matrix of order 200."""
+    import scipy.linalg.lapack  # noqa: F401 - only libraries that are loaded are found
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController().select(user_api="blas")
 
 
 def for_each_chunk(work: Callable[[slice], None], chunks: Iterable[slice], *, n_pairs: int) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import stick
+from bemkit.contact.partwise import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.options import check_max_steps
@@ -161,7 +162,7 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
     is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
     if not is_affine or np.any((cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)):
         raise LawError(
-            f"LemkePivoting cannot treat the friction law {type(problem.law).__name__}: its bound must be "
+            f"LemkePivoting cannot treat the friction law {law_name(problem.law)}: its bound must be "
             "c + s |sigma_n| without cap, and c = 0 unless it acts across the gap; use SemismoothNewton"
         )
     return cohesion, coefficient

@@ -90,7 +90,8 @@ def examine(solution: Solution) -> Evidence:
     stress, length = _scales(solution)
     normals = _contact_normals(solution)
     pressure, clearance = -table.sigma_n / stress, table.clearance / length
-    held = np.maximum(pressure, np.where(_acts_across_gap(solution), 0.0, np.abs(table.sigma_t) / stress))
+    # friction given across the gap is no sign of contact
+    held = np.maximum(np.abs(pressure), np.where(_acts_across_gap(solution), 0.0, np.abs(table.sigma_t) / stress))
     bound = _friction_bound(solution, held * stress) / stress
     shear, slip = table.sigma_t / stress, table.u_t / length
     if len(solution.scene.load_factors) > 1:
@@ -100,7 +101,7 @@ def examine(solution: Solution) -> Evidence:
         obstacle=_gap_mismatch(solution, normals) / length,
         penetration=_largest(-clearance),
         tension=_largest(-pressure),
-        complementarity=_largest(np.minimum(np.abs(held), np.abs(clearance))),
+        complementarity=_largest(np.minimum(held, np.abs(clearance))),
         cone_excess=_largest(np.abs(shear) - bound),
         slip_opposition=_largest(np.minimum(np.abs(slip), opposition)),
         equilibrium=_imbalance(solution, normals),
@@ -128,16 +129,10 @@ def _contact_normals(solution: Solution) -> FloatArray:
     mesh, table = solution.mesh, solution.contact
     elements = np.concatenate(list(_contact_elements(solution).values()))
     points = np.column_stack([table.x, table.y])
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        places, normals, lengths = (
-            mesh.centres[elements],
-            mesh.normals_at(elements, np.zeros(1))[:, 0],
-            mesh.lengths[elements],
-        )
-    else:
-        places = np.concatenate([mesh.start[elements], mesh.end[elements]])
-        both_ends = mesh.normals_at(elements, np.array([-1.0, 1.0]))
-        normals, lengths = np.concatenate([both_ends[:, 0], both_ends[:, 1]]), np.tile(mesh.lengths[elements], 2)
+    xi = np.zeros(1) if isinstance(solution.scene.discretisation, ConstantCollocation) else np.array([-1.0, 0.0, 1.0])
+    places = mesh.points(elements, xi).reshape(-1, 2)
+    normals = mesh.normals_at(elements, xi).reshape(-1, 2)
+    lengths = np.repeat(mesh.lengths[elements], xi.size)
     from scipy.spatial import cKDTree
 
     _, nearest = cKDTree(points).query(places)
@@ -258,7 +253,7 @@ def _reciprocity(solution: Solution, stress: float) -> float:
         traction = 2.0 * material.shear_modulus * normals @ np.array(unit)
         answer = np.einsum("nqc,nqc,nq->nq", traction, displacement, shares)
         size = max(np.abs(given).sum(), np.abs(answer).sum(), 1e-6 * stress * mesh.lengths.sum())
-        worst = max(worst, abs(float((given - answer).sum())) / size)
+        worst = max(worst, abs(float((given - answer).sum())) / float(size))
     return worst
 
 
@@ -268,11 +263,8 @@ def _displacement_at(solution: Solution, xi: FloatArray) -> FloatArray:
     motions = _motions(mesh, boundary.points).reshape(-1, 3)
     rigid = np.linalg.lstsq(motions, boundary.displacement.ravel(), rcond=None)[0]
     displacement = boundary.displacement - (motions @ rigid).reshape(-1, 2)
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        return np.broadcast_to(displacement[:, None], (mesh.n_elements, xi.size, 2))
-    ends = displacement[mesh.elements]
-    from_start = 0.5 * (1.0 - xi)[:, None]
-    return np.asarray(from_start * ends[:, None, 0] + (1.0 - from_start) * ends[:, None, 1])
+    space = solution.scene.discretisation.space(mesh)
+    return np.asarray(np.einsum("enc,nq->eqc", displacement[space.element_dofs], space.basis(xi)))
 
 
 def _largest(values: FloatArray) -> float:

@@ -29,7 +29,7 @@ def pressed_block(kind: type, *rollers: str) -> tuple[CondensedBody, ContactNode
     """A 2 x 1 block with a unit pressure on top."""
     mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "top", "left")
     elastic: SteklovPoincare = kind(mesh, MATERIAL)
-    force = elastic.nodal_forces(mesh.part("top"), lambda x: np.broadcast_to([0.0, -1.0], x.shape))
+    force = elastic.nodal_forces(mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape))
     body, nodes = condense(elastic, [roller(mesh, part) for part in rollers], mesh.part("bottom"), force)
     return body, nodes, elastic
 
@@ -73,7 +73,7 @@ def test_recovered_fields_repeat_the_contact_state(kind: type) -> None:
     np.testing.assert_allclose(own[:, 0], state.u_n, atol=1e-12)
     free = np.setdiff1d(np.arange(force.shape[0]), np.append(nodes.nodes, elastic_nodes_on_right(elastic)))
     given = elastic.nodal_forces(
-        elastic.displacement_space.mesh.part("top"), lambda x: np.broadcast_to([0.0, -1.0], x.shape)
+        elastic.displacement_space.mesh.part("top"), lambda x, _: np.broadcast_to([0.0, -1.0], x.shape)
     )
     np.testing.assert_allclose(force[free], given[free], atol=1e-11)
     total = force[nodes.nodes] - given[nodes.nodes]
@@ -104,7 +104,7 @@ def test_oblique_roller_at_the_end_of_the_contact_boundary() -> None:
     triangle = Polygon(((0.0, 0.0), (2.0, 0.0), (1.0, np.sqrt(3.0))))
     mesh = mesh_of(triangle, 36, "side-1", "side-2", "side-3")
     elastic = GalerkinMap(mesh, MATERIAL)
-    force = elastic.nodal_forces(mesh.part("side-3"), lambda x: np.broadcast_to([0.3, -1.0], x.shape))
+    force = elastic.nodal_forces(mesh.part("side-3"), lambda x, _: np.broadcast_to([0.3, -1.0], x.shape))
     body, nodes = condense(elastic, [roller(mesh, "side-2")], mesh.part("side-1"), force)
     assert body.rigid_motions().shape[0] == 1  # along the wall
     held = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))

@@ -38,7 +38,7 @@ def test_the_comparison_can_fail() -> None:
     assert not matches("a\nb\n", "a\nx\nb\n")
 
 
-@pytest.mark.parametrize("page", ["tutorials/first-steps.md", "command-line.md"])
+@pytest.mark.parametrize("page", ["tutorials/first-steps.md", "command-line.md", "paper-tables.md"])
 def test_shown_output(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -34,7 +34,7 @@ def patch_error(elastic: SteklovPoincare, material: Material) -> float:
     expected = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
     for element in range(mesh.n_elements):
         traction = stress @ mesh.normals[element]
-        expected += elastic.nodal_forces(np.array([element]), lambda x, t=traction: np.broadcast_to(t, x.shape))
+        expected += elastic.nodal_forces(np.array([element]), lambda x, _, t=traction: np.broadcast_to(t, x.shape))
     displacement = (dof_points(elastic.displacement_space) - mesh.centre) @ GRADIENT.T
     computed = (elastic.matrix() @ displacement.ravel()).reshape(-1, 2)
     return float(np.abs(computed - expected).max() / np.abs(expected).max())

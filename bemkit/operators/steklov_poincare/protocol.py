@@ -1,0 +1,62 @@
+"""What every Steklov-Poincare map can do, and what it becomes when it is condensed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.space import BoundarySpace
+from bemkit.operators.nodal import NodalConditions
+
+TractionField = Callable[[FloatArray, FloatArray], FloatArray]
+"""Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
+
+
+@dataclass(frozen=True, eq=False)
+class CondensedMap:
+    """A body reduced to its open directions: force = stiffness @ displacement - load.
+
+    Parameters
+    ----------
+    stiffness : (n_open, n_open) array
+        In weak form (forces, not tractions).
+    load : (n_open,) array
+        What the given loads and supports press onto the open directions.
+    recover : callable
+        (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x
+        and y.
+    under : callable
+        Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
+        nodes -> the same body under them, without another factorisation.
+    sensitivity : (n_nodes, 2) array, optional
+        Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
+        above the forces themselves, which then are differences and carry its round-off.
+    """
+
+    stiffness: FloatArray
+    load: FloatArray
+    recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    under: Callable[[FloatArray, FloatArray], CondensedMap]
+    sensitivity: FloatArray | None = None
+
+
+class SteklovPoincare(Protocol):
+    """The elastic body seen from its boundary: weak forces = matrix @ displacements."""
+
+    @property
+    def displacement_space(self) -> BoundarySpace:
+        """The space of the displacements; its nodes carry the forces."""
+
+    def matrix(self) -> FloatArray:
+        """Return the weak (n_dofs, n_dofs) matrix [Pa]; its forces are in equilibrium."""
+
+    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
+        """Return the (n_nodes, 2) nodal forces [N/m] of a traction field [Pa] on some elements."""
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the (n_elements, 2) mean tractions [Pa] that belong to what `CondensedMap.recover` gives."""
