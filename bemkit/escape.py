@@ -12,6 +12,7 @@ _DIRECTIONS = (
     *("to the right", "up and to the right", "upward", "up and to the left"),
     *("to the left", "down and to the left", "downward", "down and to the right"),
 )
+_REMEDY = ": change the load or hold the body"
 _STRAIGHT = 1e-6
 """Turning by less than this, relative to the shift at the size of the body, counts as none."""
 
@@ -40,12 +41,13 @@ def describe_escape(model: Model, escape: UnsolvableLoad) -> str:
                 f"the load slides the body {_direction(shift)} with {net:.4g} N/m more than friction can hold; "
                 "change the load, raise the friction or hold the body"
             )
-        return f"the load pushes the body {_direction(shift)} with {net:.4g} N/m; nothing holds it"
+        return f"the load pushes the body {_direction(shift)} with {net:.4g} N/m; nothing holds it{_REMEDY}"
     pivot = units.to_physical(np.array([-shift[1], shift[0]]) / turn)
     x, y = np.where(np.abs(pivot) < 1e-9 * units.length, 0.0, pivot)
     moment = escape.work / abs(turn) * units.stress * units.length**2
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
-    return f"the load turns the body {sense} about ({x:.4g}, {y:.4g}) with {moment:.4g} N m/m; contact cannot hold it"
+    words = f"the load turns the body {sense} about ({x:.4g}, {y:.4g}) with {moment:.4g} N m/m"
+    return f"{words}; contact cannot hold it{_REMEDY}"
 
 
 def _rigid_motion(model: Model, escape: UnsolvableLoad) -> tuple[FloatArray, float]:

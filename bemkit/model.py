@@ -115,7 +115,7 @@ class Model:
         """
         _check_same_body(self.scene, scene)
         space = self.elastic.displacement_space
-        prescribed = supported(space, _supports(scene, self.mesh, self.units)).displacement
+        prescribed = supported(space, _supports(scene, self.mesh, self.units, space)).displacement
         body = self.body.under(prescribed, _nodal_forces(scene, self.mesh, self.elastic, self.units))
         problem = _problem(scene, self.mesh, self.units, body, space)
         return replace(self, scene=scene, body=body, problem=problem)
@@ -193,7 +193,8 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) ->
     unit_mesh = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / units.length)
     elastic = _elastic_map(scene, unit_mesh, units)
     force = _nodal_forces(scene, mesh, elastic, units)
-    body, nodes = condense(elastic, _supports(scene, mesh, units), contact_elements(scene, mesh), force)
+    supports = _supports(scene, mesh, units, elastic.displacement_space)
+    body, nodes = condense(elastic, supports, contact_elements(scene, mesh), force)
     problem = _problem(scene, mesh, units, body, elastic.displacement_space)
     return Model(scene, mesh, units, elastic, body, nodes, problem)
 
@@ -320,13 +321,14 @@ def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray
     return mean
 
 
-def _supports(scene: Scene, mesh: BoundaryMesh, units: Units) -> list[Support]:
+def _supports(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
     result = []
-    for part, elements, normals in _parts(scene, mesh):
+    for part, elements, _ in _parts(scene, mesh):
         condition = part.condition
         axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
         if isinstance(condition, Roller):
-            result.append(Support(part.name, elements, normals[:, None, :]))
+            normals = mesh.normals_at(elements, space.local_nodes)
+            result.append(Support(part.name, elements, normals[:, :, None, :]))
         elif isinstance(condition, Clamped):
             result.append(Support(part.name, elements, axes))
         elif isinstance(condition, PrescribedDisplacement):

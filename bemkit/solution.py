@@ -188,8 +188,8 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
     end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
     at the transition; on the paper's examples this is within a quarter of the node distance. On meshes that are fine
-    there the two nodes next to the transition, where the computed solution is least true, are passed over. Where that says nothing,
-    as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
+    there the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
+    says nothing, as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip
@@ -234,7 +234,9 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
         return middle
     distance = at_near * (s[far] - s[near]) / (at_far - at_near) - s[near]
     gap = contact.s[tighter] - contact.s[last]
-    return float(contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap)
+    place = contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap
+    own = contact.s[[part == contact.part[last] for part in contact.part]]
+    return float(np.clip(place, own.min(), own.max()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,8 +67,8 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
             values = _listed(panels, material, row + rows.start, column, log_half)
             for target, value in zip((a, b, c, d), values, strict=True):
                 target[row, column] = value
-        _write(single, rows, a, b)
-        _write(double, rows, c, d)
+        _write(single, rows, a, None, b)
+        _write(double, rows, c.real, c.imag, d)
         _balance(double, rows, 0.5 if mesh.is_exterior else -0.5)
 
     step = max(1, CHUNK_PAIRS // n)
@@ -94,7 +94,7 @@ def _close_pairs(panels: Panels, rows: slice, distance: float) -> list[tuple[Int
     return [(row[kind], column[kind]) for kind in kinds if kind.any()]
 
 
-Coefficients = tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]
+Coefficients = tuple[FloatArray, ComplexArray, ComplexArray, ComplexArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +118,9 @@ class _Seen:
         a = panels.half[columns] / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
         b = -1.0 / (4.0 * np.pi * (1.0 - nu))
         square = panels.tangent[columns] ** 2
-        on_p = (a * (1.0 - (3.0 - 4.0 * nu) * (2.0 * log_half[columns] + self.log))).astype(complex)
+        on_p = a * (1.0 - 2.0 * (3.0 - 4.0 * nu) * log_half[columns]) - (a * (3.0 - 4.0 * nu)) * self.log
         on_conj_p = (a * square) * self.half_quotient
-        on_v = self.angle / (2.0 * np.pi) + (1j * b * (1.0 - 2.0 * nu)) * self.stretch
+        on_v = _complex(self.angle / (2.0 * np.pi), (b * (1.0 - 2.0 * nu)) * self.stretch)
         on_conj_v = (b * square) * self.turn
         return on_p, on_conj_p, on_v, on_conj_v
 
@@ -144,8 +144,9 @@ def _straight_far(panels: Panels, x: ComplexArray, columns: IntArray | slice, di
     zeta = (x - panels.centre[columns]) * panels.to_local[columns]
     first, second = kernels.far_moments(zeta, 1, kernels.terms_needed(distance))
     log = kernels.far_log_product(zeta) + second.real
-    turn = zeta.imag * kernels.gradient_moment(zeta * zeta - 1.0).conj()
-    return _Seen(log, 1.0 + 1j * zeta.imag * first.conj(), first.imag, first.real, turn)
+    eta, angle, stretch = zeta.imag.copy(), first.imag.copy(), first.real.copy()
+    turn = eta * kernels.gradient_moment(zeta * zeta - 1.0).conj()
+    return _Seen(log, _complex(1.0 + eta * angle, eta * stretch), angle, stretch, turn)
 
 
 def _curved_far(panels: Panels, x: ComplexArray, columns: IntArray) -> _Seen:
@@ -185,9 +186,18 @@ def _turn(chord: FloatArray, plus: ComplexArray, minus: ComplexArray, eta: Float
     return turn
 
 
-def _write(matrix: FloatArray, rows: slice, on_value: ComplexArray, on_conjugate: ComplexArray) -> None:
-    """Write v -> a v + b conj(v) as real 2 x 2 blocks."""
-    matrix[rows, 0, :, 0] = on_value.real + on_conjugate.real
-    matrix[rows, 0, :, 1] = on_conjugate.imag - on_value.imag
-    matrix[rows, 1, :, 0] = on_conjugate.imag + on_value.imag
-    matrix[rows, 1, :, 1] = on_value.real - on_conjugate.real
+def _complex(real: FloatArray, imaginary: FloatArray) -> ComplexArray:
+    """Join two arrays; cheaper than arithmetic with 1j."""
+    result = np.empty(real.shape, complex)
+    result.real, result.imag = real, imaginary
+    return result
+
+
+def _write(
+    matrix: FloatArray, rows: slice, real: FloatArray, imaginary: FloatArray | None, on_conjugate: ComplexArray
+) -> None:
+    """Write v -> (a + i b) v + c conj(v) as real 2 x 2 blocks; b may be left out."""
+    matrix[rows, 0, :, 0] = real + on_conjugate.real
+    matrix[rows, 0, :, 1] = on_conjugate.imag if imaginary is None else on_conjugate.imag - imaginary
+    matrix[rows, 1, :, 0] = on_conjugate.imag if imaginary is None else on_conjugate.imag + imaginary
+    matrix[rows, 1, :, 1] = real - on_conjugate.real

@@ -31,8 +31,9 @@ class Support:
         The boundary part, for messages.
     elements : (m,) array
         Element numbers.
-    directions : (m, k, 2) array
-        k = 1 or 2 unit directions on each element (the normal of a roller, both axes of a clamp).
+    directions : (m, k, 2) or (m, n_local, k, 2) array
+        k = 1 or 2 unit directions on each element (both axes of a clamp), or at each node of each element (the normal
+        of a roller, which turns along curved elements).
     displacement : callable, optional
         (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. Zero if left
         out.
@@ -118,10 +119,10 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
     """Return the projector (n_nodes, 2, 2) on the directions that one support fixes at each node."""
-    outer = np.einsum("eki,ekj->eij", support.directions, support.directions)
+    outer = np.einsum("...ki,...kj->...ij", support.directions, support.directions)
     matrix = np.zeros((space.n_dofs // 2, 2, 2))
-    for dofs in space.element_dofs[support.elements].T:
-        np.add.at(matrix, dofs, outer)
+    for local, dofs in enumerate(space.element_dofs[support.elements].T):
+        np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
     size, vectors = np.linalg.eigh(matrix)
     keep = np.where(size > SMOOTH * size[:, 1:], 1.0, 0.0)
     projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)

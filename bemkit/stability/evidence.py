@@ -263,7 +263,7 @@ def _displacement_at(solution: Solution, xi: FloatArray) -> FloatArray:
     motions = _motions(mesh, boundary.points).reshape(-1, 3)
     rigid = np.linalg.lstsq(motions, boundary.displacement.ravel(), rcond=None)[0]
     displacement = boundary.displacement - (motions @ rigid).reshape(-1, 2)
-    space = solution.scene.discretisation.space(mesh)
+    space = solution.scene.discretisation.displacement_space(mesh)
     return np.asarray(np.einsum("enc,nq->eqc", displacement[space.element_dofs], space.basis(xi)))
 
 
