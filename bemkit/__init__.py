@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from bemkit.cascade import run_cascade as run_cascade
     from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
     from bemkit.contact.laws import Coulomb as Coulomb
     from bemkit.contact.laws import FrictionLaw as FrictionLaw
@@ -61,6 +62,8 @@ if TYPE_CHECKING:
     from bemkit.plan import make_plan as make_plan
     from bemkit.runner import run as run
     from bemkit.runner import run_all as run_all
+    from bemkit.runner import run_history as run_history
+    from bemkit.runner import run_probe as run_probe
     from bemkit.scene import Clamped as Clamped
     from bemkit.scene import ConstantCollocation as ConstantCollocation
     from bemkit.scene import Contact as Contact
@@ -86,6 +89,7 @@ if TYPE_CHECKING:
     from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
 
 _HOME = {
+    "cascade": ("run_cascade",),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "expression": ("Expression",),
@@ -110,7 +114,7 @@ _HOME = {
     "operators.steklov_poincare": ("CollocationMap", "GalerkinMap"),
     "operators.stress": ("principal_stresses", "von_mises"),
     "plan": ("make_plan",),
-    "runner": ("run", "run_all"),
+    "runner": ("run", "run_all", "run_history", "run_probe"),
     "scene": (
         "Clamped",
         "ConstantCollocation",

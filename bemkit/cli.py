@@ -205,6 +205,32 @@ def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> No
         report.print_paper_tables(tables)
 
 
+@study.command()
+@click.argument("scene")
+@click.option("--starts", type=click.IntRange(min=0), default=8, metavar="N", help="Number of starts (8).")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--json", "json_file", metavar="FILE", help="Write all summaries as JSON; - is standard output.")
+def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
+    """Look for several solutions of SCENE from several starts."""
+    from bemkit.outputs import STDOUT, check_text, write_text
+    from bemkit.plan import check_memory
+    from bemkit.runner import run_probe
+    from bemkit.study import report
+
+    with _bad_input():
+        check_text(json_file, "JSON file", "{")
+        chosen = _load(scene, elements, None)
+    with _bad_input(scene):
+        check_memory(chosen)
+        found = run_probe(chosen, n_starts=starts)
+    with _bad_input():
+        if json_file is not None:
+            write_text(json_file, report.solutions_to_json(found, starts))
+    if json_file != STDOUT:
+        report.print_solutions(found, starts)
+    return 0 if found else NOT_CONVERGED
+
+
 def _load(
     source: str,
     elements: int | None,

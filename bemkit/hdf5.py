@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.files import replacing
 
 if TYPE_CHECKING:
     import h5py
@@ -46,10 +47,35 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
         group.create_dataset(name, data=data)
 
 
-def seal(file: h5py.File) -> None:
-    """Store a checksum of everything in a file, which `Reader.check_seal` compares."""
-    file.flush()
-    file.attrs[_SEAL] = Reader("the new file", file.id.get_filesize(), file).checksum()
+@contextmanager
+def created(target: Path) -> Iterator[h5py.File]:
+    """Give an empty HDF5 file that replaces the target, with a checksum of its content, if all goes well.
+
+    It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full.
+
+    Parameters
+    ----------
+    target : Path
+
+    Yields
+    ------
+    h5py.File
+
+    Raises
+    ------
+    OutputFileError
+        If the system refuses, for example because the disk is full.
+    """
+    import h5py
+
+    with replacing(target) as temporary:
+        with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
+            yield file
+            file.flush()
+            file.attrs[_SEAL] = Reader("the new file", file.id.get_filesize(), file).checksum()
+            file.flush()
+            image = file.id.get_file_image()
+        temporary.write_bytes(image)
 
 
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
@@ -178,7 +204,7 @@ class Reader:
         return columns
 
     def check_seal(self) -> None:
-        """Compare the content of the file with the checksum that `seal` stored.
+        """Compare the content of the file with the checksum that `created` stored.
 
         Raises
         ------

@@ -26,9 +26,9 @@ import numpy as np
 
 import bemkit
 from bemkit.contact.certificate import Certificate
-from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.files import OutputFileError, check_target
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.hdf5 import Reader, ResultFileError, opened, seal, write_attributes, write_table, write_text
+from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text
 from bemkit.plan import Plan, PlanItem
 from bemkit.scene import Scene
 from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
@@ -88,7 +88,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
 
     target = check_result_target(path)
     text = scene_to_toml(solution.scene)
-    with replacing(target) as temporary, h5py.File(str(temporary), "w-") as file:
+    with created(target) as file:
         write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
         write_text(file, "scene", text)
         write_attributes(file.create_group("provenance"), provenance())
@@ -103,7 +103,6 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
         write_table(file.create_group("history"), history_columns(solution.history))
         write_table(file.create_group("plan"), _plan_columns(solution.plan))
-        seal(file)
 
 
 def read_result(path: str | Path) -> Solution:

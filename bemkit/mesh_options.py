@@ -36,7 +36,7 @@ class MeshOptions:
         Wanted error in the energy norm relative to the solution, instead of a number of elements. Meshes then follow
         the solution: see `bemkit.adaptive.run_adaptive`.
     most_elements : int, optional
-        No mesh on the way to the accuracy has more elements; 3000 if left out.
+        No mesh on the way to the accuracy has more elements, the first one aside; 3000 if left out.
     most_seconds : float, optional [s]
         No mesh is begun that would take longer, all meshes counted; no limit if left out.
 

@@ -300,6 +300,8 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
                 stresses.append(float(np.abs(part.condition.at(points[:, k])).max()) / length * modulus)
             elif isinstance(part.condition, Contact):
                 gap = part.condition.obstacle.gap(points[:, k], normals)
+                # an overlap or gap below the round-off of the coordinates is no measure of anything
+                gap = np.where(np.abs(gap) > 1e-18 * length, gap, 0.0)
                 stresses.append(float(np.maximum(-gap, 0.0).max()) / length * modulus)
                 gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
     stress = max(stresses) or max(gaps) / length * modulus or modulus

@@ -21,11 +21,16 @@ from bemkit.plan import Plan, make_plan
 from bemkit.scene import Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
+from bemkit.solvers.probe import probe
 from bemkit.warm_start import state_on
 
 
 class UnsolvableSceneError(ValueError):
     """The scene has no solution; the message says why."""
+
+
+class LoadHistoryError(ValueError):
+    """A load history where only a single load makes sense."""
 
 
 def run(
@@ -189,6 +194,48 @@ def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
         timings={name: sum(step.timings[name] for step in steps) for name in last.timings},
         message=f"load step {len(steps)} of {len(scene.load_factors)}: {last.message}",
     )
+
+
+def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = None) -> tuple[Solution, ...]:
+    """Solve a scene from several starts and return the distinct solutions.
+
+    With Coulomb friction a scene may have more than one solution; which of them `run` returns is a matter of its
+    start.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a single load factor.
+    n_starts : int
+        Starts: all nodes sticking, open, slipping forward, slipping backward, then random choices (always the same).
+    mesh : BoundaryMesh, optional
+        As for `run`.
+
+    Returns
+    -------
+    tuple of Solution
+        In the order found, each certified; empty if no start leads to a solution. A single one does not prove that
+        there is no other.
+
+    Raises
+    ------
+    UnsolvableSceneError, ValueError
+        As for `run`; also if the scene has a load history or `n_starts` is negative.
+    """
+    if len(scene.load_factors) > 1:
+        raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
+    clock = [time.perf_counter()]
+    mesh = scene.build_mesh() if mesh is None else mesh
+    plan = make_plan(scene, mesh)
+    clock.append(time.perf_counter())
+    model = build_model(scene, mesh)
+    escape = find_unsolvable_load(model.problem)
+    if escape is not None:
+        raise UnsolvableSceneError(describe_escape(model, escape))
+    clock.append(time.perf_counter())
+    found = probe(model.problem, scene.solver, n_starts=n_starts)
+    clock.append(time.perf_counter())
+    return tuple(_solution(model, result, plan, list(clock)) for result in found)
 
 
 def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution]:

@@ -75,7 +75,7 @@ def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
 
 def to_json(solution: Solution) -> str:
     """Return the summary as one JSON object; numbers that are not finite become null."""
-    return json.dumps(_finite(solution.summary()), indent=2, allow_nan=False)
+    return json.dumps(finite_only(solution.summary()), indent=2, allow_nan=False)
 
 
 def element_displacement(solution: Solution) -> FloatArray:
@@ -133,13 +133,14 @@ def _plain(column: Any) -> list[Any]:
     return values
 
 
-def _finite(value: Any) -> Any:
+def finite_only(value: Any) -> Any:
+    """Return tables, lists and numbers as JSON can hold them: numbers that are not finite become None."""
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite_only(item) for key, item in value.items()}
     if isinstance(value, str):
         return value
     if isinstance(value, Iterable):
-        return [_finite(item) for item in value]
+        return [finite_only(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -6,9 +6,11 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bemkit.kinds import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, OBSTACLES, SHAPES, SOLVERS, Family
+from bemkit.runner import run
 from bemkit.scenefile import SceneError, scene_from_toml, scene_to_toml
 from bemkit.shipped import shipped_files
 
@@ -31,6 +33,19 @@ class Sticky(FrictionLaw):
 
 class NotADataclass:
     pass
+
+@dataclass(frozen=True)
+class Ramp:
+    slope: float = 0.0
+
+    def gap(self, points, normals):
+        return self.slope * points[:, 0]
+
+from bemkit.solvers.ssn import SemismoothNewton
+
+@dataclass(frozen=True)
+class Patient(SemismoothNewton):
+    patience: int = 1
 """
 
 ENTRY_POINTS = """
@@ -39,6 +54,12 @@ sticky = bemkit_test_plugin:Sticky
 broken = bemkit_test_plugin:Missing
 loose = bemkit_test_plugin:NotADataclass
 coulomb = bemkit_test_plugin:Sticky
+
+[bemkit.obstacles]
+ramp = bemkit_test_plugin:Ramp
+
+[bemkit.solvers]
+patient = bemkit_test_plugin:Patient
 """
 
 
@@ -69,6 +90,24 @@ def test_an_installed_law_works_in_scene_files() -> None:
     scene = scene_from_toml(text)
     assert type(scene.law).__name__ == "Sticky"
     assert 'kind = "sticky"\nstrength = 3.0' in scene_to_toml(scene)
+
+
+@pytest.mark.usefixtures("plugin")
+def test_installed_laws_obstacles_and_solvers_solve_scenes() -> None:
+    half_plane = '{ kind = "half-plane", point = [0.0, 0.0], normal = [0.0, 1.0] }'
+    text = PAPER_1.replace("elements = 320", "elements = 60")
+    assert half_plane in text
+    text = text.replace(half_plane, '{ kind = "ramp", slope = 1e-6 }')
+    text = text.replace('"semismooth-newton"', '{ kind = "patient", patience = 3 }')
+    text = text.replace('"coulomb"\nfriction_coefficient = 0.5', '"sticky"\nstrength = 0.1')
+    scene = scene_from_toml(text)
+    assert scene_from_toml(scene_to_toml(scene)) == scene
+    solution = run(scene)
+    assert solution.is_converged
+    np.testing.assert_allclose(solution.contact.gap, 1e-6 * solution.contact.x, rtol=1e-12)
+    slips = np.array(solution.contact.status_words()) == "slip"
+    np.testing.assert_allclose(np.abs(solution.contact.sigma_t[slips]), 0.1, rtol=1e-9)
+    assert slips.any()
 
 
 @pytest.mark.usefixtures("plugin")

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import LinearConditions
-from bemkit.contact.dense import DenseBody
+from bemkit.contact.dense import FORGIVEN, DenseBody
 from bemkit.geometry.space import dof_points, dof_weights
 from bemkit.operators.nodal import NodalConditions, Support, supported
 from bemkit.operators.rigid import rigid_motions
@@ -20,8 +20,8 @@ HELD = 1e-9
 """A rigid motion that moves the supports by less than this, relative to its size, is free of them."""
 
 
-_FORGIVEN = 3e-6
-"""Share of the forces up to which an imbalance may be put down to round-off; beyond, too few digits are left."""
+class NoContactNodesError(ValueError):
+    """A contact boundary whose nodes are all held by supports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +185,7 @@ class CondensedBody:
         size = float(np.abs(arm).max())
         moment = abs(float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])))
         resultant = float(np.abs(force.sum(axis=0)).max())
-        round_off = min(self._round_off(displacement), _FORGIVEN * total)
+        round_off = min(self._round_off(displacement), FORGIVEN * total)
         force_imbalance, moment_imbalance = resultant - round_off, moment / size - round_off
         return max(residual, force_imbalance / total), max(work, moment_imbalance / total)
 
@@ -217,6 +217,8 @@ def condense(
 
     Raises
     ------
+    NoContactNodesError
+        If supports leave no node of the contact boundary free to move towards the obstacle.
     ConflictingSupportsError
         If supports contradict each other at a node.
     SingularMatrixError
@@ -225,6 +227,10 @@ def condense(
     space = elastic.displacement_space
     conditions = supported(space, supports)
     contact = contact_nodes(elastic, contact_elements, conditions)
+    if not contact.nodes.size:
+        raise NoContactNodesError(
+            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
+        )
     conditions = _opened(conditions, contact)
     condensed = elastic.condense(conditions, force)
     to_open, offset = _open_directions(conditions, contact)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-LARGE = 1500
+LARGE = 2500
 """Order of a matrix above which several threads factor it faster than one."""
 MANY_PAIRS = 500_000
 """Element pairs above which several threads assemble faster than one."""

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bemkit.files import check_target, replacing
-from bemkit.hdf5 import ResultFileError, opened, seal, write_attributes, write_table, write_text
+from bemkit.files import check_target
+from bemkit.hdf5 import ResultFileError, created, opened, write_attributes, write_table, write_text
 from bemkit.io import provenance
 from bemkit.stability.cases import Axis
 from bemkit.stability.sweep import Row
@@ -47,10 +47,8 @@ def write_rows(path: str | Path, scene: str, rows: Sequence[Row]) -> None:
     OutputFileError
         If the file cannot be written, or a file that is not a bemkit stability file stands in the way.
     """
-    import h5py
-
     target = check_rows_target(path)
-    with replacing(target) as temporary, h5py.File(str(temporary), "w-") as file:
+    with created(target) as file:
         write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
         write_text(file, "scene", scene)
         write_attributes(file.create_group("provenance"), provenance())
@@ -58,7 +56,6 @@ def write_rows(path: str | Path, scene: str, rows: Sequence[Row]) -> None:
         numbers = {name: np.array([getattr(row, name) for row in rows], dtype=float) for name in _NUMBERS}
         counts = {name: np.array([getattr(row, name) for row in rows], dtype=np.int64) for name in _COUNTS}
         write_table(file.create_group("rows"), columns | numbers | counts)
-        seal(file)
 
 
 def read_rows(path: str | Path) -> tuple[str, tuple[Row, ...]]:

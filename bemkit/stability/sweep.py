@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.model import build_model
 from bemkit.operators.threads import blas_threads_for
 from bemkit.runner import run
@@ -223,7 +224,7 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
     -------
     float
         Of clearances and tangential displacements relative to the largest displacement, of tractions relative to the
-        largest traction of the reference. On another mesh the solution is interpolated to the nodes of the reference.
+        largest traction of the reference. On different meshes the coarser one is interpolated to the finer one.
     """
     one, other = reference.contact, solution.contact
     unit = max(float(np.abs(one.u_n).max()), float(np.abs(one.u_t).max())) or 1.0
@@ -234,18 +235,27 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
         rows, others = (np.array([name == part for name in table.part]) for table in (one, other))
         if not others.any():
             return math.inf
-        weight = one.weight[rows] / one.weight[rows].sum()
+        places, scaled_places = one.s[rows], other.s[others] / similarity.length
+        is_finer = bool(others.sum() > rows.sum())
+        weight = other.weight[others] if is_finer else one.weight[rows]
         for name in ("clearance", "u_t", "sigma_n", "sigma_t"):
             is_stress = name.startswith("sigma")
-            scaled = getattr(other, name)[others] / (similarity.stress if is_stress else similarity.displacement)
-            if not is_same_mesh:
-                scaled = np.interp(one.s[rows], other.s[others] / similarity.length, scaled)
             before = getattr(one, name)[rows]
-            known = np.isfinite(before) | np.isfinite(scaled)
-            gone = np.where(known, np.abs(np.where(known, scaled, 0.0) - np.where(known, before, 0.0)), 0.0)
-            size = float(gone.max()) if is_same_mesh and not in_mean else float(weight @ gone)
-            worst = max(worst, size / (stress if is_stress else unit))
+            scaled = getattr(other, name)[others] / (similarity.stress if is_stress else similarity.displacement)
+            if not is_same_mesh and is_finer:
+                before = np.interp(scaled_places, places, before)
+            elif not is_same_mesh:
+                scaled = np.interp(places, scaled_places, scaled)
+            gone = _apart(before, scaled)
+            size = gone.max() if is_same_mesh and not in_mean else weight @ gone / weight.sum()
+            worst = max(worst, float(size) / (stress if is_stress else unit))
     return worst
+
+
+def _apart(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the distances of two columns; infinite clearances agree with each other only."""
+    known = np.isfinite(before) | np.isfinite(after)
+    return np.abs(np.where(known, after, 0.0) - np.where(known, before, 0.0))
 
 
 def condition_number(scene: Scene, case: Case) -> float:

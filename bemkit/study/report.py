@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections import Counter
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
@@ -13,7 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.solution import Solution
 from bemkit.study.paper_tables import RHO, PaperTable, paper_tables
+from bemkit.tables import finite_only
 
 
 def compute_with_progress(*, is_live: bool) -> tuple[PaperTable, PaperTable]:
@@ -60,6 +63,32 @@ def to_csv(tables: Sequence[PaperTable]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return stream.getvalue()
+
+
+def print_solutions(found: Sequence[Solution], n_starts: int, console: Console | None = None) -> None:
+    """Print how many distinct solutions there are, and what tells them apart."""
+    console = Console(highlight=False) if console is None else console
+    if not found:
+        console.print(f"none of {n_starts} starts leads to a solution")
+        return
+    title = f"{len(found)} distinct solution{'s' * (len(found) > 1)} from {n_starts} starts"
+    console.print(Text(title, style="bold yellow" if len(found) > 1 else "bold"))
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    for name in ("separated", "slip", "stick", "normal force", "friction force", "energy"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for solution in found:
+        counts = Counter(solution.contact.status_words())
+        forces = (solution.force_normal, solution.force_tangential, solution.energy)
+        table.add_row(
+            *(str(counts[word]) for word in ("separated", "slip", "stick")), *(f"{value:.6g}" for value in forces)
+        )
+    console.print(table)
+
+
+def solutions_to_json(found: Sequence[Solution], n_starts: int) -> str:
+    """Return the summaries of all solutions as one JSON object."""
+    summaries = [finite_only(solution.summary()) for solution in found]
+    return json.dumps({"starts": n_starts, "solutions": summaries}, indent=2, allow_nan=False) + "\n"
 
 
 def _cell(table: PaperTable, i: int, j: int) -> str:

@@ -46,6 +46,20 @@ def overflowing_problem():
     return ContactProblem(body, np.zeros(1), Coulomb(0.1))
 
 
+class Unbalanced(DenseBody):
+    """A body whose forces are never in equilibrium, whatever the contact does."""
+
+    def imbalance(self, state):
+        return 1e-6, 0.0
+
+
+def unbalanced_problem():
+    body = block_problem(Coulomb(0.5)).body
+    return ContactProblem(
+        Unbalanced(body.stiffness, body.load, body.weights, body.motions), np.zeros(body.n_contact), Coulomb(0.5)
+    )
+
+
 CASES = {
     "converged": (Status.CONVERGED, random_problem(0), SemismoothNewton(), {}),
     "max steps": (Status.MAX_STEPS, block_problem(Coulomb(0.5)), AugmentedLagrangian(), {"max_steps": 1}),
@@ -65,6 +79,7 @@ CASES = {
         AugmentedLagrangian(),
         {"tolerance": 1e-30},
     ),
+    "stalled, nothing left to do": (Status.STALLED, unbalanced_problem(), SemismoothNewton(), {}),
     "cycling, newton": (Status.CYCLING, hard_problem(120), BARE_NEWTON, {}),
     "cycling, fixed point": (Status.CYCLING, hard_problem(11), FixedPoint(), {}),
     "cycling, augmented": (Status.CYCLING, hard_problem(11), AugmentedLagrangian(), {}),
@@ -128,6 +143,7 @@ def test_every_status_has_a_case():
         ("stalled, line search", "no Newton step reduces the residual"),
         ("stalled, full steps", "2 full steps have not settled the active sets"),
         ("cycling, newton", "the active sets come back"),
+        ("stalled, nothing left to do", "the rest of the certificate is beyond this driver"),
         ("singular later", "the sockets are empty"),
         ("singular at the start", "the sockets are empty"),
         ("unsolvable load", "the load pushes the body away from the obstacle"),
@@ -211,3 +227,8 @@ def test_drivers_refuse_each_others_iterates():
     for driver in (newton, augmented, fixed):
         with pytest.raises(TypeError, match="iterate is a Iterate; give what init or step of this driver returned"):
             driver.step(problem, iterate)
+
+
+def test_newton_ends_when_only_the_body_is_out_of_balance():
+    """Neither line search nor path could improve what is no matter of contact."""
+    assert solve(unbalanced_problem(), SemismoothNewton(), throw=False).linear_solves <= 10

@@ -228,10 +228,10 @@ def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
     """Return the symmetric part of `hyper` plus strained^T strained, read-only."""
     from scipy.linalg.blas import dsyrk
 
-    matrix: FloatArray = 0.5 * (hyper + hyper.T)
-    product = dsyrk(1.0, strained, trans=1, lower=1)
-    matrix += product
-    matrix += np.tril(product, -1).T
+    half: FloatArray = dsyrk(1.0, strained, trans=1, lower=1)  # column-major, zero above the diagonal
+    half[np.diag_indices_from(half)] *= 0.5
+    half += 0.5 * hyper.T
+    matrix = half + half.T
     read_only(matrix)
     return matrix
 

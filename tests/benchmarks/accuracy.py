@@ -1,0 +1,105 @@
+"""Error against run time on the paper's examples, for the targets of the project.
+
+    python tests/benchmarks/accuracy.py [REPETITIONS]
+
+Each line is one run from the scene to the solution in a warm process: mesh, assembly, all levels, recovery. Times are
+the least and the median of the repetitions, the least also as a multiple of one LAPACK LU of order 640 measured
+between them. Errors are relative and taken against the independent reference; they are a precondition of the timing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import statistics
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.linalg.lapack import dgetrf
+from threadpoolctl import threadpool_limits
+
+import bemkit as bk
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+from tests.adaptive.problems import contact_error, paper, reference_values
+
+
+@dataclasses.dataclass(frozen=True)
+class Target:
+    """Errors to reach, by name, within some seconds, and the mesh that does it."""
+
+    errors: dict[str, float]
+    seconds: float
+    mesh: bk.MeshOptions
+
+
+TARGETS = (
+    Target({"sigma_n": 1e-2}, 0.02, bk.MeshOptions(elements=72, density={"bottom": 2.0})),
+    Target({"sigma_n": 1e-3, "sigma_t": 4e-3}, 0.15, bk.MeshOptions(accuracy=2e-3)),
+    Target({"force": 1e-5, "energy": 1e-5}, 0.3, bk.MeshOptions(accuracy=1e-3)),
+    Target({"sigma_n": 3e-5, "u": 1e-5}, 0.6, bk.MeshOptions(accuracy=5e-5)),
+    Target({"transitions": 1e-5}, 1.0, bk.MeshOptions(accuracy=3e-5)),
+)
+
+
+def measured_errors(solution: bk.Solution, example: int) -> dict[str, float]:
+    """Return all errors that a target may name."""
+    values, places = reference_values(example)
+    found = [transition.x for transition in solution.transitions]
+    is_complete = len(found) == len(places)
+    return {
+        "sigma_n": contact_error(solution, example, "sigma_n"),
+        "sigma_t": contact_error(solution, example, "sigma_t"),
+        "u": contact_error(solution, example, "u_n", "u_t"),
+        "force": abs(solution.force_tangential / values["Ft"] - 1.0),
+        "energy": abs(solution.energy / values["energy"] - 1.0),
+        "transitions": float(np.abs(np.subtract(found, places)).max()) if is_complete else float("inf"),
+    }
+
+
+def time_once(work: object) -> float:
+    """Wall time [s] of one call."""
+    begin = time.perf_counter()
+    work()  # type: ignore[operator]
+    return time.perf_counter() - begin
+
+
+def main() -> None:
+    """Measure and print."""
+    repetitions = int(sys.argv[1]) if len(sys.argv) > 1 else 7
+    matrix = np.asfortranarray(np.random.default_rng(1).standard_normal((640, 640)))
+    table = Table(title="Error against run time, quadratic elements")
+    for column in ("example", "wanted", "reached", "elements", "allowed [ms]", "least [ms]", "median [ms]", "LUs", ""):
+        table.add_column(column, justify="right")
+    for example in (1, 2):
+        for target in TARGETS:
+            scene = paper(example, mesh=target.mesh)
+            solution = bk.run(scene)
+            errors = measured_errors(solution, example)
+            times, lu = [], []
+            for _ in range(repetitions):
+                times.append(time_once(lambda s=scene: bk.run(s)))
+                with threadpool_limits(limits=1, user_api="blas"):
+                    lu.append(time_once(lambda: dgetrf(matrix)))
+            is_met = min(times) <= target.seconds and all(
+                errors[name] <= wanted for name, wanted in target.errors.items()
+            )
+            table.add_row(
+                f"paper-{example}",
+                ", ".join(f"{name} {wanted:.0e}" for name, wanted in target.errors.items()),
+                ", ".join(f"{errors[name]:.1e}" for name in target.errors),
+                str(solution.mesh.n_elements),
+                f"{1e3 * target.seconds:.0f}",
+                f"{1e3 * min(times):.0f}",
+                f"{1e3 * statistics.median(times):.0f}",
+                f"{min(times) / min(lu):.1f}",
+                "met" if is_met else "MISSED",
+            )
+    Console(width=140).print(table)
+
+
+if __name__ == "__main__":
+    main()
