@@ -263,7 +263,12 @@ class Reader:
             if found.external is not None or found.nbytes > min(self._size, found.id.get_storage_size()):
                 raise self.error(f"{path} is not stored plainly in the file")
             kind = found.dtype.kind if kind is None else kind
-            if found.dtype.kind != kind or kind not in "fiS" or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
+            if (
+                found.dtype.kind != kind
+                or kind not in "fiS"
+                or (kind != "S" and found.dtype.itemsize != 8)
+                or found.ndim > 2
+            ):
                 raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")
             return np.asarray(found[()])
         except (OSError, RuntimeError, TypeError, MemoryError) as error:

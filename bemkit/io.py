@@ -84,8 +84,6 @@ def write_result(path: str | Path, solution: Solution) -> None:
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """
-    import h5py
-
     target = check_result_target(path)
     text = scene_to_toml(solution.scene)
     with created(target) as file:

@@ -16,7 +16,7 @@ DEFAULT_ELEMENTS = 320
 """Elements where neither a number nor an accuracy is given."""
 FIRST_ELEMENTS = 40
 """About the size of the first mesh where the accuracy decides."""
-MOST_ELEMENTS = 3000
+MOST_ELEMENTS = 1500
 """Where the search for an accuracy ends unless another number is given."""
 
 
@@ -36,7 +36,7 @@ class MeshOptions:
         Wanted error in the energy norm relative to the solution, instead of a number of elements. Meshes then follow
         the solution: see `bemkit.adaptive.run_adaptive`.
     most_elements : int, optional
-        No mesh on the way to the accuracy has more elements, the first one aside; 3000 if left out.
+        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out.
     most_seconds : float, optional [s]
         No mesh is begun that would take longer, all meshes counted; no limit if left out.
 

@@ -208,6 +208,14 @@ def _discretisation_items(scene: Scene, mesh: BoundaryMesh) -> Iterator[PlanItem
             yield PlanItem("hypersingular operator", False, "collocation takes the displacement equation alone")
             reason = "(1/2 I + K) u = V t in the unknowns of this scene, factored once"
             yield _matrix("boundary equations", reason, n_tractions, n_tractions, copies=4)
+    accuracy = scene.mesh.accuracy
+    yield PlanItem(
+        "further meshes",
+        accuracy is not None,
+        "the number of elements is given"
+        if accuracy is None
+        else f"until the estimated error is below {accuracy:g}; this is the plan for the first, {mesh.n_elements} elements",
+    )
     n_curved = int(np.count_nonzero(~mesh.is_straight))
     yield PlanItem(
         "quadrature on curved elements",

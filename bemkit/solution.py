@@ -163,10 +163,13 @@ class Transition:
         }
 
 
-_POLLUTED = 2
-"""Nodes next to a transition whose values are the least accurate."""
-_CLOSE = 0.02
-"""Distance, relative to the size of the zone, up to which the powers of the distance hold closely."""
+_FIT = (2, 4, 6, 12)
+"""Nodes from a transition on that tell its place (the first two) and the power of the distance (the last two). The
+values at the nodes before them are the least accurate."""
+_CLOSE = 0.1
+"""Distance, relative to the size of the zone, up to which that power holds closely."""
+_POWERS = (1.3, 1.7)
+"""The powers that sliding friction may make of 3/2."""
 
 
 def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
@@ -187,8 +190,9 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     -----
     Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
     end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
-    at the transition; on the paper's examples this is within a quarter of the node distance. On meshes that are fine
-    there the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
+    at the transition; on the paper's examples this is within a quarter of the node distance. Sliding friction changes
+    the power somewhat (to 1.56 at the separation point of Example 1): on meshes that are fine there it is fitted too,
+    and the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
     says nothing, as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
@@ -225,18 +229,32 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
         zone.append(k)
     if len(zone) < 2:
         return middle
-    s = np.abs(contact.s[zone] - contact.s[last])
-    is_fine = len(zone) > _POLLUTED + 1 and s[_POLLUTED + 1] < _CLOSE * s[-1]
-    near, far = (_POLLUTED, _POLLUTED + 1) if is_fine else (0, 1)
     field = contact.clearance if words[last] == "separated" else np.abs(slip)
-    at_near, at_far = (float(field[zone[k]]) ** (2.0 / 3.0) if field[zone[k]] >= 0.0 else np.inf for k in (near, far))
-    if not 0.0 <= at_near < at_far < np.inf:
+    distance = _distance_to_zero(np.abs(contact.s[zone] - contact.s[last]), field[zone])
+    if distance is None:
         return middle
-    distance = at_near * (s[far] - s[near]) / (at_far - at_near) - s[near]
     gap = contact.s[tighter] - contact.s[last]
     place = contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap
     own = contact.s[[part == contact.part[last] for part in contact.part]]
     return float(np.clip(place, own.min(), own.max()))
+
+
+def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
+    """Extrapolate powers of the distance from a zone's nodes at s = 0, s[1], ...; None if they do not fall to zero."""
+    is_fine = len(s) > _FIT[-1] and s[_FIT[-1]] < _CLOSE * s[-1]
+    near, far, *outer = _FIT if is_fine else (0, 1)
+    power, distance = 1.5, 0.0
+    values = field[[near, far, *outer]]
+    if not (np.isfinite(values).all() and np.all(np.diff(values) > 0.0) and values[0] >= 0.0):
+        return None
+    for _ in range(4 if is_fine else 1):
+        share = (field[near] / field[far]) ** (1.0 / power)
+        distance = float((s[far] * share - s[near]) / (1.0 - share))
+        if is_fine:
+            inner, outermost = (max(s[k] + distance, s[1]) for k in outer)
+            ratio = np.log(field[outer[1]] / field[outer[0]]) / np.log(outermost / inner)
+            power = float(np.clip(ratio, *_POWERS))
+    return distance
 
 
 @dataclass(frozen=True, eq=False)

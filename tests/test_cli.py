@@ -55,6 +55,14 @@ def test_json_on_standard_output_is_one_object(capsys: pytest.CaptureFixture[str
     assert {"x", "y", "s", "from", "to"} <= set(result["transitions"][0])
 
 
+def test_an_accuracy_instead_of_elements(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-2", "--discretisation", "quadratic", "--accuracy", "1e-2", "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["estimated_error"] <= 1e-2
+    assert "2 meshes" in result["message"]
+    assert any(item["name"] == "further meshes" and item["needed"] for item in result["plan"]["items"])
+
+
 def test_outputs_go_to_files_and_can_be_shown_again(capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):  # the second time replaces the first
         assert call("run", "paper-1", *SMALL, "-q", "-o", "r.h5", "--json", "r.json", "--csv", "r.csv") == 0
@@ -129,6 +137,9 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     [
         (["run", "papr-1"], "did you mean 'paper-1'"),
         (["run", "paper-1", "--elements", "2"], "elements is 2"),
+        (["run", "paper-1", "--accuracy", "2", "--discretisation", "linear"], "accuracy is 2.0: give a relative error"),
+        (["run", "paper-1", "--accuracy", "1e-3"], "collocation has no error estimate"),
+        (["run", "paper-1", "--accuracy", "1e-3", "--elements", "40"], "give one of them"),
         (["run", "paper-1", "--elements", "many"], "'many' is not a valid integer.*bemkit run --help"),
         (["run", "paper-1", "--elements", "1000000"], "use at most"),
         (["run", "paper-1", "--solver", "newtn"], "unknown solver 'newtn'"),

@@ -37,7 +37,8 @@ def test_a_lifted_body(law: bk.FrictionLaw) -> None:
     lift = dataclasses.replace(scene.parts[2], condition=bk.Traction(y=0.1))
     lifted = dataclasses.replace(scene, law=law, parts=(*scene.parts[:2], lift, *scene.parts[3:]))
     # 0.1 on half of the top of length 1
-    assert complaint(lifted) == "the load pushes the body upward with 0.05 N/m; nothing holds it: change the load or hold the body"
+    sentence = "the load pushes the body upward with 0.05 N/m; nothing holds it: change the load or hold the body"
+    assert complaint(lifted) == sentence
 
 
 @pytest.mark.parametrize(

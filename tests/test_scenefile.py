@@ -224,7 +224,7 @@ CONTACT = '{ kind = "contact", obstacle = { kind = "half-plane", point = [0.0, 0
         ('"strain"', '"stran"', "material.plane: 'stran' is unknown: give one of strain, stress; did you mean"),
         ("= 320", "= 2", "mesh: elements is 2: give a number from 3"),
         ("= 320", "= 1000000000", "mesh: elements is 1000000000: give a number from 3"),
-        ("= 320", "= 3.5", "mesh.elements: 3.5 is not a whole number"),
+        ("= 320", "= 3.5", "mesh.elements: 3.5 does not fit: give a whole number"),
         ('"uniform"', '"unifrom"', "mesh.grading.kind: unknown grading 'unifrom'.*did you mean 'uniform'"),
         ('"constant"', '"konstant"', "discretisation.kind: unknown discretisation.*linear, quadratic, constant"),
         (

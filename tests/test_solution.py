@@ -60,6 +60,20 @@ def test_the_end_of_slip_is_found_from_the_slip() -> None:
     assert (found.x, found.from_status, found.to_status) == (pytest.approx(2.3, rel=1e-12), "slip", "stick")
 
 
+@pytest.mark.parametrize("power", [1.44, 1.5, 1.56])
+@pytest.mark.parametrize("offset", [0.0, 2e-4])
+def test_on_fine_meshes_the_power_of_the_distance_is_found_too(power: float, offset: float) -> None:
+    n = 40
+    distance = np.append((np.arange(n - 1, -1, -1) / n) ** 2.5 + offset, [-0.01, -0.05])
+    s = 1.0 - distance
+    clearance = np.maximum(distance, 0.0) ** power * (1.0 + 0.3 * distance)
+    clearance[n - 2 : n] *= 0.5  # the values next to the transition are the least true
+    columns = {"s": s, "x": s, "weight": np.full(n + 2, 1.0), "clearance": clearance}
+    (found,) = find_transitions(table([SEPARATED] * n + [STICK] * 2, **columns))
+    # the factor 1 + 0.3 d changes the fitted power by 2 %
+    assert found.s == pytest.approx(1.0, abs=1e-4)
+
+
 def test_without_a_law_for_its_end_a_zone_ends_halfway() -> None:
     far = np.array([np.inf, np.inf, np.inf, 0.0, 0.0])
     assert find_transitions(table([SEPARATED] * 3 + [STICK] * 2, clearance=far))[0].x == 2.5

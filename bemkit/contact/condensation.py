@@ -172,8 +172,8 @@ class CondensedBody:
     def imbalance(self, state: ContactState) -> tuple[float, float]:
         """Return how far all forces on the body (loads, contact, reactions) are from equilibrium of forces and moments.
 
-        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. What may be
-        round-off of the forces, which in thin bodies are small differences of large terms, does not count.
+        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. What may
+        be round-off of the forces, which in thin bodies are small differences of large terms, does not count.
         """
         displacement, force = self.recover(state)
         residual, work = self.dense.imbalance(state)
@@ -227,18 +227,19 @@ def condense(
     space = elastic.displacement_space
     conditions = supported(space, supports)
     contact = contact_nodes(elastic, contact_elements, conditions)
+    conditions = _opened(conditions, contact)
+    condensed = elastic.condense(conditions, force)
     if not contact.nodes.size:
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    conditions = _opened(conditions, contact)
-    condensed = elastic.condense(conditions, force)
     to_open, offset = _open_directions(conditions, contact)
     stiffness = to_open.T @ condensed.stiffness @ to_open
     load = to_open.T @ (condensed.load - condensed.stiffness @ offset)
     idle = np.flatnonzero(~to_open.any(axis=0))
     diagonal = np.diagonal(stiffness)
-    stiffness[idle, idle] = np.median(diagonal[diagonal > 0.0])
+    is_stiff = diagonal > 0.0
+    stiffness[idle, idle] = np.median(diagonal[is_stiff]) if is_stiff.any() else 1.0
     points = dof_points(space)
     motions = _free_motions(conditions, contact, points)[: 0 if space.mesh.is_exterior else None]
     motions.reshape(len(motions), 2 * contact.nodes.size)[:, idle] = 0.0

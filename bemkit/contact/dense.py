@@ -139,9 +139,16 @@ class DenseBody:
             return float(residual), 0.0
         # Not relative to the stiffness terms: a body on its way to infinity would balance any load by comparison.
         given = max(np.abs(forces).max(), np.abs(self.load).max()) or largest
-        round_off = min(np.finfo(float).eps * np.abs(terms).sum(), FORGIVEN * given)
+        defect = self._motion_defect @ np.abs(state.displacement.ravel())
+        round_off = min(defect + np.finfo(float).eps * np.abs(terms).sum(), FORGIVEN * given)
         work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
         return float(residual), max(float(work - round_off), 0.0) / float(given)
+
+    @cached_property
+    def _motion_defect(self) -> FloatArray:
+        """(2 n_contact,) array [Pa]: what round-off of the stiffness adds to the balance of forces."""
+        motions = self.rigid_motions().reshape(-1, 2 * self.n_contact)
+        return np.asarray(np.abs(motions @ self.stiffness).max(axis=0) / np.abs(motions).max())
 
     @cached_property
     def _traction_of_displacement(self) -> FloatArray:

@@ -23,6 +23,10 @@ Coefficient: TypeAlias = ScalarField | FloatArray
 """A number, a formula or function of x and y, or one number per contact node."""
 
 
+class LawError(ValueError):
+    """A friction law failed or returned what no bound can be; the message names the law."""
+
+
 @runtime_checkable
 class FrictionLaw(Protocol):
     """Bound of the tangential traction; derive from this class and write two methods.
@@ -355,12 +359,17 @@ def _evaluated(law: Tresca | Coulomb | CohesiveCoulomb, points: FloatArray) -> d
     values = {}
     for entry in fields(law):
         coefficient = getattr(law, entry.name)
+        if isinstance(coefficient, np.ndarray) and len(coefficient) != len(points):
+            raise LawError(
+                f"{entry.name} has {len(coefficient)} values for {len(points)} contact nodes: give one number, "
+                "one for each node, or a formula of x and y"
+            )
         if callable(coefficient):
             value = values[entry.name] = evaluate_field(coefficient, points)
             if np.any(value < 0.0):
                 node = int(np.argmin(value))
                 x, y = points[node]
-                raise ValueError(
+                raise LawError(
                     f"{entry.name} = {coefficient!r} is {value[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); "
                     "it must be zero or positive on the whole contact part"
                 )

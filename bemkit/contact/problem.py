@@ -9,14 +9,10 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import stick
 from bemkit.contact.dense import DenseBody
-from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.contact.partwise import law_name
 
 __all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]
-
-
-class LawError(ValueError):
-    """A friction law failed or returned what no bound can be; the message names the law."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,7 +143,7 @@ def _contact_normals(solution: Solution) -> FloatArray:
     is_own = np.hypot(*(points[nearest] - places).T) <= 1e-6 * lengths + round_off
     total = np.zeros_like(points)
     np.add.at(total, nearest[is_own], (normals * lengths[:, None])[is_own])
-    return np.asarray(total / np.hypot(*total.T)[:, None])
+    return np.asarray(total / np.hypot(total[:, 0], total[:, 1])[:, None])
 
 
 def _gap_mismatch(solution: Solution, normals: FloatArray) -> float:
@@ -161,7 +161,7 @@ def _gap_mismatch(solution: Solution, normals: FloatArray) -> float:
     if len(solution.scene.contact_parts) == 1:
         nearer = np.abs(table.gap[is_known] - measured[is_known])
     round_off = 64.0 * np.finfo(float).eps * (np.abs(points).max() + np.abs(measured[is_known]).max(initial=0.0))
-    return max(_largest(nearer) - round_off, 0.0)
+    return max(_largest(nearer) - float(round_off), 0.0)
 
 
 def _acts_across_gap(solution: Solution) -> BoolArray:

@@ -33,7 +33,7 @@ class Stretch:
 
     def forward(self, points: FloatArray) -> FloatArray:
         """Map (n, 2) points."""
-        return points * np.array(self.factor) + np.array(self.shift)
+        return np.asarray(points * np.array(self.factor) + np.array(self.shift))
 
     def back(self, points: FloatArray) -> FloatArray:
         """Map (n, 2) points back to where they came from."""

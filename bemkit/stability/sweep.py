@@ -255,7 +255,7 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
 def _apart(before: FloatArray, after: FloatArray) -> FloatArray:
     """Return the distances of two columns; infinite clearances agree with each other only."""
     known = np.isfinite(before) | np.isfinite(after)
-    return np.abs(np.where(known, after, 0.0) - np.where(known, before, 0.0))
+    return np.asarray(np.abs(np.where(known, after, 0.0) - np.where(known, before, 0.0)))
 
 
 def condition_number(scene: Scene, case: Case) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bemkit.contact.certificate import certify
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, LawError, Tresca
 from bemkit.contact.partwise import PartwiseLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.expression import Expression
@@ -101,3 +101,9 @@ def test_a_jump_on_one_part_alone_is_seen():
     assert not path_exists(problem)
     with pytest.raises(ValueError, match="LemkePivoting cannot treat the friction law Coulomb or CohesiveCoulomb"):
         solve(problem, LemkePivoting())
+
+
+def test_a_list_of_coefficients_must_have_one_for_each_node() -> None:
+    message = "friction_coefficient has 3 values for 5 contact nodes: give one number, one for each node, or a formula"
+    with pytest.raises(LawError, match=message):
+        Coulomb(np.array([0.1, 0.2, 0.3])).at(np.zeros((5, 2)))

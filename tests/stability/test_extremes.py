@@ -36,7 +36,10 @@ def test_a_strip_of_1000_to_1_bends_as_beam_theory_says(load: str) -> None:
     assert solution.is_converged
     assert examine(solution).is_good
     corner = np.argmin(np.hypot(*(solution.boundary.points - [length, 0.0]).T))
-    exact = {"shear": -1e-9 * length**3 / (3.0 * modulus * inertia), "moment": -1e-9 * length**2 / (2.0 * modulus * inertia)}
+    exact = {
+        "shear": -1e-9 * length**3 / (3.0 * modulus * inertia),
+        "moment": -1e-9 * length**2 / (2.0 * modulus * inertia),
+    }
     assert solution.boundary.displacement[corner, 1] == pytest.approx(exact[load], rel=1e-2)
 
 
@@ -128,8 +131,12 @@ def test_a_contact_part_that_never_touches(discretisation: bk.LinearGalerkin, di
     assert not solution.contact.sigma_n.any()
     assert solution.transitions == ()
     assert examine(solution).is_good
-    other = bk.run(block(dataclasses.replace(low, condition=bk.Contact(bk.Gap(7.0))), *parts[1:], discretisation=discretisation))
-    np.testing.assert_allclose(solution.contact.u_t, other.contact.u_t, rtol=1e-9, atol=1e-12 * np.abs(other.contact.u_t).max())
+    other = bk.run(
+        block(dataclasses.replace(low, condition=bk.Contact(bk.Gap(7.0))), *parts[1:], discretisation=discretisation)
+    )
+    np.testing.assert_allclose(
+        solution.contact.u_t, other.contact.u_t, rtol=1e-9, atol=1e-12 * np.abs(other.contact.u_t).max()
+    )
 
 
 @DISCRETISATIONS
@@ -142,7 +149,9 @@ def test_a_body_that_lifts_off_is_refused_with_a_remedy(discretisation: bk.Linea
 @DISCRETISATIONS
 def test_a_held_body_that_lifts_off_has_an_answer(discretisation: bk.LinearGalerkin) -> None:
     held = bk.Part("held", bk.Clamped(), sides=("right",))
-    solution = bk.run(block(FLOOR, held, bk.Part("pull", bk.Traction(y=1e-3), sides=("left",)), discretisation=discretisation))
+    solution = bk.run(
+        block(FLOOR, held, bk.Part("pull", bk.Traction(y=1e-3), sides=("left",)), discretisation=discretisation)
+    )
     assert solution.is_converged
     assert not solution.contact.status.any()
     assert solution.contact.clearance.max() > 1e-3
@@ -165,7 +174,9 @@ def test_a_body_slides_away_when_the_push_exceeds_friction(discretisation: bk.Li
 
 @DISCRETISATIONS
 @pytest.mark.parametrize("friction", [0.0, 0.5, 1e3])
-def test_a_roller_and_a_sticking_corner_hold_one_direction_twice(discretisation: bk.LinearGalerkin, friction: float) -> None:
+def test_a_roller_and_a_sticking_corner_hold_one_direction_twice(
+    discretisation: bk.LinearGalerkin, friction: float
+) -> None:
     sides = (WALL, bk.Part("other wall", bk.Roller(), sides=("left",)))
     scene = block(FLOOR, *sides, press(2.0), law=bk.Coulomb(friction), discretisation=discretisation)
     solution = bk.run(scene)

@@ -51,7 +51,9 @@ def conditions(draw: st.DrawFn, size: float, modulus: float) -> object:
         case "roller":
             return bk.Roller()
         case "motion":
-            return bk.PrescribedDisplacement(y=motion) if draw(st.booleans()) else bk.PrescribedDisplacement(motion, 0.0)
+            return (
+                bk.PrescribedDisplacement(y=motion) if draw(st.booleans()) else bk.PrescribedDisplacement(motion, 0.0)
+            )
         case "traction":
             return bk.Traction(x=stress, y=bk.Expression(f"{-abs(stress)!r} * (1 + x / {size!r})"))
         case "pressure":
@@ -107,9 +109,15 @@ def scenes(draw: st.DrawFn) -> dict[str, object]:
         "material": bk.Material(modulus, draw(st.sampled_from([-0.5, 0.0, 0.2, 0.3, 0.49, 0.4999999, 0.5]))),
         "parts": tuple(parts),
         "law": draw(laws(modulus)),
-        "discretisation": draw(st.sampled_from([bk.LinearGalerkin(), bk.ConstantCollocation(), bk.QuadraticGalerkin()])),
+        "discretisation": draw(
+            st.sampled_from([bk.LinearGalerkin(), bk.ConstantCollocation(), bk.QuadraticGalerkin()])
+        ),
         "mesh": bk.MeshOptions(draw(st.integers(12, 40)), draw(st.sampled_from([bk.Uniform(), bk.Algebraic(2.0)]))),
-        "solver": draw(st.sampled_from([bk.SemismoothNewton(), bk.SemismoothNewton(rho=1e-3), bk.AugmentedLagrangian(max_steps=50)])),
+        "solver": draw(
+            st.sampled_from(
+                [bk.SemismoothNewton(), bk.SemismoothNewton(rho=1e-3), bk.AugmentedLagrangian(max_steps=50)]
+            )
+        ),
     }
 
 
@@ -118,11 +126,13 @@ def assert_honest(scene: dict[str, object]) -> None:
     try:
         solution = bk.run(bk.Scene(**scene))  # type: ignore[arg-type]
     except (ValueError, ArithmeticError) as error:
-        assert type(error).__module__.startswith("bemkit."), f"{type(error)}: {error}"
-        assert REMEDY.search(str(error)), f"no remedy: {error}"
-        return
-    if not solution.is_converged:
-        assert REMEDY.search(solution.message), f"no remedy: {solution.message}"
+        if not type(error).__module__.startswith("bemkit."):
+            raise
+        refusal = str(error)
+    else:
+        refusal = "" if solution.is_converged else solution.message
+    if refusal:
+        assert REMEDY.search(refusal), f"no remedy: {refusal}"
         return
     for name, column in solution.contact.columns().items():
         assert np.isfinite(column).all() or name in ("gap", "clearance"), name

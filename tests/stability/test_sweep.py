@@ -141,7 +141,9 @@ def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.Monkey
     axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
     row = Row("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
     begun: list[float] = []
-    rows = list(sweep(small_paper_scene(1), [axis], finished={("friction", 0.1): row}, begins=lambda _, v: begun.append(v)))
+    rows = list(
+        sweep(small_paper_scene(1), [axis], finished={("friction", 0.1): row}, begins=lambda _, v: begun.append(v))
+    )
     assert rows[0] is row
     assert begun == [0.2]
     assert rows[1].verdict == "right"

@@ -138,7 +138,9 @@ class GalerkinMap:
         factor = Cholesky(matrix[np.ix_(free, free)], "the body held by its supports and its contact boundary")
         coupling = matrix[np.ix_(free, is_open)]
         volume = rotate_rows(self._volume, conditions.frame)
-        held = _HeldVolume(factor, volume[free])
+        # what tangential motions change the volume by is round-off, and no room for an incompressible body
+        room = np.where(np.abs(volume) > 1e-14 * np.abs(volume).max(initial=0.0), volume, 0.0)
+        held = _HeldVolume(factor, room[free])
         response, pressures = held.solve(-coupling, -volume[is_open].T)
         stiffness = matrix[np.ix_(is_open, is_open)] + multiply(coupling.T, response) + volume[is_open] @ pressures
         stiffness = 0.5 * (stiffness + stiffness.T)

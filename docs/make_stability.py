@@ -1,0 +1,45 @@
+"""Fill the tables of ``docs/stability.md``: ``python docs/make_stability.py`` runs all sweeps again (some minutes)."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import bemkit as bk
+from bemkit.scenefile import with_overrides
+from bemkit.stability.axes import all_axes
+from bemkit.stability.files import to_markdown
+from bemkit.stability.sweep import Verdict, sweep
+
+PAGE = Path(__file__).parent / "stability.md"
+RUNS = (("paper-1", "linear"), ("paper-2", "constant"), ("paper-1", "constant"), ("paper-2", "linear"))
+N_FULL = 2  # the others are counted only
+
+
+def main() -> None:
+    """Run the sweeps and write their tables between the markers of the page."""
+    text = PAGE.read_text("utf-8")
+    summary = ["| scene | elements | rows | " + " | ".join(v.value for v in Verdict) + " |", "|---|---|" + "---:|" * 6]
+    for number, (name, discretisation) in enumerate(RUNS):
+        scene = with_overrides(bk.load_scene(name), discretisation=discretisation)
+        rows = list(sweep(scene, all_axes()))
+        counts = Counter(row.verdict for row in rows)
+        numbers = " | ".join(str(counts[verdict.value]) for verdict in Verdict)
+        summary.append(f"| `{name}` | {discretisation} | {len(rows)} | {numbers} |")
+        if number < N_FULL:
+            text = between(text, f"{name}-{discretisation}", to_markdown(all_axes(), rows))
+    PAGE.write_text(between(text, "summary", "\n".join(summary)), "utf-8")
+
+
+def between(text: str, marker: str, content: str) -> str:
+    """Replace what stands between two markers."""
+    pattern = rf"(<!-- {marker} -->\n).*?(<!-- end {marker} -->)"
+    replaced, count = re.subn(pattern, lambda match: f"{match[1]}\n{content}\n\n{match[2]}", text, flags=re.DOTALL)
+    if count != 1:
+        raise ValueError(f"{PAGE.name} has {count} places marked {marker!r}: keep one")
+    return replaced
+
+
+if __name__ == "__main__":
+    main()
