@@ -3,7 +3,7 @@
 Each mesh is made anew from the solution before it: its pieces end where the contact status changes, so that these
 points are nodes and the mesh is graded towards them; elements are shared by the estimated errors, and half of them lie
 on the contact boundary in any case. Solves start from the solution before, so that few Newton steps are needed. The
-few meshes grow like 1, 2, 4, ..., so that the last one costs more than all others together.
+few meshes grow by factors of two and more, so that the last one costs more than all others together.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ SMALLEST_GROWTH = 1.1
 """A mesh that is hardly larger would hardly be better."""
 TRANSITION = 3.0
 """Length of the element in which the status changes, in units of the accuracy times the length of the part."""
+MOST_FOR_TRANSITIONS = 2
+"""Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
 SAFETY = 0.8
 """The next mesh is planned for this part of the wished error."""
 
@@ -70,7 +72,8 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         now = time.perf_counter()
         if not solution.is_converged:
             return _ending(solutions, f"the solve on {solution.mesh.n_elements} elements failed")
-        if _error(solution) <= options.accuracy and _resolves_transitions(solution, options.accuracy):
+        n_accurate = sum(_error(each) <= options.accuracy for each in solutions)
+        if n_accurate > MOST_FOR_TRANSITIONS or (n_accurate and _resolves_transitions(solution, options.accuracy)):
             return _ending(solutions)
         partition = better_partition(
             partition,
@@ -125,33 +128,38 @@ def _resolves_transitions(solution: Solution, accuracy: float) -> bool:
     contact part of length l. The energy hardly notices.
     """
     mesh = solution.mesh
-    for found in solution.transitions:
-        elements = along_boundary(mesh, mesh.part(found.part))
-        ends = np.cumsum(mesh.lengths[elements])
-        length = mesh.lengths[elements[min(int(np.searchsorted(ends, found.s)), elements.size - 1)]]
-        if length > TRANSITION * accuracy * ends[-1]:
-            return False
-    return True
+    return all(
+        mesh.lengths[element] <= TRANSITION * accuracy * mesh.lengths[mesh.part(part)].sum()
+        for part, element, _ in _zone_ends(solution)
+    )
 
 
-def _cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
-    """Return where the status changes, as parameters by the number of the side.
+def _zone_ends(solution: Solution) -> list[tuple[str, int, float]]:
+    """Return where zones of one status end: the part, the element and the fraction of its length.
 
-    A zone that a single node stands for is not resolved yet: its ends are left alone.
+    A zone that a single node stands for is not resolved yet, or it is a node that a support holds: its ends are left
+    alone.
     """
     table, mesh = solution.contact, solution.mesh
-    cuts: dict[int, list[float]] = {}
+    found = []
     for part in dict.fromkeys(table.part):
         nodes = table.s[[name == part for name in table.part]]
-        places = np.array([found.s for found in solution.transitions if found.part == part])
+        places = np.array([transition.s for transition in solution.transitions if transition.part == part])
         zone_sizes = np.histogram(nodes, np.concatenate([[-np.inf], places, [np.inf]]))[0]
         elements = along_boundary(mesh, mesh.part(part))
         ends = np.cumsum(mesh.lengths[elements])
         for place in places[(zone_sizes[:-1] > 1) & (zone_sizes[1:] > 1)].tolist():
             k = min(int(np.searchsorted(ends, place)), elements.size - 1)
-            start, end = partition.spans[elements[k]].tolist()
-            fraction = 1.0 - (ends[k] - place) / mesh.lengths[elements[k]]
-            cuts.setdefault(int(partition.sides[elements[k]]), []).append(float(start + fraction * (end - start)))
+            found.append((part, int(elements[k]), 1.0 - float((ends[k] - place) / mesh.lengths[elements[k]])))
+    return found
+
+
+def _cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
+    """Return where zones of one status end, as parameters by the number of the side."""
+    cuts: dict[int, list[float]] = {}
+    for _, element, fraction in _zone_ends(solution):
+        start, end = partition.spans[element].tolist()
+        cuts.setdefault(int(partition.sides[element]), []).append(start + fraction * (end - start))
     return cuts
 
 

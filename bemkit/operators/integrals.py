@@ -17,8 +17,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from bemkit.arrays import BoolArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
@@ -39,6 +41,10 @@ CHUNK_PAIRS = 32768
 """Pairs treated at once: a few complex arrays of this length stay in the cache."""
 LISTED_COST = 2.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""
+
+
+LevelArray: TypeAlias = npt.NDArray[np.int8]
+"""An index into `GAUSS_LEVELS` for each pair; one byte, because there are as many as matrix blocks."""
 
 
 class PairSweep:
@@ -77,7 +83,7 @@ class PairSweep:
         for first in range(0, self.test.size, self.rows_per_chunk):
             yield slice(first, min(first + self.rows_per_chunk, self.test.size))
 
-    def _classify(self) -> tuple[IntArray, BoolArray]:
+    def _classify(self) -> tuple[LevelArray, BoolArray]:
         """Find the Gauss level of every pair, and which pairs are too close for the dense sweep.
 
         The level counts the distances of `GAUSS_LEVELS` that the pair falls short of. A curved trial element needs a
@@ -104,7 +110,7 @@ class PairSweep:
                 own = sum((from_centre[:, curved] < (threshold + half) ** 2).astype(np.int8) for threshold in inner)
                 level[rows, curved] = np.maximum(level[rows, curved], own)
                 is_close[rows, curved] = False
-        return level, is_close  # type: ignore[return-value]
+        return level, is_close
 
     @cached_property
     def _columns_by_kind(self) -> tuple[IntArray, IntArray]:
@@ -112,7 +118,7 @@ class PairSweep:
         is_straight = self.panels.is_straight[self.trial]
         return np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
 
-    def _correct(self, level: IntArray) -> PairIntegrals:
+    def _correct(self, level: LevelArray) -> PairIntegrals:
         """Integrate the listed pairs, each with the rule that its distance asks for; straight trial elements first."""
         test, trial = self.test[self._rows], self.trial[self._columns]
         result = PairIntegrals.zeros(self.degrees, (test.size,))

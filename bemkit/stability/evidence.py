@@ -117,7 +117,7 @@ def _scales(solution: Solution) -> tuple[float, float]:
     at_contact = [np.abs(solution.contact.sigma_n).max(), np.abs(solution.contact.sigma_t).max()]
     # a body that gives way to an overlap, or only moves, has no stresses but round-off of those it avoids
     overlap = float(np.maximum(-solution.contact.gap, 0.0).max())
-    avoided = max(1e-2 * overlap, 1e-8 * displacement) / diameter * modulus
+    avoided = max(1e-2 * overlap, 1e-4 * displacement) / diameter * modulus
     stress = max(float(np.abs(solution.boundary.traction).max()), *at_contact, avoided)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     return stress or 1.0, length or 1.0

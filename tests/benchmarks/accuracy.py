@@ -34,7 +34,7 @@ class Target:
     errors: dict[str, float]
     seconds: float
     mesh: bk.MeshOptions
-    discretisation: bk.LinearGalerkin | bk.QuadraticGalerkin = bk.QuadraticGalerkin()
+    discretisation: bk.LinearGalerkin | bk.QuadraticGalerkin = dataclasses.field(default_factory=bk.QuadraticGalerkin)
 
 
 TARGETS = (

@@ -35,7 +35,9 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
     scene, rows = read_rows(files["h5"])
     assert "title" in scene
     assert len(rows) == 11
-    assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [row.verdict for row in rows]
+    assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [
+        row.verdict for row in rows
+    ]
     assert files["csv"].read_text() == to_csv(rows)
     assert files["md"].read_text().count("| right |") == 6
     assert (tmp_path / "plots" / "stability-sliding.png").read_bytes().startswith(b"\x89PNG")

@@ -37,11 +37,4 @@ def rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
 
 def rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     """Express the rows (2 * node + component) in the frames of the nodes."""
-    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
-    if not turned.size:
-        return matrix
-    result = matrix.copy()
-    x, y = matrix[2 * turned], matrix[2 * turned + 1]
-    for k in range(2):
-        result[2 * turned + k] = frame[turned, k, 0, None] * x + frame[turned, k, 1, None] * y
-    return result
+    return rotate_columns(matrix.T, frame).T
