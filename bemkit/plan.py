@@ -214,7 +214,7 @@ def _discretisation_items(scene: Scene, mesh: BoundaryMesh) -> Iterator[PlanItem
         accuracy is not None,
         "the number of elements is given"
         if accuracy is None
-        else f"until the estimated error is below {accuracy:g}; this is the plan for the first, {mesh.n_elements} elements",
+        else f"until the estimated error is below {accuracy:g}; this plan is for the first mesh",
     )
     n_curved = int(np.count_nonzero(~mesh.is_straight))
     yield PlanItem(

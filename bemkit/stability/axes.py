@@ -119,7 +119,8 @@ def _numerical_axes() -> tuple[Axis, ...]:
 
 
 def _similar(baseline: Solution, value: float, *, factor: str) -> Case:
-    return _similar_case(baseline, value, replace(Similarity(), **{factor: value}), PRECISION)
+    length, modulus, stress = (value if name == factor else 1.0 for name in ("length", "modulus", "stress"))
+    return _similar_case(baseline, value, Similarity(length, modulus, stress), PRECISION)
 
 
 def _moved(baseline: Solution, value: float) -> Case:

@@ -115,12 +115,17 @@ def _scales(solution: Solution) -> tuple[float, float]:
     modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
     displacement = float(np.abs(solution.boundary.displacement).max())
     at_contact = [np.abs(solution.contact.sigma_n).max(), np.abs(solution.contact.sigma_t).max()]
-    # a body that gives way to an overlap, or only moves, has no stresses but round-off of those it avoids
-    overlap = float(np.maximum(-solution.contact.gap, 0.0).max())
-    avoided = max(1e-2 * overlap, 1e-4 * displacement) / diameter * modulus
-    stress = max(float(np.abs(solution.boundary.traction).max()), *at_contact, avoided)
+    stress = max(float(np.abs(solution.boundary.traction).max()), *at_contact, _avoided_stress(solution))
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     return stress or 1.0, length or 1.0
+
+
+def _avoided_stress(solution: Solution) -> float:
+    """Return the stress [Pa] below which a body that gives way to an overlap, or only moves, has round-off alone."""
+    overlap = float(np.maximum(-solution.contact.gap, 0.0).max())
+    displacement = float(np.abs(solution.boundary.displacement).max())
+    strain = max(1e-2 * overlap, 1e-4 * displacement) / solution.mesh.diameter
+    return strain * solution.scene.material.plane_modulus
 
 
 def _contact_elements(solution: Solution) -> dict[str, IntArray]:
@@ -138,7 +143,7 @@ def _contact_normals(solution: Solution) -> FloatArray:
     lengths = np.repeat(mesh.lengths[elements], xi.size)
     from scipy.spatial import cKDTree
 
-    _, nearest = cKDTree(points).query(places)
+    nearest = np.asarray(cKDTree(points).query(places)[1])
     round_off = 8.0 * np.finfo(float).eps * np.abs(places).max()
     is_own = np.hypot(*(points[nearest] - places).T) <= 1e-6 * lengths + round_off
     total = np.zeros_like(points)
@@ -187,7 +192,7 @@ def _imbalance(solution: Solution, normals: FloatArray) -> float:
     tangents = np.column_stack([-normals[:, 1], normals[:, 0]])
     contact = table.weight[:, None] * (table.sigma_n[:, None] * normals + table.sigma_t[:, None] * tangents)
     work = contact.ravel() @ _motions(mesh, np.column_stack([table.x, table.y])).reshape(-1, 3)
-    size = float(np.abs(contact).sum())
+    size = float(np.abs(contact).sum()) + _avoided_stress(solution) * mesh.diameter
     xi, weights = gauss_legendre(8)
     factor = solution.scene.load_factors[-1]
     space = solution.scene.discretisation.displacement_space(mesh)

@@ -71,7 +71,9 @@ def test_later_meshes_start_from_earlier_solutions() -> None:
 
 
 def test_the_wavy_obstacle_has_its_closed_form() -> None:
-    solution = run_adaptive(dataclasses.replace(wavy(), mesh=bk.MeshOptions(accuracy=1e-4)))[-1]
+    solutions = run_adaptive(dataclasses.replace(wavy(), mesh=bk.MeshOptions(accuracy=1e-4)))
+    assert len(solutions) <= 5
+    solution = solutions[-1]
     assert solution.transitions[-1].x == pytest.approx(0.25, abs=1e-5)
     assert -solution.contact.sigma_n[0] == pytest.approx(0.048824, rel=1e-4)  # the digits printed
 

@@ -9,8 +9,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.runner import UnsolvableSceneError
+from bemkit.stability.axes import all_axes
+from bemkit.stability.cases import find_axes
 from bemkit.stability.evidence import examine
-from tests.stability.scenes import CONSTANT, FLOOR, LINEAR, block
+from tests.stability.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 
 DISCRETISATIONS = pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT], ids=["linear", "constant"])
 WALL = bk.Part("wall", bk.Roller(), sides=("right",))
@@ -40,7 +42,7 @@ def test_a_strip_of_1000_to_1_bends_as_beam_theory_says(load: str) -> None:
         "shear": -1e-9 * length**3 / (3.0 * modulus * inertia),
         "moment": -1e-9 * length**2 / (2.0 * modulus * inertia),
     }
-    assert solution.boundary.displacement[corner, 1] == pytest.approx(exact[load], rel=1e-2)
+    assert solution.boundary.displacement[corner, 1] == pytest.approx(exact[load], rel=3e-2)
 
 
 def test_a_strip_too_thin_for_double_precision_is_not_called_solved() -> None:
@@ -200,3 +202,55 @@ def test_a_body_too_far_from_the_origin_is_refused_and_a_far_one_is_not_held_by_
     # the nodes of the wall share their x exactly, or a slanted roller would hold the body against the pull
     with pytest.raises(UnsolvableSceneError, match="upward"):
         bk.run(lifted(0.7e6))
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.QuadraticGalerkin()])
+def test_rollers_along_a_circle_do_not_hold_a_rotation(discretisation: bk.LinearGalerkin) -> None:
+    parts = (
+        bk.Part("liner", bk.Contact(bk.Gap(0.0)), sides=("outer-1",)),
+        bk.Part("rollers", bk.Roller(), sides=("outer-2", "outer-3")),
+        bk.Part("torque", bk.Pressure(1e-3, shear=1e-4), sides=("inner-1", "inner-2", "inner-3", "inner-4")),
+    )
+    scene = block(*parts, shape=bk.Ring(1.0, 2.0), law=bk.Frictionless(), discretisation=discretisation)
+    with pytest.raises(UnsolvableSceneError, match=r"turns the body .* about \(0, 0\).*hold"):
+        bk.run(scene)
+    # friction takes the torque up: 1e-4 * 2 pi against 0.3 of the pressure on a quarter of the outer circle
+    held = bk.run(dataclasses.replace(scene, law=bk.Coulomb(3.0)))
+    assert held.is_converged
+    assert examine(held).is_good
+
+
+def test_a_body_on_its_way_to_infinity_is_not_in_equilibrium() -> None:
+    # the only contact node would have to be wedged by a turn that never closes its gap
+    parts = (
+        bk.Part("c", bk.Contact(bk.HalfPlane()), sides=("inner-2",)),
+        bk.Part("t", bk.Traction(x=1e-4), sides=("outer-1",)),
+        bk.Part("rollers", bk.Roller(), sides=("outer-2", "outer-3")),
+        bk.Part("p", bk.Pressure(1e-2), sides=("inner-4",)),
+    )
+    options = {
+        "shape": bk.Ring(1.0, 2.0),
+        "law": bk.Coulomb(3.0),
+        "discretisation": CONSTANT,
+        "mesh": bk.MeshOptions(12),
+    }
+    assert not bk.run(block(*parts, material=bk.Material(1.0, 0.2), **options)).is_converged
+
+
+@DISCRETISATIONS
+def test_tractions_beside_corners_stay_sensible_on_elements_of_1e_minus_12(discretisation: bk.LinearGalerkin) -> None:
+    (axis,) = find_axes(all_axes(), ["grading"])
+    baseline = bk.run(small_paper_scene(1, 48, discretisation=discretisation))
+    case = axis.make(baseline, 1e12)
+    solution = bk.run(case.scene, mesh=case.mesh(case.scene))
+    assert solution.mesh.lengths.max() / solution.mesh.lengths.min() > 0.5e12
+    # constant elements see the corner singularity at 1e-13; round-off alone made 1e10
+    assert np.abs(solution.boundary.traction).max() < 1e4
+    # the discretisation error of 48 constant elements is about 5 per cent
+    assert solution.force_tangential == pytest.approx(baseline.force_tangential, rel=3e-2)
+
+
+def test_supports_that_fix_every_contact_node_are_an_error_with_a_remedy() -> None:
+    walls = (bk.Part("l", bk.Clamped(), sides=("left",)), bk.Part("r", bk.Clamped(), sides=("right",)))
+    with pytest.raises(ValueError, match="every node of the contact boundary: use more elements"):
+        bk.run(block(FLOOR, *walls, mesh=bk.MeshOptions(4)))
