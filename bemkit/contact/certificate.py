@@ -92,7 +92,10 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 
 def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[float, float]:
     """Return the traction [Pa] and the length [m] by which `certify` measures; see its notes."""
-    stress = float(max(np.abs(state.traction).max(), np.abs(problem.glued_state.traction).max()))
+    present, glued = (float(np.abs(held.traction).max()) for held in (state, problem.glued_state))
+    # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must not
+    # excuse; what is left of the glued tractions below 1e-9 is round-off, and speaks of no answer at all.
+    stress = max(present, min(glued, 1e3 * present) if present > 1e-9 * glued else glued)
     furthest = float(np.abs(state.displacement).max())
     length = max(stress / problem.body.stiffness_scale, 1e-6 * furthest)
     if stress == 0.0:
