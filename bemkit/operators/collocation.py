@@ -62,32 +62,38 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
     distance = DENSE_DISTANCE if n < MANY_ELEMENTS else DENSE_DISTANCE_OF_MANY
 
     def fill(rows: slice) -> None:
-        a, b, c, d = _dense(panels, material, rows, log_half, distance)
-        for row, column in _close_pairs(panels, rows, distance):
+        (a, b, c, d), close = _dense(panels, material, rows, log_half, distance)
+        for row, column in close:
             values = _listed(panels, material, row + rows.start, column, log_half)
             for target, value in zip((a, b, c, d), values, strict=True):
                 target[row, column] = value
         _write(single, rows, a, None, b)
         _write(double, rows, c.real, c.imag, d)
-        _balance(double, rows, 0.5 if mesh.is_exterior else -0.5)
+        _balance(double, rows, c.sum(axis=1), d.sum(axis=1), 0.5 if mesh.is_exterior else -0.5)
 
     step = max(1, CHUNK_PAIRS // n)
     for_each_chunk(fill, (slice(first, min(first + step, n)) for first in range(0, n, step)), n_pairs=n * n)
     return single.reshape(2 * n, 2 * n), double.reshape(2 * n, 2 * n)
 
 
-def _balance(double: FloatArray, rows: slice, constant: float) -> None:
+def _balance(double: FloatArray, rows: slice, value: ComplexArray, conjugate: ComplexArray, constant: float) -> None:
     """Make the double layer of a constant displacement exact in the diagonal blocks.
 
     An element of length h at coordinates of size one has its midpoint to eps / h only; the tractions there feel that
-    divided by h again unless a translation causes none.
+    divided by h again unless a translation causes none. `value` and `conjugate` are the row sums of the coefficients.
     """
     own = np.arange(rows.start, rows.stop)
-    double[own, :, own, :] += constant * np.eye(2) - double[rows].sum(axis=2)
+    sums = np.zeros((own.size, 2, 1, 2))
+    _write(sums, slice(None), value.real[:, None], value.imag[:, None], conjugate[:, None])
+    double[own, :, own, :] += constant * np.eye(2) - sums[:, :, 0]
 
 
-def _close_pairs(panels: Panels, rows: slice, distance: float) -> list[tuple[IntArray, IntArray]]:
-    """Return the (row, column) pairs too close for the far formulas: those of straight columns, then of curved ones."""
+ClosePairs = list[tuple[IntArray, IntArray]]
+"""(row, column) pairs too close for the far formulas: those of straight columns, then of curved ones."""
+
+
+def _close_pairs(panels: Panels, rows: slice, distance: float) -> ClosePairs:
+    """Find the close pairs by their distances."""
     reach = panels.half * np.where(panels.is_straight, distance, panels.reach(CURVED_DISTANCE))
     row, column = np.nonzero(squared_distance(panels.centre[rows, None], panels.centre) < reach**2)
     kinds = (panels.is_straight[column], ~panels.is_straight[column])
@@ -125,18 +131,23 @@ class _Seen:
         return on_p, on_conj_p, on_v, on_conj_v
 
 
-def _dense(panels: Panels, material: Material, rows: slice, log_half: FloatArray, distance: float) -> Coefficients:
-    """Evaluate all pairs of some rows by the far formulas."""
+def _dense(
+    panels: Panels, material: Material, rows: slice, log_half: FloatArray, distance: float
+) -> tuple[Coefficients, ClosePairs]:
+    """Evaluate all pairs of some rows by the far formulas, and find those that are too close for them."""
     x = panels.centre[rows, None]
     with np.errstate(all="ignore"):  # close pairs may overflow here; the caller replaces them
         if panels.bent is None:
-            return _straight_far(panels, x, slice(None), distance).combine(panels, material, slice(None), log_half)
+            seen = _straight_far(panels, x, slice(None), distance)
+            # the log integral is log|zeta^2| up to 1 / |zeta|^2, and not a number on the element itself
+            row, column = np.nonzero(~(seen.log > 2.0 * np.log(distance) + 2.0 / distance**2))
+            return seen.combine(panels, material, slice(None), log_half), [(row, column)]
         straight, curved = np.flatnonzero(panels.is_straight), np.flatnonzero(~panels.is_straight)
         left = _straight_far(panels, x, straight, distance).combine(panels, material, straight, log_half)
         right = _curved_far(panels, x, curved).combine(panels, material, curved, log_half)
     order = np.argsort(np.concatenate([straight, curved]))
     a, b, c, d = (np.concatenate(pair, axis=1)[:, order] for pair in zip(left, right, strict=True))
-    return a, b, c, d
+    return (a, b, c, d), _close_pairs(panels, rows, distance)
 
 
 def _straight_far(panels: Panels, x: ComplexArray, columns: IntArray | slice, distance: float) -> _Seen:
