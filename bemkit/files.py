@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -80,6 +82,25 @@ def replacing(target: Path) -> Iterator[Path]:
         raise OutputFileError(f"{_shown(target)}: cannot be written ({reason}): choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_room(folder: Path, n_bytes: int) -> None:
+    """Find out whether a large file fits on the disk, for libraries that do not survive when it runs full.
+
+    Parameters
+    ----------
+    folder : Path
+    n_bytes : int
+        Size of the file.
+
+    Raises
+    ------
+    OSError
+        If there is less room; `replacing` turns it into an `OutputFileError`.
+    """
+    free = shutil.disk_usage(folder).free
+    if free < n_bytes:
+        raise OSError(errno.ENOSPC, f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free")
 
 
 def _flush(path: Path) -> None:

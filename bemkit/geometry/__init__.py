@@ -24,4 +24,6 @@ from bemkit.geometry.shapes import PlateWithHole as PlateWithHole
 from bemkit.geometry.shapes import Polygon as Polygon
 from bemkit.geometry.shapes import Rectangle as Rectangle
 from bemkit.geometry.shapes import Ring as Ring
+from bemkit.geometry.shapes import Sector as Sector
 from bemkit.geometry.shapes import Shape as Shape
+from bemkit.geometry.symmetry import Symmetry as Symmetry

@@ -6,13 +6,14 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.curve import Curve
-from bemkit.geometry.division import divide
+from bemkit.geometry.division import Division, divide
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.selection import Selection
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
 
 _N_PANELS = 256
@@ -27,6 +28,7 @@ def discretise(
     parts: Mapping[str, Selection] | None = None,
     grading: Grading | None = None,
     density: Mapping[str, float] | None = None,
+    symmetry: Symmetry | None = None,
 ) -> BoundaryMesh:
     """Cut an outline into elements.
 
@@ -43,6 +45,8 @@ def discretise(
         Spacing of the elements on every piece; uniform if left out.
     density : mapping of str to float, optional
         How densely sides are divided compared with the others, by the name of the side; 1 where left out.
+    symmetry : Symmetry, optional
+        Lines of which only the side x <= a, y <= b is divided, into a half or a quarter of `n_elements`.
 
     Returns
     -------
@@ -53,13 +57,18 @@ def discretise(
     ------
     GeometryError
         If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces, or a
-        density is not positive or names an unknown side.
+        density is not positive or names an unknown side, or one beyond the symmetry lines; or if these do not cross
+        the body.
     """
     density = {} if density is None else density
     _check_density(density, outline)
     parts = {} if parts is None else parts
     grading = Uniform() if grading is None else grading
     division = divide(outline, parts)
+    if symmetry is not None:
+        division = division.half(symmetry)
+        n_elements = _share_of_half(n_elements, division, symmetry)
+        _check_sides_divided(density, division)
     rulers = [_Ruler(side.curve) for side in outline.sides]
     weights = [
         density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span)
@@ -145,3 +154,23 @@ def _check_density(density: Mapping[str, float], outline: Outline) -> None:
             )
         if not 0.0 < value < np.inf:
             raise GeometryError(f"discretise: the density of side {side!r} is {value}: give a positive, finite number")
+
+
+def _share_of_half(n_elements: int, half: Division, symmetry: Symmetry) -> int:
+    share, n_pieces = -(-n_elements // symmetry.n_images), len(half.pieces)
+    if share < n_pieces:
+        raise GeometryError(
+            f"discretise: n_elements is {n_elements}, of which the symmetry leaves {share} for {n_pieces} pieces "
+            f"(sides cut where parts end): give at least {n_pieces * symmetry.n_images}"
+        )
+    return share
+
+
+def _check_sides_divided(density: Mapping[str, float], half: Division) -> None:
+    divided = {half.outline.side_names[piece.side] for piece in half.pieces}
+    for side in density:
+        if side not in divided:
+            raise GeometryError(
+                f"discretise: density names the side {side!r}, which lies beyond the symmetry lines ({half.symmetry}) "
+                f"and mirrors what is divided: name its image among the sides {', '.join(sorted(divided))}"
+            )

@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError, format_point
-from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.selection import N_SAMPLES, Selection, breakpoints, merge_breakpoints
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
+
+_INNER = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True)
@@ -46,11 +48,14 @@ class Division:
     outline : Outline
     pieces : tuple of Piece
     part_names : tuple of str
+    symmetry : Symmetry, optional
+        Lines beyond which there are no pieces.
     """
 
     outline: Outline
     pieces: tuple[Piece, ...]
     part_names: tuple[str, ...]
+    symmetry: Symmetry | None = None
 
     def cut(self, cuts: Mapping[int, Sequence[float]]) -> "Division":
         """Return the division with further cuts.
@@ -67,6 +72,23 @@ class Division:
             ends = [start, *(start + inner * (end - start)).tolist(), end]
             pieces += [replace(piece, span=span) for span in itertools.pairwise(ends)]
         return replace(self, pieces=tuple(pieces))
+
+    def half(self, symmetry: Symmetry) -> "Division":
+        """Return what lies on the side x <= a, y <= b of symmetry lines.
+
+        Raises
+        ------
+        GeometryError
+            If the body is an exterior, or a line does not cross it or runs along a side.
+        """
+        if self.outline.is_exterior:
+            raise GeometryError(f"symmetry ({symmetry}): the body is an exterior: leave the symmetry out")
+        pieces = self.cut(_crossings(self.outline, symmetry)).pieces
+        points = np.array([self.outline.sides[piece.side].curve.point(piece.at(_INNER)) for piece in pieces])
+        _check_lines(self.outline, symmetry, pieces, points)
+        is_kept = ~symmetry.is_beyond(points[:, 1])
+        kept = [piece for piece, keep in zip(pieces, is_kept.tolist(), strict=True) if keep]
+        return replace(self, pieces=tuple(kept), symmetry=symmetry)
 
     @property
     def piece_lengths(self) -> FloatArray:
@@ -91,7 +113,7 @@ class Division:
         Returns
         -------
         BoundaryMesh
-            Elements run along each loop in order, node i starts element i.
+            Elements run along each loop in order, node i starts element i; the nodes that start none come last.
         """
         outline = self.outline
         along = list(zip(self.pieces, parameters, strict=True))
@@ -99,17 +121,65 @@ class Division:
         counts = [len(points) for points in nodes]
         side = np.repeat([piece.side for piece in self.pieces], counts)
         part = np.repeat([piece.part or "" for piece in self.pieces], counts)
-        loop = np.repeat(np.arange(len(outline.loops)), [len(sides) for sides in outline.loops])[side]
         is_curved = np.array([not side.curve.is_straight for side in outline.sides])
+        after = np.cumsum(counts)
+        ends = np.arange(1, after[-1] + 1)
+        following = self._following
+        ends[after - 1] = (after - counts)[following]
+        loose = np.flatnonzero(following < 0)  # on a symmetry line
+        ends[after[loose] - 1] = after[-1] + np.arange(len(loose))
+        nodes += [outline.sides[self.pieces[k].side].curve.point(parameters[k][-1:]) for k in loose.tolist()]
         return BoundaryMesh(
             np.concatenate(nodes),
-            np.column_stack([np.arange(len(loop)), following_in_loops(np.bincount(loop))]),
+            np.column_stack([np.arange(after[-1]), ends]),
             {name: np.flatnonzero(part == name) for name in self.part_names},
             tuple(side.curve for side in outline.sides if not side.curve.is_straight),
             np.where(is_curved, np.cumsum(is_curved) - 1, -1)[side] if is_curved.any() else None,
             np.concatenate([np.column_stack([s[:-1], s[1:]]) for s in parameters]) if is_curved.any() else None,
             outline.is_exterior,
+            self.symmetry,
         )
+
+    @property
+    def _following(self) -> IntArray:
+        """(n_pieces,) array: the piece that starts where each one ends; -1 on a symmetry line."""
+        next_side = np.arange(1, len(self.outline.sides) + 1)
+        after = np.cumsum([len(sides) for sides in self.outline.loops])
+        next_side[after - 1] = [0, *after[:-1].tolist()]
+        starting = {(piece.side, piece.span[0]): k for k, piece in enumerate(self.pieces)}
+        places = [
+            (int(next_side[piece.side]), 0.0) if piece.span[1] == 1.0 else (piece.side, piece.span[1])
+            for piece in self.pieces
+        ]
+        return np.array([starting.get(place, -1) for place in places], dtype=np.intp)
+
+
+def _crossings(outline: Outline, symmetry: Symmetry) -> dict[int, list[float]]:
+    """Return where sides cross symmetry lines: parameters by the number of the side."""
+    cuts: dict[int, list[float]] = {}
+    for number, side in enumerate(outline.sides):
+        for line in symmetry.lines:
+            cuts.setdefault(number, []).extend(breakpoints(side.curve, line.is_beyond_at).tolist())
+    return cuts
+
+
+def _check_lines(outline: Outline, symmetry: Symmetry, pieces: Sequence[Piece], points: FloatArray) -> None:
+    """Raise if a line runs along a side or misses the body; `points` (n_pieces, n, 2) lie on the pieces."""
+    for line in symmetry.lines:
+        on_line = line.meets(points.reshape(-1, 2)).any(axis=1).reshape(len(pieces), -1).all(axis=1)
+        for k in np.flatnonzero(on_line).tolist():
+            raise GeometryError(
+                f"symmetry: side {outline.side_names[pieces[k].side]!r} lies on the line {line}: describe the whole "
+                "body, or leave out the symmetry and give the side a roller"
+            )
+        is_beyond = line.is_beyond(points[:, 1])
+        if is_beyond.all() or not is_beyond.any():
+            corners = np.concatenate(outline.corners)
+            low, high = (format_point(corner) for corner in (corners.min(axis=0), corners.max(axis=0)))
+            raise GeometryError(
+                f"symmetry: the line {line} does not cross the body, whose corners lie between {low} and {high}: "
+                "give the middle of the body"
+            )
 
 
 def divide(outline: Outline, parts: Mapping[str, Selection]) -> Division:

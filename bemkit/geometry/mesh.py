@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.curve import Curve, MovedCurve, as_point, require_positive
+from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
 from bemkit.geometry.loops import swept_areas
 from bemkit.geometry.mesh_checks import (
@@ -19,9 +20,11 @@ from bemkit.geometry.mesh_checks import (
     check_mesh_loops,
     check_parts,
     follow_loops,
+    restrict_loops,
 )
 from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.vectors import norms, turned_right
 
 _N_LENGTH_POINTS = 16
@@ -51,6 +54,8 @@ class BoundaryMesh:
         Parameters of the start and the end of each curved element on its curve.
     is_exterior : bool
         Whether the body is the plane outside of the loops, which then all run clockwise.
+    symmetry : Symmetry, optional
+        Lines on which the loops end; the rest of the body are images, see `whole`. A part may then be empty.
 
     Raises
     ------
@@ -71,11 +76,14 @@ class BoundaryMesh:
     element_curve: IntArray | None = None
     element_span: FloatArray | None = None
     is_exterior: bool = False
+    symmetry: Symmetry | None = None
 
     def __post_init__(self) -> None:
         nodes = np.array(self.nodes, dtype=float)
         elements = as_index(self.elements, "elements")
-        check_chains(nodes, elements)
+        check_chains(nodes, elements, self.symmetry)
+        if self.symmetry is not None:
+            nodes = self.symmetry.snapped(nodes)
         self._keep("nodes", nodes)
         self._keep("elements", elements)
         object.__setattr__(self, "curves", tuple(self.curves))
@@ -85,8 +93,13 @@ class BoundaryMesh:
             self._keep("element_curve", as_index(self.element_curve, "element_curve"))
             self._keep("element_span", np.array(self.element_span, dtype=float))
             check_curves(nodes, elements, self.curves, self._curve_index, self._span)
-        object.__setattr__(self, "parts", MappingProxyType(check_parts(self.parts, len(elements))))
-        check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
+        parts = check_parts(self.parts, len(elements), may_be_empty=self.symmetry is not None)
+        object.__setattr__(self, "parts", MappingProxyType(parts))
+        if self.symmetry is None:
+            check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
+        else:
+            check_half(self.symmetry, nodes, elements, self.is_exterior)
+            _ = self.whole  # checks its loops
 
     def _keep(self, name: str, array: FloatArray | IntArray) -> None:
         read_only(array)
@@ -94,12 +107,28 @@ class BoundaryMesh:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the constructor takes: a mesh from elsewhere is validated like any other."""
-        arguments = (self.nodes, self.elements, dict(self.parts), self.curves, self.element_curve, self.element_span)
-        return BoundaryMesh, (*arguments, self.is_exterior)
+        content = self._content._replace(parts=dict(self.parts))
+        return BoundaryMesh, (*content, self.is_exterior, self.symmetry)
+
+    @property
+    def whole(self) -> "BoundaryMesh":
+        """The mesh of the whole body: itself, or with the images that a symmetry adds.
+
+        Element e of image g (see `Symmetry.images`) has the number g * n_elements + e; the first nodes are those of
+        this mesh.
+        """
+        # a mesh that held itself would have to wait for the garbage collector
+        return self if self.symmetry is None else self._unfolded
+
+    @cached_property
+    def on_symmetry_lines(self) -> BoolArray:
+        """(n_nodes, 2) bool array: whether a node lies on the line x = a, and on y = b, of the symmetry."""
+        meets = np.zeros((self.n_nodes, 2), bool) if self.symmetry is None else self.symmetry.meets(self.nodes)
+        return _frozen(meets)
 
     @property
     def n_nodes(self) -> int:
-        """Number of nodes, equal to the number of elements."""
+        """Number of nodes: of elements, and one more for each chain of elements between symmetry lines."""
         return len(self.nodes)
 
     @property
@@ -149,20 +178,30 @@ class BoundaryMesh:
 
     @cached_property
     def node_elements(self) -> IntArray:
-        """(n_nodes, 2) int array: the element that ends and the element that starts at each node."""
+        """(n_nodes, 2) int array: the element that ends and the element that starts at each node.
+
+        On a symmetry line both are the one element there, whose image goes on.
+        """
         pairs = np.empty((self.n_nodes, 2), dtype=np.intp)
+        pairs[self.elements] = np.arange(self.n_elements)[:, None, None]
         pairs[self.elements[:, 1], 0] = np.arange(self.n_elements)
         pairs[self.elements[:, 0], 1] = np.arange(self.n_elements)
         return _frozen(pairs)
 
     @cached_property
     def loops(self) -> tuple[IntArray, ...]:
-        """For each closed loop its elements in order, starting at the smallest."""
-        return tuple(_frozen(loop) for loop in follow_loops(self.elements))
+        """For each closed loop its elements in order, starting at the smallest, or at a symmetry line.
+
+        Of loops that are images of each other there is one.
+        """
+        loops = (
+            follow_loops(self.elements) if self.symmetry is None else restrict_loops(self.whole.loops, self.elements)
+        )
+        return tuple(_frozen(loop) for loop in loops)
 
     @cached_property
     def centre(self) -> FloatArray:
-        """(2,) array [m]: middle of the bounding box of the boundary."""
+        """(2,) array [m]: middle of the bounding box of the boundary, images included."""
         low, high = self._bounds
         return _frozen(0.5 * (low + high))
 
@@ -174,14 +213,16 @@ class BoundaryMesh:
 
     @cached_property
     def loop_areas(self) -> FloatArray:
-        """(n_loops,) array [m^2]: area within each loop, negative where the loop runs clockwise."""
+        """(n_loops,) array [m^2]: area within each loop, images included, negative where the loop runs clockwise."""
+        if self.symmetry is not None:
+            return _frozen(self.whole.loop_areas[[loop[0] < self.n_elements for loop in self.whole.loops]])
         areas = swept_areas(self._pieces)
         return _frozen(np.array([areas[loop].sum() for loop in self.loops]))
 
     @property
     def area(self) -> float:
-        """Area [m^2] of the body, infinite for an exterior."""
-        return float("inf") if self.is_exterior else float(self.loop_areas.sum())
+        """Area [m^2] of the body, images included, infinite for an exterior."""
+        return float("inf") if self.is_exterior else float(self.whole.loop_areas.sum())
 
     def part(self, name: str) -> IntArray:
         """Return the elements of a part.
@@ -266,33 +307,7 @@ class BoundaryMesh:
             )
         is_halved = np.zeros(self.n_elements, dtype=bool)
         is_halved[marked] = True
-        first = (
-            np.arange(self.n_elements) + np.cumsum(is_halved) - is_halved
-        )  # new number of the (first half of the) element
-        halved = np.flatnonzero(is_halved)
-        source = np.repeat(np.arange(self.n_elements), 1 + is_halved)
-
-        # the middle of an element is numbered next to its start node
-        starts_halved = is_halved[self.node_elements[:, 1]]
-        new_node = np.arange(self.n_nodes) + np.cumsum(starts_halved) - starts_halved
-        middle = new_node[self.elements[halved, 0]] + 1
-        nodes = np.empty((self.n_nodes + len(halved), 2))
-        nodes[new_node] = self.nodes
-        nodes[middle] = self.centres[halved]
-        elements = new_node[self.elements][source]
-        elements[first[halved], 1] = middle
-        elements[first[halved] + 1, 0] = middle
-        span = self._span[source]
-        span[first[halved], 1] = span[first[halved] + 1, 0] = self._span[halved].mean(axis=1)
-        return BoundaryMesh(
-            nodes,
-            elements,
-            {name: np.flatnonzero(np.isin(source, members)) for name, members in self.parts.items()},
-            self.curves,
-            None if self.element_curve is None else self.element_curve[source],
-            None if self.element_span is None else span,
-            self.is_exterior,
-        )
+        return BoundaryMesh(*bisected(self._content, is_halved, self.centres), self.is_exterior, self.symmetry)
 
     def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> "BoundaryMesh":
         """Return the mesh of the body (x - shift) * factor.
@@ -319,7 +334,22 @@ class BoundaryMesh:
             self.element_curve,
             self.element_span,
             self.is_exterior,
+            None if self.symmetry is None else self.symmetry.transformed(shift, factor),
         )
+
+    @cached_property
+    def unit(self) -> "BoundaryMesh":
+        """The same mesh about the origin, in units of its diameter."""
+        x, y = self.centre.tolist()
+        return self.transformed(shift=(x, y), factor=1.0 / self.diameter)
+
+    @cached_property
+    def _unfolded(self) -> "BoundaryMesh":
+        return self if self.symmetry is None else BoundaryMesh(*unfold(self.symmetry, self._content))
+
+    @property
+    def _content(self) -> Elements:
+        return Elements(self.nodes, self.elements, self.parts, self.curves, self.element_curve, self.element_span)
 
     @cached_property
     def _curve_index(self) -> IntArray:
@@ -335,6 +365,8 @@ class BoundaryMesh:
 
     @cached_property
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        if self.symmetry is not None:
+            return self.whole._bounds
         points = np.concatenate([self.nodes, self.centres])
         return points.min(axis=0), points.max(axis=0)
 

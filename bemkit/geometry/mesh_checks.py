@@ -10,6 +10,7 @@ from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
 from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, point_on, resolution
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
 
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away
@@ -25,8 +26,8 @@ def as_index(values: npt.ArrayLike, name: str) -> IntArray:
     return array.astype(np.intp)
 
 
-def check_chains(nodes: FloatArray, elements: IntArray) -> None:
-    """Raise unless the elements join finite, distinct nodes to closed chains."""
+def check_chains(nodes: FloatArray, elements: IntArray, symmetry: Symmetry | None = None) -> None:
+    """Raise unless the elements join finite, distinct nodes to chains, closed or between symmetry lines."""
     for name, array in (("nodes", nodes), ("elements", elements)):
         if array.ndim != 2 or array.shape[1] != 2 or not len(array):
             raise GeometryError(f"BoundaryMesh: {name} has shape {array.shape}: give an array of shape (n, 2), n >= 2")
@@ -38,10 +39,14 @@ def check_chains(nodes: FloatArray, elements: IntArray) -> None:
             f"nodes: use numbers from 0 to {len(nodes) - 1}"
         )
     n_starting, n_ending = (np.bincount(elements[:, column], minlength=len(nodes)) for column in (0, 1))
-    for node in np.flatnonzero((n_starting != 1) | (n_ending != 1)):
+    is_joint = (n_starting == 1) & (n_ending == 1)
+    if symmetry is not None:
+        is_joint |= (n_starting + n_ending == 1) & symmetry.meets(nodes).any(axis=1)
+    for node in np.flatnonzero(~is_joint):
         raise GeometryError(
             f"BoundaryMesh: node {node} at {format_point(nodes[node])} starts {n_starting[node]} and ends "
             f"{n_ending[node]} elements: each node must start one and end one, so that the boundary is closed"
+            + ("" if symmetry is None else f", or lie on the symmetry line ({symmetry})")
         )
     chord = norms(nodes[elements[:, 1]] - nodes[elements[:, 0]])
     for element in np.flatnonzero(chord <= resolution(nodes[elements[:, 0]], nodes[elements[:, 1]])):
@@ -103,17 +108,19 @@ def _check_speed(curves: tuple[Curve, ...], elements: IntArray, element_curve: I
         )
 
 
-def check_parts(parts: Mapping[str, npt.ArrayLike], n_elements: int) -> dict[str, IntArray]:
+def check_parts(
+    parts: Mapping[str, npt.ArrayLike], n_elements: int, *, may_be_empty: bool = False
+) -> dict[str, IntArray]:
     """Return the parts, sorted and read-only, or raise unless they are disjoint sets of elements."""
     checked: dict[str, IntArray] = {}
     part_of_element = np.full(n_elements, -1)
     for number, (name, values) in enumerate(parts.items()):
         members = np.sort(as_index(values, f"part {name!r}").ravel())
-        if not (isinstance(name, str) and name) or not len(members):
+        if not (isinstance(name, str) and name) or not (len(members) or may_be_empty):
             raise GeometryError(
                 f"BoundaryMesh: part {name!r} has {len(members)} elements: give parts a name and at least one element"
             )
-        if members[0] < 0 or members[-1] >= n_elements:
+        if len(members) and (members[0] < 0 or members[-1] >= n_elements):
             outside = members[0] if members[0] < 0 else members[-1]
             raise GeometryError(
                 f"BoundaryMesh: part {name!r} contains element {outside}: use numbers from 0 to {n_elements - 1}"
@@ -148,6 +155,16 @@ def follow_loops(elements: IntArray) -> tuple[IntArray, ...]:
         if loop:
             loops.append(np.array(loop, dtype=np.intp))
     return tuple(loops)
+
+
+def restrict_loops(loops: tuple[IntArray, ...], elements: IntArray) -> tuple[IntArray, ...]:
+    """Return what loops of a whole body hold of the first elements, each in order from a symmetry line on."""
+    restricted = [loop[loop < len(elements)] for loop in loops]
+    result = []
+    for loop in filter(len, restricted):
+        starts_on_line = np.isin(elements[loop, 0], elements[loop, 1], invert=True)
+        result.append(np.roll(loop, -int(np.argmax(starts_on_line))))
+    return tuple(result)
 
 
 def check_mesh_loops(

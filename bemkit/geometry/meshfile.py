@@ -79,8 +79,8 @@ def write_mesh(path: str | Path, mesh: BoundaryMesh) -> None:
     path : str or Path
         A file name that ends in ".msh"; an existing file is replaced.
     mesh : BoundaryMesh
-        The mesh; its parts become physical groups. The file knows only straight lines: curved elements are written as
-        their chords.
+        The mesh, with the images that a symmetry adds; its parts become physical groups. The file knows only straight
+        lines: curved elements are written as their chords.
 
     Raises
     ------
@@ -93,6 +93,7 @@ def write_mesh(path: str | Path, mesh: BoundaryMesh) -> None:
     path = Path(path)
     if path.suffix != ".msh":
         raise GeometryError(f"write_mesh: {path} is not a name for a Gmsh file: end it in .msh")
+    mesh = mesh.whole
     tags = np.zeros(mesh.n_elements, dtype=int)
     for tag, members in enumerate(mesh.parts.values(), start=1):
         tags[members] = tag

@@ -26,7 +26,8 @@ def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
     chosen[elements] = True
     incoming, outgoing = mesh.node_elements.T
     previous, following = incoming[mesh.elements[:, 0]], outgoing[mesh.elements[:, 1]]
-    starts = np.flatnonzero(chosen & ~chosen[previous]).tolist()
+    is_first = previous == np.arange(mesh.n_elements)  # on a symmetry line
+    starts = np.flatnonzero(chosen & (is_first | ~chosen[previous])).tolist()
     ordered: list[int] = []
     while starts or chosen.any():
         element = starts.pop(0) if starts else int(np.flatnonzero(chosen)[0])

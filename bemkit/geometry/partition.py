@@ -14,6 +14,7 @@ from bemkit.geometry.division import Division, Piece, divide
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.selection import Selection
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
 
 EXPONENT = 2.5
@@ -64,7 +65,12 @@ class Partition:
 
 
 def first_partition(
-    outline: Outline, parts: Mapping[str, Selection], n_elements: int, *, even: Collection[str] = ()
+    outline: Outline,
+    parts: Mapping[str, Selection],
+    n_elements: int,
+    *,
+    even: Collection[str] = (),
+    symmetry: Symmetry | None = None,
 ) -> Partition:
     """Divide an outline of whose solution nothing is known.
 
@@ -77,6 +83,8 @@ def first_partition(
         About so many elements, more where `LEAST` or `STEEPEST` ask for them.
     even : collection of str
         Parts with elements of equal length: on a contact boundary anything may happen anywhere.
+    symmetry : Symmetry, optional
+        Lines of which only one side is divided.
 
     Returns
     -------
@@ -84,6 +92,8 @@ def first_partition(
         Graded towards corners and ends of parts; elements are shared like the square roots of lengths.
     """
     base = divide(outline, parts)
+    if symmetry is not None:
+        base = base.half(symmetry)
     shares = np.sqrt(base.piece_lengths)
     counts = share_elements(max(n_elements, LEAST * len(shares)), shares)
     parameters = []

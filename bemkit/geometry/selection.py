@@ -11,7 +11,7 @@ from bemkit.geometry.errors import GeometryError
 
 N_SAMPLES = 257
 """Points at which a predicate is looked at along a side; 2**k + 1, so that halves and quarters are among them."""
-_N_BISECTIONS = 48  # from 1/256 to less than the spacing of numbers near 1
+_N_PASSES = 7  # 256**-7 is less than the spacing of numbers near 1
 _END_TOLERANCE = 1e-12  # a part does not begin this close to the end of its side: that is round-off of the predicate
 
 Predicate = Callable[[FloatArray, FloatArray], BoolArray]
@@ -75,18 +75,19 @@ def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
     Returns
     -------
     (n,) array
-        Parameters in (0, 1), increasing, to round-off: sampled at 257 points, then bisected.
+        Parameters in (0, 1), increasing, to round-off: sampled at 257 points, then between those where it changes.
     """
-    samples = np.linspace(0.0, 1.0, N_SAMPLES)
-    holds = evaluate_predicate(where, curve.point(samples))
-    changes = np.flatnonzero(holds[1:] != holds[:-1])
-    if not len(changes):
-        return np.zeros(0)
-    low, high, holds_low = samples[changes], samples[changes + 1], holds[changes]
-    for _ in range(_N_BISECTIONS):
-        middle = 0.5 * (low + high)
-        is_before = evaluate_predicate(where, curve.point(middle)) == holds_low
-        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    low, high = np.zeros(1), np.ones(1)
+    for k in range(_N_PASSES):
+        samples = np.linspace(low, high, N_SAMPLES)
+        holds = evaluate_predicate(where, curve.point(samples.ravel())).reshape(samples.shape)
+        before, interval = np.nonzero(holds[1:] != holds[:-1])
+        if k > 0:  # one of each: far from the origin a predicate flickers, and each flicker would bring forth others
+            interval, first = np.unique(interval, return_index=True)
+            before = before[first]
+        low, high = samples[before, interval], samples[before + 1, interval]
+        if not low.size:
+            break
     return merge_breakpoints(high)
 
 

@@ -119,6 +119,42 @@ class Disk:
 
 
 @dataclass(frozen=True)
+class Sector:
+    """A sector of a disk, such as the quarter that symmetry leaves, with the sides arc, end and start.
+
+    Parameters
+    ----------
+    radius : float [m]
+        Of the disk.
+    start_angle, end_angle : float [degree]
+        Where the arc begins and ends, anticlockwise from the x axis; less than 360 apart.
+    centre : (float, float) [m]
+        Of the disk, the tip of the sector. The side end leads to it, the side start away from it.
+    """
+
+    radius: float
+    start_angle: float
+    end_angle: float
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_positive("Sector", radius=self.radius)
+        object.__setattr__(self, "centre", as_point(self.centre, "Sector: centre"))
+        if not 0.0 < self.end_angle - self.start_angle < 360.0:
+            raise GeometryError(
+                f"Sector: the arc runs from {self.start_angle} to {self.end_angle} degrees: end less than 360 degrees "
+                "after the start"
+            )
+
+    def outline(self) -> Outline:
+        """Return one loop of an arc and two radii."""
+        arc = Arc(self.centre, self.radius, float(np.radians(self.start_angle)), float(np.radians(self.end_angle)))
+        begin, end = ((float(x), float(y)) for x, y in arc.point(np.array([0.0, 1.0])))
+        sides = (Side("arc", arc), Side("end", Segment(end, self.centre)), Side("start", Segment(self.centre, begin)))
+        return Outline((sides,))
+
+
+@dataclass(frozen=True)
 class Ring:
     """A ring with the sides outer-1 ... outer-4 and inner-1 ... inner-4, numbered by quadrant.
 

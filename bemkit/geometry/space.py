@@ -173,10 +173,12 @@ class _NodalSpace:
         """Dofs of the start and the end of each element; the element that ends at a broken node has one of its own."""
         dofs = self.mesh.elements.copy()
         if self.broken is not None:
+            # on a symmetry line there is no second element
+            is_shared = self.broken & ~self.mesh.on_symmetry_lines.any(axis=1)
             own = np.full(self.mesh.n_nodes, -1)
-            own[self.broken] = self.mesh.n_nodes + np.arange(int(self.broken.sum()))
+            own[is_shared] = self.mesh.n_nodes + np.arange(int(is_shared.sum()))
             end = self.mesh.elements[:, 1]
-            dofs[:, 1] = np.where(self.broken[end], own[end], end)
+            dofs[:, 1] = np.where(is_shared[end], own[end], end)
         return dofs
 
 
@@ -251,6 +253,8 @@ class QuadraticSpace(_NodalSpace):
 
 def break_nodes(mesh: BoundaryMesh) -> BoolArray:
     """Return the (n_nodes,) mask of nodes where tractions may jump: corners and ends of boundary parts."""
+    if mesh.symmetry is not None:
+        return break_nodes(mesh.whole)[: mesh.n_nodes]
     owner = np.full(mesh.n_elements, -1)
     for number, name in enumerate(mesh.parts):
         owner[mesh.part(name)] = number
@@ -264,6 +268,8 @@ def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
 
     The direction of a short element is known only as well as its coordinates are; that round-off is added to `angle`.
     """
+    if mesh.symmetry is not None:
+        return corner_nodes(mesh.whole, angle)[: mesh.n_nodes]
     incoming, outgoing = mesh.node_elements[:, 0], mesh.node_elements[:, 1]
     before = mesh.normals_at(incoming, np.array([1.0]))[:, 0]
     after = mesh.normals_at(outgoing, np.array([-1.0]))[:, 0]

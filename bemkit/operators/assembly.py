@@ -3,6 +3,9 @@
 An operator is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local
 coordinates, weighted by the monomial coefficients of the local test and trial functions. Its columns are gathered
 first, in a buffer of a few rows of elements, so that the large matrix is written once.
+
+On a mesh with a symmetry the rows are those of the mesh, the trial elements those of the whole body, and the columns of
+all images of an element are gathered into its own, with the signs that the components have there.
 """
 
 from __future__ import annotations
@@ -17,10 +20,12 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.folding import element_images, vanishing_dofs
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators import kernels
 from bemkit.operators.integrals import PairSweep
 from bemkit.operators.pairs import Degrees, PairIntegrals
+from bemkit.operators.stopwatch import assembling
 from bemkit.operators.threads import for_each_chunk
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
@@ -83,8 +88,15 @@ class Assemblable(Protocol):
         """Return the parts that share the test coefficients."""
 
 
-def assemble_together(operators: Sequence[Assemblable]) -> list[FloatArray]:
-    """Sweep over all element pairs once and return the matrices (test.n_dofs, trial.n_dofs) of all operators.
+@assembling()
+def assemble_together(operators: Sequence[Assemblable]) -> tuple[list[FloatArray], int]:
+    """Sweep over all element pairs once for all operators.
+
+    Returns
+    -------
+    matrices : list of (test.n_dofs, trial.n_dofs) arrays
+    n_pairs : int
+        Element pairs whose integrals were evaluated.
 
     Raises
     ------
@@ -99,20 +111,31 @@ def assemble_together(operators: Sequence[Assemblable]) -> list[FloatArray]:
     for operator in operators:
         degrees |= operator.degrees
     targets = [_Target(operator) for operator in operators]
-    sweep = PairSweep(mesh, degrees)
-    half = 0.5 * mesh.lengths
+    sweep = PairSweep(mesh.whole, degrees, test_elements=np.arange(mesh.n_elements))
+    half = 0.5 * mesh.whole.lengths
     log_scale = float(np.log(mesh.diameter))
     lock = Lock()
 
-    def fill(rows: slice) -> None:
+    def fill(rows: slice) -> int:
         block = Block(sweep.chunk(rows), half[rows], half, log_scale)
         for target in targets:
             for a, gathered in target.gather(block):
                 with lock:  # two chunks share the rows of the node between them
                     target.add(rows, a, gathered)
+        return block.test_half.size * block.trial_half.size
 
-    for_each_chunk(fill, sweep.row_slices(), n_pairs=mesh.n_elements**2)
-    return [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
+    n_pairs = for_each_chunk(fill, sweep.row_slices(), n_pairs=sweep.test.size * sweep.trial.size)
+    matrices = [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
+    for operator, matrix in zip(operators, matrices, strict=True):
+        clear_vanishing(matrix, operator.test, operator.trial)
+    return matrices, sum(n_pairs)
+
+
+def clear_vanishing(matrix: FloatArray, test: BoundarySpace, trial: BoundarySpace) -> None:
+    """Set the rows and columns to zero of dofs that are zero by symmetry."""
+    if test.mesh.symmetry is not None:
+        matrix[vanishing_dofs(test)] = 0.0
+        matrix[:, vanishing_dofs(trial)] = 0.0
 
 
 class _Target:
@@ -124,7 +147,10 @@ class _Target:
         self.n_trial = operator.trial.n_dofs // 2
         self.test_coefficients = operator.test_coefficients
         self.terms = operator.trial_terms()
-        self.columns = [_runs(dofs) for dofs in operator.trial.element_dofs.T]
+        self.images = [
+            (elements, signs.tolist(), [_runs(own) for own in dofs.T])
+            for elements, signs, dofs in element_images(operator.trial)
+        ]
         self.matrix = np.zeros((self.test_dofs_total // 2, 2, self.n_trial, 2))
 
     def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:
@@ -135,18 +161,20 @@ class _Target:
             buffers = [np.zeros((n_rows, self.n_trial)) for _ in range(4)]
             for term in self.terms:
                 for b in np.flatnonzero(np.any(term.coefficients != 0.0, axis=0)).tolist():
-                    for buffer, values in zip(buffers, term.tensor(block, a, b), strict=True):
+                    for index, values in enumerate(term.tensor(block, a, b)):
                         if values is not None:
-                            self._add_columns(buffer, values, term.coefficients[:, b])
+                            self._add_columns(buffers[index], values, term.coefficients[:, b], index % 2)
             result.append((a, buffers))
         return result
 
-    def _add_columns(self, buffer: FloatArray, values: FloatArray, coefficients: FloatArray) -> None:
-        for coefficient, runs in zip(coefficients.tolist(), self.columns, strict=True):
-            if coefficient:
-                scaled = values if coefficient == 1.0 else coefficient * values
-                for positions, dofs in runs:
-                    buffer[:, dofs] += scaled[:, positions]
+    def _add_columns(self, buffer: FloatArray, values: FloatArray, coefficients: FloatArray, component: int) -> None:
+        for elements, signs, columns in self.images:
+            own = values[:, elements]
+            for coefficient, runs in zip((signs[component] * coefficients).tolist(), columns, strict=True):
+                if coefficient:
+                    scaled = own if coefficient == 1.0 else coefficient * own
+                    for positions, dofs in runs:
+                        buffer[:, dofs] += scaled[:, positions]
 
     def add(self, rows: slice, a: int, gathered: list[FloatArray]) -> None:
         """Add the gathered rows to the matrix."""

@@ -20,8 +20,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, read_only
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.space import BoundarySpace, local_coefficients
-from bemkit.operators.assembly import Block, Tensor, TrialTerm, assemble_together
+from bemkit.operators.assembly import Block, Tensor, TrialTerm, assemble_together, clear_vanishing
 from bemkit.operators.material import Material
 from bemkit.operators.pairs import Degrees
 
@@ -120,7 +121,7 @@ class PairOperator(_DenseOperator):
         """Return the parts of the operator that share the test coefficients."""
 
     def _build(self) -> FloatArray:
-        return assemble_together([self])[0]
+        return assemble_together([self])[0][0]
 
 
 def _derivative(coefficients: FloatArray) -> FloatArray:
@@ -136,8 +137,7 @@ class SingleLayer(PairOperator):
 
     def __init__(self, trial: BoundarySpace, test: BoundarySpace, material: Material) -> None:
         # uniform pressure does not deform an incompressible body: V n = 0
-        definite = Tag.POSITIVE_DEFINITE if material.effective_poisson_ratio < 0.5 else Tag.POSITIVE_SEMIDEFINITE
-        tags = frozenset({Tag.SYMMETRIC, definite}) if trial is test else frozenset[Tag]()
+        tags = _definite(trial, material.effective_poisson_ratio < 0.5) if trial is test else frozenset[Tag]()
         super().__init__(trial, test, tags)
         self.material = material
 
@@ -252,8 +252,7 @@ class Mass(_DenseOperator):
     """The identity in weak form: <u, q>."""
 
     def __init__(self, trial: BoundarySpace, test: BoundarySpace) -> None:
-        tags = {Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE} if trial is test else set[Tag]()
-        super().__init__(trial, test, frozenset(tags))
+        super().__init__(trial, test, _definite(trial) if trial is test else frozenset())
 
     def _build(self) -> FloatArray:
         from bemkit.geometry.quadrature import gauss_legendre
@@ -266,7 +265,15 @@ class Mass(_DenseOperator):
             for c in range(2):
                 rows, columns = self.test.element_dofs[:, p], self.trial.element_dofs[:, q]
                 matrix[rows, c, columns, c] += local[p, q] * half
-        return matrix.reshape(self.test.n_dofs, self.trial.n_dofs)
+        result = matrix.reshape(self.test.n_dofs, self.trial.n_dofs)
+        clear_vanishing(result, self.test, self.trial)
+        return result
+
+
+def _definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:
+    """Return the tags of a symmetric operator that is positive but on dofs that are zero by symmetry."""
+    is_definite = is_positive and not vanishing_dofs(space).any()
+    return frozenset({Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE if is_definite else Tag.POSITIVE_SEMIDEFINITE})
 
 
 def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
@@ -323,15 +330,23 @@ def mass(trial: BoundarySpace, test: BoundarySpace) -> Mass:
     return Mass(trial, test)
 
 
-def assemble(*operators: PairOperator) -> None:
+def assemble(*operators: PairOperator) -> int:
     """Build the matrices of several operators in one sweep, so that shared integrals are computed once.
 
     Parameters
     ----------
     *operators : PairOperator
         On the same mesh; those that are assembled already are left alone.
+
+    Returns
+    -------
+    int
+        Element pairs whose integrals were evaluated.
     """
     waiting = [operator for operator in operators if not operator.is_assembled]
-    if waiting:
-        for operator, matrix in zip(waiting, assemble_together(waiting), strict=True):
-            operator.keep(matrix)
+    if not waiting:
+        return 0
+    matrices, n_pairs = assemble_together(waiting)
+    for operator, matrix in zip(waiting, matrices, strict=True):
+        operator.keep(matrix)
+    return n_pairs

@@ -23,7 +23,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
-from bemkit.files import check_target, replacing
+from bemkit.files import check_room, check_target, replacing
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, local_coefficients
 from bemkit.hdf5 import Reader, ResultFileError, opened, write_attributes
@@ -39,6 +39,8 @@ FORMULA_VERSION = 1
 FINGERPRINTS = ("operator", "geometry", "material", "spaces", "formulas")
 MARKER = b"bemkit operator cache\n"
 _USER_BLOCK = 512
+_OVERHEAD = 65536
+"""More than what a file holds besides its arrays."""
 _CURVE_SAMPLES = 17
 
 CachedOperator: TypeAlias = SingleLayer | DoubleLayer | Hypersingular | Mass | GalerkinMap
@@ -83,6 +85,7 @@ def save(path: str | Path, operator: CachedOperator) -> None:
     target = check_target(Path(path), "bemkit operator cache", _is_own)
     arrays = _computed(operator)
     with replacing(target) as temporary:
+        check_room(target.parent, sum(array.nbytes for array in arrays.values()) + _OVERHEAD)
         with h5py.File(str(temporary), "w-", userblock_size=_USER_BLOCK) as file:
             marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": bemkit.__version__}
             write_attributes(file, {**marks, "checksum": _checksum(arrays), **fingerprints(operator)})

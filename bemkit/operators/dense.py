@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.operators.work import Factorisation, FactorKind
 
 
 def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -60,6 +61,21 @@ class Cholesky:
         return factor
 
     @property
+    def factorisation(self) -> Factorisation:
+        """What it took."""
+        return Factorisation(FactorKind.CHOLESKY, len(self._factor))
+
+    @property
+    def factorisations(self) -> tuple[Factorisation, ...]:
+        """The same as one of several."""
+        return (self.factorisation,)
+
+    @property
+    def iterations(self) -> tuple[()]:
+        """None: a factorisation does not iterate."""
+        return ()
+
+    @property
     def lower(self) -> FloatArray:
         """The factor L, zero above its diagonal."""
         return np.tril(self._factor)
@@ -102,14 +118,17 @@ class DenseLU:
     """
 
     def __init__(self, matrix: FloatArray, name: str) -> None:
-        from scipy.linalg.lapack import dgecon, dgetrf
+        from scipy.linalg.lapack import dgecon, dgetrf, dlange
 
         # columns belong to elements: on graded meshes their sizes differ by the grading, which is no singularity
-        sizes = np.abs(matrix).max(axis=0, initial=0.0)
+        sizes = np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0))
         self._column_sizes = np.where(sizes > 0.0, sizes, 1.0)
         matrix /= self._column_sizes
-        norm = float(np.linalg.norm(matrix, 1))
-        self._factor, self._pivots, info = dgetrf(matrix, overwrite_a=1)
+        # LAPACK stores by columns: a matrix that is stored by rows is factored as its transpose, without a copy
+        self._is_transposed = matrix.flags.c_contiguous and not matrix.flags.f_contiguous
+        stored = matrix.T if self._is_transposed else matrix
+        norm = float(dlange("1", stored))  # type: ignore[call-arg]  # the stubs lack its arguments
+        self._factor, self._pivots, info = dgetrf(stored, overwrite_a=1)
         reciprocal_condition = 0.0 if info else dgecon(self._factor, norm)[0]
         if not reciprocal_condition > 1e-15:
             raise SingularMatrixError(
@@ -117,9 +136,15 @@ class DenseLU:
                 "check that the supports and contacts hold it"
             )
 
+    @property
+    def factorisation(self) -> Factorisation:
+        """What it took."""
+        return Factorisation(FactorKind.LU, len(self._factor))
+
     def solve(self, right: FloatArray) -> FloatArray:
         """Solve A x = right."""
         from scipy.linalg.lapack import dgetrs
 
-        solution = np.asarray(dgetrs(self._factor, self._pivots, right)[0])
-        return (solution.T / self._column_sizes).T
+        solution = np.asarray(dgetrs(self._factor, self._pivots, right, trans=int(self._is_transposed))[0])
+        solution /= self._column_sizes[(slice(None), *[None] * (solution.ndim - 1))]
+        return solution

@@ -8,13 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.space import BoundarySpace, dof_points
+from bemkit.operators.rigid import possible_motions, rigid_motions
 
 SMOOTH = 0.07
 """Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
 their sum then differ by the factor tan(15 deg)^2."""
 CONFLICT = 1e-9
 """Relative difference of two prescribed displacements at one node that round-off may explain."""
+HELD = 1e-6
+"""A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
+from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
+with a million times the load holds nothing."""
 
 
 class ConflictingSupportsError(ValueError):
@@ -94,6 +100,7 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
     """
     n_nodes = space.n_dofs // 2
     points = dof_points(space)
+    supports = [*supports, *_mirrors(space)]
     matrix, right = np.zeros((n_nodes, 2, 2)), np.zeros((n_nodes, 2))
     for support in supports:
         own = _directions_of(space, support)
@@ -115,6 +122,15 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
     is_fixed = np.stack([(rank == 2) | ((rank == 1) & is_x), (rank == 2) | ((rank == 1) & ~is_x)], axis=1)
     local = np.where(is_fixed, np.einsum("nkc,nc->nk", frame, displacement), 0.0)
     return NodalConditions(frame, is_fixed, local, np.zeros((n_nodes, 2), bool))
+
+
+def _mirrors(space: BoundarySpace) -> list[Support]:
+    """Return the supports that stand for symmetry lines: no displacement across them."""
+    held = vanishing_dofs(space).reshape(-1, 2)[space.element_dofs]
+    elements = np.flatnonzero(held.any(axis=(1, 2)))
+    if not elements.size:
+        return []
+    return [Support("symmetry line", elements, np.where(held[elements], 1.0, 0.0)[..., None] * np.eye(2))]
 
 
 def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
@@ -143,3 +159,28 @@ def _check_agreement(
                 f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
                 f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
             )
+
+
+def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
+    """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+    conditions : NodalConditions
+
+    Returns
+    -------
+    (n_motions, n_nodes, 2) array
+        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `possible_motions`.
+    """
+    points = dof_points(space)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
+    motions = motions[:, :, list(possible_motions(space.mesh))]
+    fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
+    if fixed.size:
+        _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
+        n_held = int(np.count_nonzero(sizes >= HELD * np.sqrt(len(fixed))))
+        motions = motions @ directions[n_held:].T
+    return motions.transpose(2, 0, 1)

@@ -31,6 +31,17 @@ def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> Floa
     return motions
 
 
+def possible_motions(mesh: BoundaryMesh) -> tuple[int, ...]:
+    """Return which of the two translations and the rotation a body can make.
+
+    All of them, or those that its symmetry allows; none of an exterior, which is at rest at infinity. The forces on the
+    body do no work on them.
+    """
+    if mesh.is_exterior:
+        return ()
+    return (0, 1, 2) if mesh.symmetry is None else mesh.symmetry.rigid_motions
+
+
 def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
     """Return the motions of a body that cause no tractions at all.
 
@@ -42,7 +53,8 @@ def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
     Returns
     -------
     (2 n, n_motions) array
-        The three rigid motions, component-wise; none for an exterior, which is at rest at infinity.
+        The rigid motions that are possible, component-wise; see `possible_motions`.
     """
-    motions = rigid_motions(points, mesh.centre, mesh.diameter).reshape(-1, 3)
-    return motions[:, :0] if mesh.is_exterior else motions
+    possible = list(possible_motions(mesh))
+    motions = rigid_motions(points, mesh.centre, mesh.diameter)[:, :, possible]
+    return motions.reshape(2 * len(points), len(possible))

@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
+
+Result = TypeVar("Result")
 
 LARGE = 2500
 """Order of a matrix above which several threads factor it faster than one."""
@@ -49,7 +51,7 @@ def _blas_libraries() -> ThreadpoolController:
     return ThreadpoolController().select(user_api="blas")
 
 
-def for_each_chunk(work: Callable[[slice], None], chunks: Iterable[slice], *, n_pairs: int) -> None:
+def for_each_chunk(work: Callable[[slice], Result], chunks: Iterable[slice], *, n_pairs: int) -> list[Result]:
     """Call a function on every chunk of rows, from several threads if there are many element pairs.
 
     Parameters
@@ -59,12 +61,21 @@ def for_each_chunk(work: Callable[[slice], None], chunks: Iterable[slice], *, n_
     chunks : iterable of slice
     n_pairs : int
         Element pairs in all chunks together.
+
+    Returns
+    -------
+    list
+        What the function returned, in the order of the chunks.
     """
+    count = n_threads(n_pairs)
+    if count == 1:
+        return [work(chunk) for chunk in chunks]
+    with ThreadPoolExecutor(count) as pool:
+        return list(pool.map(work, chunks))
+
+
+def n_threads(n_pairs: int) -> int:
+    """Return how many threads assemble a number of element pairs."""
     affinity = getattr(os, "sched_getaffinity", None)
     available = len(affinity(0)) if affinity else os.cpu_count() or 1
-    if n_pairs < MANY_PAIRS or available == 1:
-        for chunk in chunks:
-            work(chunk)
-        return
-    with ThreadPoolExecutor(min(available, MAX_THREADS)) as pool:
-        list(pool.map(work, chunks))
+    return 1 if n_pairs < MANY_PAIRS else min(available, MAX_THREADS)

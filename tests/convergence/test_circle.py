@@ -116,7 +116,7 @@ CASES = {
     "galerkin, polygons": (GalerkinMap, polygon, 2.0, 1.5e-2),
     "linear, arcs": (linear, circle, 2.0, 1.5e-2),
     "quadratic, arcs": (quadratic, circle, 4.0, 1e-4),
-    "collocation, arcs": (CollocationMap, circle, 1.0, 5e-2),
+    "collocation, arcs": (CollocationMap, circle, 2.0, 5e-3),
 }
 
 

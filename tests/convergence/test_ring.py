@@ -76,8 +76,12 @@ def test_ring_on_a_shaft(make: Make, nu: float) -> None:
         force = forces(elastic, pressures)
         u, _ = elastic.condense(conditions, force).recover(np.zeros(0))
         errors.append(float(np.abs(u - lame(dof_points(space), material)).max()))
-    assert errors[-1] < 0.02 * np.abs(lame(np.array([[INNER, 0.0]]), material)).max()
-    assert observed_order(errors) > (1.75 if make is GalerkinMap else 0.75)
+    size = np.abs(lame(np.array([[INNER, 0.0]]), material)).max()
+    if make is GalerkinMap:
+        assert errors[-1] < 0.02 * size
+        assert observed_order(errors) > 1.75
+    else:  # uniform widening is held by slopes exactly, and the rest is too small to show an order here
+        assert errors[-1] < 0.001 * size
 
 
 def test_rotating_disk_by_a_particular_solution() -> None:

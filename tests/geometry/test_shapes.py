@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.discretise import discretise
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Shape
+from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
 
 from .strategies import angles, polygon_area, rotation, sizes, star_polygons
 
@@ -13,6 +13,7 @@ SHAPES = {
     "rectangle": (Rectangle(2.0, 0.5, (1.0, -1.0)), 1.0, 5.0),
     "polygon": (Polygon(((0, 0), (2, 0), (1, 1), (1, 3))), 2.0, 2 + np.sqrt(2) + 2 + np.sqrt(10)),
     "disk": (Disk(2.0, (3.0, 0.0)), 4 * np.pi, 4 * np.pi),
+    "sector": (Sector(2.0, -90.0, 30.0, (1.0, 0.0)), 4 * np.pi / 3, 4 * np.pi / 3 + 4.0),
     "ring": (Ring(1.0, 2.0), 3 * np.pi, 6 * np.pi),
     "plate": (PlateWithHole(2.0, 1.0, 0.25), 2.0 - np.pi / 16, 6.0 + np.pi / 2),
     "exterior": (ExteriorOf(Disk(0.5)), np.inf, np.pi),
@@ -35,6 +36,7 @@ def test_area_and_perimeter(shape: Shape, area: float, perimeter: float, n_eleme
         (Polygon(((0, 0), (1, 0), (0, 1))), "side-1 side-2 side-3"),
         (Polygon(((0, 0), (1, 0), (0, 1)), ("a", "b", "c")), "a b c"),
         (Disk(1), "arc-1 arc-2 arc-3 arc-4"),
+        (Sector(1, 0, 300), "arc end start"),
         (Ring(1, 2), "outer-1 outer-2 outer-3 outer-4 inner-4 inner-3 inner-2 inner-1"),
         (PlateWithHole(4, 4, 1), "bottom right top left hole-4 hole-3 hole-2 hole-1"),
         (ExteriorOf(Rectangle(1, 1)), "left top right bottom"),
@@ -97,6 +99,9 @@ def test_polygon_that_is_none_is_refused(vertices, size, angle) -> None:
         (lambda: Polygon(((0, 0), (0, 1), (1, 1), (1, 0))), r"vertices run clockwise: list the vertices anticlockwise"),
         (lambda: Disk(-1.0), r"Disk: radius is -1.0"),
         (lambda: Disk(1.0, (0.0,)), r"Disk: centre is \(0.0,\): give two finite numbers"),
+        (lambda: Sector(0.0, 0.0, 90.0), r"Sector: radius is 0.0: give a positive"),
+        (lambda: Sector(1.0, 90.0, 0.0), r"from 90.0 to 0.0 degrees: end less than 360 degrees after the start"),
+        (lambda: Sector(1.0, 0.0, 360.0), r"from 0.0 to 360.0 degrees: end less than 360"),
         (lambda: Ring(2.0, 1.0), r"Ring: inner_radius is 2.0, not less than outer_radius, 1.0: give the smaller"),
         (lambda: Ring(0.0, 1.0), r"Ring: inner_radius is 0.0: give a positive"),
         (lambda: Ring(1.0, 2.0, (0.0, np.inf)), r"Ring: centre is"),

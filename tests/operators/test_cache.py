@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,9 +57,7 @@ def test_a_map_from_a_file_computes_nothing_and_gives_the_same_tractions(
     u = np.random.default_rng(1).normal(size=(16, 2))
     expected = written.tractions(u)
     cache.save(tmp_path / "map.h5", written)
-    monkeypatch.setattr(
-        "bemkit.operators.steklov_poincare.galerkin.assemble", lambda *_: pytest.fail("assembled again")
-    )
+    monkeypatch.setattr("bemkit.operators.steklov_poincare.layers.assemble", lambda *_: pytest.fail("assembled again"))
     cache.load(tmp_path / "map.h5", fresh)
     # the same numbers, multiplied in another order
     np.testing.assert_allclose(fresh.tractions(u), expected, rtol=1e-11)
@@ -192,6 +191,21 @@ def test_load_or_build_uses_rebuilds_and_says_so(tmp_path: Path, caplog: pytest.
     assert not cache.load_or_build(path, galerkin(mesh(20)))
     assert "damaged" in caplog.records[-1].getMessage()
     assert cache.load_or_build(path, galerkin(mesh(20)))
+
+
+def test_a_disk_without_room_is_named_before_anything_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "map.h5"
+    cache.save(path, galerkin())
+    before = path.read_bytes()
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr("bemkit.files.shutil.disk_usage", lambda _: usage._replace(free=70_000))
+    # three matrices of order 40 take 38 kB besides the file's own overhead
+    with pytest.raises(OutputFileError, match=r"0\.0001\d* GB are needed and 7e-05 GB free"):
+        cache.save(path, galerkin(mesh(20)))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

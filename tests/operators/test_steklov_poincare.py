@@ -138,11 +138,12 @@ def test_map_is_symmetric_positive_and_kills_rigid_motions(nu: float, seed: int)
     assert eigenvalues[3] > 1e-4 * size if nu < 0.49 else eigenvalues[3] > 0
 
 
-def test_collocation_keeps_exact_equilibrium_and_kills_translations() -> None:
+def test_collocation_keeps_exact_equilibrium_and_kills_rigid_motions() -> None:
     elastic = CollocationMap(mesh_of(L_SHAPE, 64), MATERIAL)
     matrix = elastic.matrix()
     motions = rigid_motions(elastic.mesh.centres, elastic.mesh.centre, 1.0).reshape(-1, 3)
-    assert np.abs(matrix @ motions[:, :2]).max() < 1e-12 * np.abs(matrix).max()
+    # rotations by the slopes of the double layer, which constants on elements do not hold by themselves
+    assert np.abs(matrix @ motions).max() < 1e-12 * np.abs(matrix).max()
     assert np.abs(motions.T @ matrix).max() < 1e-12 * np.abs(matrix).max()
 
 
@@ -201,11 +202,10 @@ def circle_symbol_errors(kind: type, n: int, nu: float) -> FloatArray:
     return np.array(errors)
 
 
-@pytest.mark.parametrize(("kind", "order", "ceiling"), [(GalerkinMap, 2.0, 3e-3), (CollocationMap, 1.0, 5e-2)])
+@pytest.mark.parametrize(("kind", "order", "ceiling"), [(GalerkinMap, 2.0, 3e-3), (CollocationMap, 2.0, 2e-3)])
 def test_symbols_on_inscribed_polygons_converge(kind: type, order: float, ceiling: float) -> None:
     errors = np.array([circle_symbol_errors(kind, n, 0.3) for n in (24, 48, 96, 192)])
     observed = np.log2(errors[2] / errors[3])
     assert errors[-1].max() < ceiling
-    # constants approach their order slowly from both sides; linear elements show theirs to three digits
     assert observed.min() > order - 0.25
     assert observed.max() < order + 0.25

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +11,24 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
-from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
-from bemkit.operators.dense import Cholesky, SingularMatrixError, multiply
+from bemkit.operators.block_cg import Iterations
+from bemkit.operators.boundary import mass
+from bemkit.operators.dense import Cholesky
+from bemkit.operators.linear import DenseCholesky, Factor, LinearSolver, LinearSolverWish
+from bemkit.operators.linear_choice import choose_linear_solver
 from bemkit.operators.material import Material
+from bemkit.operators.memory import physical_memory
 from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.rigid import resting_motions
-from bemkit.operators.steklov_poincare.nodes import integrate_traction, rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
+from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
+from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers
+from bemkit.operators.steklov_poincare.nodes import integrate_traction, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
+from bemkit.operators.steklov_poincare.schur import SchurCondensation
+from bemkit.operators.work import Work
+
+_DIRECT = DenseCholesky()
+_HELD_BODY = "the body held by its supports and its contact boundary"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +43,14 @@ class GalerkinFactors:
         V = L L^T.
     strained : (n_traction_dofs, n_dofs) array
         L^-1 (1/2 M + K), without the part whose tractions exert a resultant.
+    work : Work
+        What they took; nothing if they come from a cache.
     """
 
     matrix: FloatArray
     single_layer: Cholesky
     strained: FloatArray
+    work: Work = field(default_factory=Work)
 
 
 class GalerkinMap:
@@ -48,6 +62,8 @@ class GalerkinMap:
     material : Material
     displacement_space, traction_space : BoundarySpace, optional
         Continuous linear displacements and piecewise constant tractions unless given.
+    linear_solver : LinearSolver or Automatic
+        How `condense` solves for the free displacements: by forming S and factoring it unless given otherwise.
 
     Notes
     -----
@@ -66,35 +82,35 @@ class GalerkinMap:
         material: Material,
         displacement_space: BoundarySpace | None = None,
         traction_space: BoundarySpace | None = None,
+        linear_solver: LinearSolverWish = _DIRECT,
     ) -> None:
         self.mesh = mesh
         self.material = material
         self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
+        self.linear_solver = linear_solver
+        self._factors: list[Factor] = []
+
+    @property
+    def iterations(self) -> tuple[Iterations, ...]:
+        """What each solution for free displacements took that was found by iteration, in their order."""
+        return tuple(one for factor in self._factors for one in factor.iterations)
 
     @cached_property
     def factors(self) -> GalerkinFactors:
-        """What the map is made of, computed on first use."""
-        u, t = self.displacement_space, self.traction_space
-        v, k, w = (
-            single_layer(t, t, self.material),
-            double_layer(u, t, self.material),
-            hypersingular(u, u, self.material),
-        )
-        assemble(v, k, w)
-        identity = mass(u, t).matrix()
-        pressures = mass(t, t).matrix() @ self._pressures
-        factor = Cholesky(_without_kernel(v.matrix(), pressures), "the single layer operator")
-        motions = resting_motions(self.mesh, dof_points(u))
-        # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
-        at_rest, _ = np.linalg.qr(motions[:, : 0 if self.mesh.is_straight.all() else 3])
-        strained = factor.solve_lower(_without(0.5 * identity + k.matrix(), at_rest))
-        idle = np.column_stack([identity @ motions, pressures])
-        resultant, _ = np.linalg.qr(factor.solve_lower(idle))
-        if idle.shape[1]:
-            strained -= multiply(resultant, multiply(resultant.T, strained))
-        hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
-        return GalerkinFactors(_symmetric_sum(hyper, strained), factor, strained)
+        """What the map is made of when S is formed, computed on first use."""
+        layers = self.__dict__.get("layers") or self._assemble()
+        strained = layers.strained()
+        work = layers.work + Work(right_hand_sides=strained.shape[1])
+        return GalerkinFactors(_symmetric_sum(layers.hypersingular, strained), layers.single_layer, strained, work)
+
+    @cached_property
+    def layers(self) -> Layers:
+        """What the map is made of when only products with S are wanted, computed on first use."""
+        return self._assemble()
+
+    def _assemble(self) -> Layers:
+        return assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
 
     @cached_property
     def _pressures(self) -> FloatArray:
@@ -129,51 +145,36 @@ class GalerkinMap:
         return integrate_traction(self.displacement_space, elements, traction)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not open by a Schur complement."""
-        n = force.shape[0]
-        matrix = rotate_rows(rotate_columns(self.matrix(), conditions.frame), conditions.frame)
-        free, is_open, fixed = (
-            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
-        )
-        factor = Cholesky(matrix[np.ix_(free, free)], "the body held by its supports and its contact boundary")
-        coupling = matrix[np.ix_(free, is_open)]
+        """Eliminate every direction that is not open by a Schur complement, with the linear solver of the map."""
+        n_open = int(np.count_nonzero(conditions.is_open))
+        choice = choose_linear_solver(self.linear_solver, self.displacement_space.n_dofs, n_open, physical_memory())
+        condense = self._condense_matrix if choice.solver.forms_matrix else self._condense_products
+        return condense(choice.solver, conditions, force)
+
+    def _condense_products(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Condense without forming S."""
+        stiffness = FreeStiffness(self.layers, self.displacement_space, conditions)
+        check_is_held(stiffness, dof_points(self.displacement_space), _HELD_BODY)
+        factor = solver.factor(stiffness, _HELD_BODY)
+        self._factors.append(factor)
         volume = rotate_rows(self._volume, conditions.frame)
-        # what tangential motions change the volume by is round-off, and no room for an incompressible body
-        room = np.where(np.abs(volume) > 1e-14 * np.abs(volume).max(initial=0.0), volume, 0.0)
-        held = _HeldVolume(factor, room[free])
-        response, pressures = held.solve(-coupling, -volume[is_open].T)
-        stiffness = matrix[np.ix_(is_open, is_open)] + multiply(coupling.T, response) + volume[is_open] @ pressures
-        stiffness = 0.5 * (stiffness + stiffness.T)
-        of_fixed = matrix[:, fixed]
-        sensitivity = np.abs(self.matrix()).sum(axis=0).reshape(n, 2)
+        return IterativeCondensation(stiffness, factor, volume).condense(force, self.layers.work)
 
-        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
-            prescribed = displacement.ravel()[fixed]
-            known = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() - of_fixed @ prescribed
-            at_rest, pressure = held.solve(known[free], -volume[fixed].T @ prescribed)
-            load = known[is_open] - coupling.T @ at_rest - volume[is_open] @ pressure
-
-            def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-                local = np.empty(2 * n)
-                local[fixed] = prescribed
-                local[is_open] = open_displacement
-                local[free] = at_rest + response @ open_displacement
-                displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(n, 2))
-                force = self.matrix() @ displacement.ravel()
-                force += self._volume @ (pressure + pressures @ open_displacement)
-                return displacement, force.reshape(n, 2)
-
-            return CondensedMap(stiffness, load, recover, under, sensitivity)
-
-        return under(force, conditions.displacement)
+    def _condense_matrix(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Condense the formed S."""
+        condensation = SchurCondensation(self.matrix(), self._volume, conditions, solver, _HELD_BODY)
+        first = condensation.under(force, conditions.displacement)
+        return replace(first, work=self.factors.work + condensation.work + first.work)
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m].
 
         Of an incompressible body they lack the pressures, which displacements do not tell.
         """
-        factors = self.factors
-        return factors.single_layer.solve_upper(factors.strained @ displacement.ravel()).reshape(-1, 2)
+        if "factors" in self.__dict__ or "layers" not in self.__dict__:
+            factors = self.factors
+            return factors.single_layer.solve_upper(factors.strained @ displacement.ravel()).reshape(-1, 2)
+        return self.layers.tractions(displacement.reshape(-1, 1)).reshape(-1, 2)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
@@ -190,42 +191,6 @@ class GalerkinMap:
         return means
 
 
-@dataclass(frozen=True, eq=False)
-class _HeldVolume:
-    """Solves for the free displacements, with the pressure that keeps the volume of an incompressible body.
-
-    Parameters
-    ----------
-    stiffness : Cholesky
-        Of the free directions.
-    volume : (n_free, 0 or 1) array
-        Their change of volume; no column for a compressible body.
-    """
-
-    stiffness: Cholesky
-    volume: FloatArray
-
-    @cached_property
-    def _compliance(self) -> tuple[FloatArray, FloatArray]:
-        """Displacements under a unit pressure, and the volume that they yield."""
-        displacement = self.stiffness.solve(self.volume)
-        yielded = self.volume.T @ displacement
-        if yielded.size and not yielded.min() > 0.0:
-            raise SingularMatrixError(
-                "the incompressible body (poisson_ratio 0.5) has no free boundary to make room: leave a part free"
-            )
-        return displacement, yielded
-
-    def solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacements and pressure for given forces (n_free, ...) and changes of volume (0 or 1, ...)."""
-        free = self.stiffness.solve(right)
-        if not self.volume.shape[1]:
-            return free, np.zeros(volume.shape)
-        displacement, yielded = self._compliance
-        pressure = (self.volume.T @ free - volume) / yielded[0, 0]
-        return free - displacement @ pressure, pressure
-
-
 def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
     """Return the symmetric part of `hyper` plus strained^T strained, read-only."""
     from scipy.linalg.blas import dsyrk
@@ -236,19 +201,3 @@ def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
     matrix = half + half.T
     read_only(matrix)
     return matrix
-
-
-def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return the matrix made to vanish on some orthonormal motions (n_dofs, n_motions)."""
-    if not motions.shape[1]:
-        return matrix
-    return matrix - multiply(multiply(matrix, motions), np.ascontiguousarray(motions.T))
-
-
-def _without_kernel(matrix: FloatArray, directions: FloatArray) -> FloatArray:
-    """Add a mean eigenvalue along directions that the matrix may annihilate; they are projected out later."""
-    if not directions.shape[1]:
-        return matrix
-    unit, _ = np.linalg.qr(directions)
-    raised: FloatArray = matrix + np.trace(matrix) / len(matrix) * unit @ unit.T
-    return raised

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.work import Work
 
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
 """Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
@@ -30,16 +31,23 @@ class CondensedMap:
     under : callable
         Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
         nodes -> the same body under them, without another factorisation.
+    follow : callable
+        (k,) numbers (2 node + component) of free directions -> response (k, n_open) and at_rest (k,) of the
+        displacements there: ``at_rest + response @ open_displacement``.
     sensitivity : (n_nodes, 2) array, optional
         Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
         above the forces themselves, which then are differences and carry its round-off.
+    work : Work
+        Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     """
 
     stiffness: FloatArray
     load: FloatArray
     recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     under: Callable[[FloatArray, FloatArray], CondensedMap]
+    follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
+    work: Work = field(default_factory=Work)
 
 
 class SteklovPoincare(Protocol):

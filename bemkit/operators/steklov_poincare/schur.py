@@ -1,0 +1,93 @@
+"""Condensation of a Galerkin map whose matrix has been formed: a Schur complement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.operators.dense import multiply
+from bemkit.operators.linear import Factor, LinearSolver, MatrixOperator
+from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.steklov_poincare.held_volume import HeldVolume, room
+from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
+from bemkit.operators.work import Work
+
+
+@dataclass(eq=False)
+class SchurCondensation:
+    """A body reduced to its open directions by eliminating the free ones from S.
+
+    Parameters
+    ----------
+    matrix : (n_dofs, n_dofs) array
+        S in x and y.
+    volume : (n_dofs, 0 or 1) array
+        Change of volume of an incompressible body, in x and y.
+    conditions : NodalConditions
+    solver : LinearSolver
+    name : str
+        What is singular if the free block is.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the supports, and the open directions held fast, leave the body free.
+    """
+
+    matrix: FloatArray
+    volume: FloatArray
+    conditions: NodalConditions
+    solver: LinearSolver
+    name: str
+    factor: Factor = field(init=False)
+
+    def __post_init__(self) -> None:
+        conditions = self.conditions
+        matrix = rotate_rows(rotate_columns(self.matrix, conditions.frame), conditions.frame)
+        self._free, self._open, self._fixed = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
+        )
+        self.factor = self.solver.factor(MatrixOperator(matrix[np.ix_(self._free, self._free)]), self.name)
+        self._coupling = matrix[np.ix_(self._free, self._open)]
+        self._of_fixed = matrix[:, self._fixed]
+        self._volume = volume = rotate_rows(self.volume, conditions.frame)
+        self._held = HeldVolume(self.factor, room(volume)[self._free])
+        self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._open].T)
+        stiffness = matrix[np.ix_(self._open, self._open)] + multiply(self._coupling.T, self._response)
+        stiffness += volume[self._open] @ self._pressures
+        self._stiffness = 0.5 * (stiffness + stiffness.T)
+        self._sensitivity = np.abs(self.matrix).sum(axis=0).reshape(-1, 2)
+
+    @property
+    def work(self) -> Work:
+        """What the elimination took."""
+        n_columns = self._open.size + self.volume.shape[1]
+        return Work(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
+        frame, free, response = self.conditions.frame, self._free, self._response
+        prescribed = displacement.ravel()[self._fixed]
+        known = np.einsum("nkc,nc->nk", frame, force).ravel() - self._of_fixed @ prescribed
+        at_rest, pressure = self._held.solve(known[free], -self._volume[self._fixed].T @ prescribed)
+        load = known[self._open] - self._coupling.T @ at_rest - self._volume[self._open] @ pressure
+
+        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            local = np.empty(len(self.matrix))
+            local[self._fixed] = prescribed
+            local[self._open] = open_displacement
+            local[free] = at_rest + response @ open_displacement
+            displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
+            force = self.matrix @ displacement.ravel()
+            force += self.volume @ (pressure + self._pressures @ open_displacement)
+            return displacement, force.reshape(-1, 2)
+
+        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
+            rows = np.searchsorted(free, directions)
+            return response[rows], at_rest[rows]
+
+        work = Work(right_hand_sides=1)
+        return CondensedMap(self._stiffness, load, recover, self.under, follow, self._sensitivity, work)

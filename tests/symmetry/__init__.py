@@ -1,0 +1,1 @@
+"""Symmetry lines by images."""
