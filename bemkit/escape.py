@@ -55,7 +55,7 @@ def _rigid_motion(model: Model, escape: UnsolvableLoad) -> tuple[FloatArray, flo
     frame, points = model.nodes.frame, model.nodes.points
     spin = frame[:, :, 1] * points[:, None, 0] - frame[:, :, 0] * points[:, None, 1]
     matrix = np.concatenate([frame, spin[:, :, None]], axis=2).reshape(-1, 3)
-    moves = model.body.to_open.any(axis=0)  # where a support holds the tangent, that component says nothing
+    moves = model.body.moves.ravel()  # where a support holds the tangent, that component says nothing
     # full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle
     velocity = escape.motion * [0.0, 1.0] if escape.is_sliding else escape.motion
     motion = np.linalg.lstsq(matrix[moves], velocity.ravel()[moves], rcond=1e-9)[0]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from pathlib import Path
+
+from markers import between
 
 import bemkit as bk
 from bemkit.scenefile import with_overrides
@@ -30,15 +31,6 @@ def main() -> None:
         if number < N_FULL:
             text = between(text, f"{name}-{discretisation}", to_markdown(all_axes(), rows))
     PAGE.write_text(between(text, "summary", "\n".join(summary)), "utf-8")
-
-
-def between(text: str, marker: str, content: str) -> str:
-    """Replace what stands between two markers."""
-    pattern = rf"(<!-- {marker} -->\n).*?(<!-- end {marker} -->)"
-    replaced, count = re.subn(pattern, lambda match: f"{match[1]}\n{content}\n\n{match[2]}", text, flags=re.DOTALL)
-    if count != 1:
-        raise ValueError(f"{PAGE.name} has {count} places marked {marker!r}: keep one")
-    return replaced
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Whether the obstacle can hold the load at all."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from bemkit.contact.problem import ContactProblem
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
 linear programming (tolerance 1e-7) cannot decide and the drivers can."""
+
+_FARTHEST = 1e7
+"""Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +94,27 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
             if best is None or work > best.work:
                 best = UnsolvableLoad(motion, lift, work)
     return best
+
+
+def find_long_travel(problem: ContactProblem) -> float | None:
+    """Return how far the load carries the body before any obstacle can hold it, if that hides how the body deforms.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        With a load that the obstacle can hold; see `find_unsolvable_load`.
+
+    Returns
+    -------
+    float or None
+        Smallest gap that must close, in displacements that the load of the glued body causes at one node; None if it
+        is small enough for displacements to hold both the travel and the deformation.
+    """
+    deformation = float(np.abs(problem.glued_state.traction).max()) / problem.body.stiffness_scale
+    is_far = problem.gap > _FARTHEST * deformation
+    if not is_far.any() or find_unsolvable_load(replace(problem, gap=np.where(is_far, np.inf, problem.gap))) is None:
+        return None
+    return float(problem.gap[is_far].min()) / deformation
 
 
 def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:

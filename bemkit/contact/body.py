@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions
 
 
@@ -108,12 +108,21 @@ class LinearBody(Protocol):
         """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho."""
         ...
 
+    @property
+    def tangent_is_free(self) -> BoolArray:
+        """(n_contact,) bool array: nodes without friction, whose tangential motion the body has eliminated.
+
+        The only tangential condition there is ``sigma_t = 0``; `ContactProblem.respond` sees to it.
+        """
+        ...
+
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return displacement and traction of the loaded body under two conditions per contact node.
 
         Parameters
         ----------
         conditions : LinearConditions
+            At nodes whose tangent is free the second one is ``sigma_t = 0``.
 
         Returns
         -------
@@ -123,6 +132,8 @@ class LinearBody(Protocol):
         ------
         SingularResponse
             If the conditions do not determine the response.
+        ValueError
+            If there is another tangential condition where the tangent is free.
         """
         ...
 

@@ -7,6 +7,10 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.problem import ContactProblem, ContactState
 
+_ROUND_OFF = 1e-13
+"""Tractions below this share of those that hold the body glued are round-off (450 eps) of the sums they come from.
+Larger ones mean something, however small they are."""
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -65,9 +69,11 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     Notes
     -----
     Tractions are measured by the largest traction in the state or in the glued state (all nodes held), whichever is
-    larger, so that a nearly lifted body is judged by its load. Lengths are measured by the displacement which that
-    traction causes at one node, ``traction / stiffness_scale``: a far obstacle or a long rigid motion does not
-    loosen the test until it exceeds 1e6 times that displacement, where round-off would speak instead.
+    larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
+    Lengths are measured by the displacement which that traction causes at one node, ``traction / stiffness_scale``: a
+    far obstacle or a long rigid motion does not loosen the test until it exceeds 1e6 times that displacement, where
+    round-off would speak instead. A state without tractions, such as that of a loose body which has given way to an
+    overlap, has no length but its displacement.
     """
     stress, length = certificate_scales(problem, state)
     clearance = problem.gap - state.u_n
@@ -93,16 +99,19 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[float, float]:
     """Return the traction [Pa] and the length [m] by which `certify` measures; see its notes."""
     present, glued = (float(np.abs(held.traction).max()) for held in (state, problem.glued_state))
-    # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must not
-    # excuse; what is left of the glued tractions below 1e-9 is round-off, and speaks of no answer at all.
-    stress = max(present, min(glued, 1e3 * present) if present > 1e-9 * glued else glued)
     furthest = float(np.abs(state.displacement).max())
-    length = max(stress / problem.body.stiffness_scale, 1e-6 * furthest)
-    if stress == 0.0:
-        # Neither load nor reaction: any length will do, and there is nothing to measure tractions by.
-        is_finite = np.isfinite(problem.gap)
-        length = max([furthest, *np.abs(problem.gap[is_finite])])
-    return stress or 1.0, length or 1.0
+    stiffness = problem.body.stiffness_scale
+    # friction without pressure is a traction to be met as well, however small beside the glued ones
+    at_hand = max(present, float(problem.friction_bound(np.zeros(problem.n_contact)).max()))
+    if at_hand > _ROUND_OFF * glued and max(present, glued) > 0.0:
+        # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must
+        # not excuse.
+        stress = max(present, min(glued, 1e3 * at_hand))
+        return stress, max(stress / stiffness, 1e-6 * furthest)
+    # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
+    # by what would hold it or, if even that is nothing, by the gaps.
+    gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
+    return glued or 1.0, furthest or glued / stiffness or float(gaps.max(initial=0.0)) or 1.0
 
 
 def _largest(values: FloatArray) -> float:

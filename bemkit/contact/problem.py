@@ -7,7 +7,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import stick
+from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.dense import DenseBody
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.contact.partwise import law_name
@@ -78,9 +78,34 @@ class ContactProblem:
     def glued_state(self) -> ContactState:
         """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
 
-        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``.
+        Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
+        eliminated the tangent.
         """
-        return self.body.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
+        return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
+
+    def respond(self, conditions: LinearConditions) -> ContactState:
+        """Return the response of the body; where it has eliminated the tangent, ``sigma_t = 0`` whatever is asked.
+
+        Drivers ask this instead of the body itself, and need not know where there is no friction.
+
+        Parameters
+        ----------
+        conditions : LinearConditions
+
+        Returns
+        -------
+        ContactState
+
+        Raises
+        ------
+        SingularResponse
+            If the conditions do not determine the response.
+        """
+        is_free = self.body.tangent_is_free
+        if is_free.any():
+            rows = np.stack([np.zeros_like(is_free), is_free], axis=1)
+            conditions = conditions.replaced(rows, separated(self.n_contact))
+        return self.body.respond(conditions)
 
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law."""
@@ -114,6 +139,12 @@ class ContactProblem:
             raise LawError(
                 f"friction law {law_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
                 f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
+            )
+        if np.any(bound[self.body.tangent_is_free] > 0.0):
+            node = int(np.flatnonzero(self.body.tangent_is_free & (bound > 0.0))[0])
+            raise LawError(
+                f"friction law {law_name(self.law)} allows {bound[node]:g} at contact node {node}, where the body was "
+                "condensed without friction: condense it again for this law"
             )
         return self._where_acting(bound, is_closed)
 

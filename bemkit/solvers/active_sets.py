@@ -16,7 +16,7 @@ class NodeStatus(IntEnum):
     SEPARATED = 0
     STICK = 1
     SLIP_FORWARD = 2
-    """Slips along the tangent, ``u_t > 0``."""
+    """Slips along the tangent, ``u_t > 0``; also a node that touches without any friction and happens to rest."""
     SLIP_BACKWARD = 3
     """Slips against the tangent, ``u_t < 0``."""
 
@@ -76,6 +76,11 @@ class Trial:
     predicted_sigma_n: FloatArray
     residual: FloatArray
 
+    @property
+    def is_free(self) -> BoolArray:
+        """(n_contact,) bool array: nodes that slide freely, because neither a bound nor its derivative is there."""
+        return np.asarray((self.bound == 0.0) & (self.slope == 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class ProjectedConditions:
@@ -131,8 +136,7 @@ class ProjectedConditions:
             held = augmented(problem.gap, problem.slip_origin, self.multiplier, self.rho_n, self.rho_t)
         intercept = trial.bound - trial.slope * trial.predicted_sigma_n
         sliding = slip(problem.gap, sets.direction.astype(float), trial.slope, intercept)
-        is_free = (trial.bound == 0.0) & (trial.slope == 0.0)
-        slides = (sets.direction != 0) | is_free
+        slides = (sets.direction != 0) | trial.is_free
         conditions = separated(problem.n_contact)
         conditions = conditions.replaced(np.stack([sets.is_closed, ~slides], axis=1), held)
         return conditions.replaced(np.stack([np.zeros_like(slides), slides], axis=1), sliding)
@@ -145,11 +149,16 @@ class ProjectedConditions:
         """
         sets = trial.sets
         flips = (sets.direction * previous.direction < 0) & sets.is_closed & previous.is_closed
-        flips &= (trial.bound > 0.0) | (trial.slope != 0.0)
+        flips &= ~trial.is_free
         return ActiveSets(sets.is_closed, np.where(flips, 0, sets.direction))
 
 
 def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
-    """Return the active sets of a state under the exact conditions, rho being the stiffness scale of the body."""
+    """Return the active sets of a state under the exact conditions, rho being the stiffness scale of the body.
+
+    Nothing makes a node without any friction stick: where it does not move, that is chance, and it counts as slipping.
+    """
     rho = problem.body.stiffness_scale
-    return ProjectedConditions(problem, rho, rho).evaluate(state).sets
+    trial = ProjectedConditions(problem, rho, rho).evaluate(state)
+    direction = np.where(trial.is_free & (trial.sets.direction == 0), 1, trial.sets.direction)
+    return ActiveSets(trial.sets.is_closed, direction)

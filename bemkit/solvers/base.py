@@ -8,10 +8,12 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.admissibility import find_unsolvable_load
+from bemkit.contact.admissibility import find_long_travel, find_unsolvable_load
 from bemkit.contact.certificate import Certificate, certify
+from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
+from bemkit.solvers.floating import FloatingResponse, floating_response
 from bemkit.solvers.newton import consistent_state
 
 
@@ -29,6 +31,10 @@ class Status(Enum):
     )
     SINGULAR = "The body can move freely whatever its contact nodes do; hold it by its boundary conditions."
     UNSOLVABLE_LOAD = "No contact tractions can balance this load; change the load or hold the body."
+    TOO_FAR = (
+        "The load must first carry the body so far to an obstacle that numbers do not hold the deformation beside the "
+        "travel; move body and obstacle together, so that they nearly touch."
+    )
     INNER_FAILED = "An inner solve failed, for the reason given in the message; change the options of the inner solver."
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
@@ -243,7 +249,10 @@ class _Run:
                 escape = find_unsolvable_load(self.problem)
                 if escape is not None:
                     return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
-                iterate = self._first(start)
+                unheld = self._unheld()
+                first = self._first(start)
+                spent = first.linear_solves + (unheld is not None)
+                iterate = self._freed(replace(first, linear_solves=spent), unheld)
             except SingularResponse as error:
                 return self._nothing_done(Status.SINGULAR, str(error))
             history = [self._record(iterate, None)]
@@ -252,8 +261,13 @@ class _Run:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
+                following = self._freed(following, unheld)
                 history.append(self._record(following, iterate, step=len(history)))
                 iterate = following
+            has_failed = status not in (Status.CONVERGED, Status.MAX_STEPS)
+            if has_failed and (travel := find_long_travel(self.problem)) is not None:
+                status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
+                iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
         return self._solution(iterate, status, history)
 
     def _first(self, start: ContactState | None) -> Iterate:
@@ -263,6 +277,27 @@ class _Run:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
         return replace(iterate, linear_solves=iterate.linear_solves + linear_solves)
+
+    def _unheld(self) -> FloatingResponse | None:
+        """Return the response without any contact, if the body floats and its load balances."""
+        body = self.problem.body
+        most = float(body.weights @ np.abs(self.problem.glued_state.traction).sum(axis=1))
+        if np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2))):
+            return None  # far from balanced, which is not worth a linear solve
+        return floating_response(body, separated(body.n_contact))
+
+    def _freed(self, iterate: Iterate, unheld: FloatingResponse | None) -> Iterate:
+        """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.
+
+        Drivers only come ever closer to tractions that vanish. What they leave is no small error, having nothing to be
+        small against.
+        """
+        if unheld is None or not iterate.state.is_finite:
+            return iterate
+        state = unheld.nearest(iterate.state.displacement)
+        if not certify(self.problem, state).is_below(self.tolerance):
+            return iterate
+        return replace(iterate, state=state, message="the body rests without touching")
 
     def _record(self, iterate: Iterate, previous: Iterate | None, step: int = 0) -> StepRecord:
         sets = contact_sets(self.problem, iterate.state)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.conditions import stick
 from bemkit.contact.partwise import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
@@ -89,6 +89,7 @@ class LemkePivoting:
         pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
         force = np.stack([-pressed, backward - forward], axis=1)
         displacement = (free + compliance @ force.ravel()).reshape(-1, 2)
+        displacement = problem.respond(stick(*displacement.T)).displacement  # where the tangent is free it follows
         state = ContactState(displacement, force / problem.body.weights[:, None])
         return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
 
@@ -128,7 +129,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
         if leaving == 2 * n:
             solution = np.zeros(2 * n)
             solution[basis] = np.maximum(tableau[:, -1], 0.0)
-            return solution[n:], n_pivots
+            return _solved_anew(matrix, vector, solution[n:], basis[basis >= n] - n), n_pivots
         entering = leaving + n if leaving < n else leaving - n
         covering = int(np.flatnonzero(basis == 2 * n)[0])
         next_row = _leaving_row(tableau[:, entering], tableau[:, -1], covering, cover_at_start)
@@ -136,6 +137,18 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
             return None, n_pivots
         row = next_row
     return None, limit
+
+
+def _solved_anew(matrix: FloatArray, vector: FloatArray, found: FloatArray, basic: IntArray) -> FloatArray:
+    """Return the solution of the last basis without the round-off that the pivots have gathered."""
+    result = np.zeros_like(found)
+    try:
+        result[basic] = np.linalg.solve(matrix[np.ix_(basic, basic)], -vector[basic])
+    except np.linalg.LinAlgError:
+        return found
+    is_same = np.allclose(result, found, rtol=0.0, atol=1e-6 * found.max(initial=0.0))
+    # variables that are zero in a degenerate basis may come out on the other side of it
+    return np.maximum(result, 0.0) if is_same else found
 
 
 def _leaving_row(column: FloatArray, right_side: FloatArray, covering: int, cover_at_start: float) -> int | None:
@@ -169,24 +182,31 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
 
 
 def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
-    """Return stiffness and load of any body, from its responses to unit displacements, and the solves spent."""
+    """Return stiffness and load of any body, from its responses to unit displacements, and the solves spent.
+
+    Free tangents, which no force ever moves here, become springs of their own.
+    """
     body, n_contact = problem.body, problem.n_contact
     weights = np.repeat(body.weights, 2)
     none = np.zeros(n_contact)
     amount = (float(np.abs(problem.glued_state.traction).max()) or 1.0) / body.stiffness_scale
-    at_rest = body.respond(stick(none, none)).traction.ravel()
+    at_rest = problem.respond(stick(none, none)).traction.ravel()
     stiffness = np.empty((2 * n_contact, 2 * n_contact))
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
-        moved = body.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
+        moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
         stiffness[:, column] = weights * (moved - at_rest) / amount
+    idle = 2 * np.flatnonzero(body.tangent_is_free) + 1
+    stiffness[idle, idle] = weights[idle] * body.stiffness_scale
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
 
 def _springs(problem: ContactProblem, stiffness: FloatArray, state: ContactState) -> tuple[FloatArray, FloatArray]:
     """Return stiffness and load of springs on the free rigid motions, without force at the given state."""
-    motions = problem.body.rigid_motions().reshape(-1, 2 * problem.n_contact)
+    motions = problem.body.rigid_motions()
     if not len(motions):
         return np.zeros_like(stiffness), np.zeros(len(stiffness))
+    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_free], axis=1)
+    motions = (motions * is_held).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
     scale = _SPRING * float(np.diagonal(stiffness).mean())
     springs = scale * orthonormal @ orthonormal.T

@@ -7,6 +7,7 @@ import numpy as np
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.floating import floating_response
 
 _SPRING = 1e-3
 """Springs that hold an unheld body, in units of its stiffness scale. Small: each further step reduces what the
@@ -45,7 +46,8 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets) -> 
     Returns
     -------
     Response
-        If the sets do not hold the body, weak springs from the present displacements hold it during this step.
+        If the sets do not hold the body, it stays near its present displacements: exactly there if the forces on it
+        balance, or else held by weak springs during this step.
 
     Raises
     ------
@@ -57,8 +59,11 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets) -> 
     try:
         return Response(body.respond(linear), 1, is_sprung=False)
     except SingularResponse:
+        floating = floating_response(body, linear)
+        if floating is not None:
+            return Response(floating.nearest(trial.state.displacement), 2, is_sprung=False)
         springs = linear.held_by_springs(trial.state.displacement, _spring(conditions.problem, trial.state))
-        return Response(body.respond(springs), 2, is_sprung=True)
+        return Response(conditions.problem.respond(springs), 2, is_sprung=True)
 
 
 def _spring(problem: ContactProblem, state: ContactState) -> float:

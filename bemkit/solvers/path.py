@@ -132,6 +132,7 @@ class _Path:
         """Respond to fixed statuses, at amount zero and at amount one."""
         problem, bound = self.problem, self.bound
         slips = direction != 0
+        sticks = ~slips & ~problem.body.tangent_is_free  # where the tangent is free there is nothing to follow
         conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
         conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)
@@ -144,7 +145,7 @@ class _Path:
         with_extras = LinearConditions(
             conditions.on_displacement, conditions.on_traction, conditions.value + extra_value
         )
-        origin, shifted = problem.body.respond(conditions), problem.body.respond(with_extras)
+        origin, shifted = problem.respond(conditions), problem.respond(with_extras)
         traction_rate = shifted.traction - origin.traction
         traction_rate[:, 0] -= self.pressure
         rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
@@ -157,7 +158,7 @@ class _Path:
         return _Piece(
             origin,
             rate,
-            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), ~slips, ~slips, slips]),
+            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips]),
             np.stack([*slack, direction * origin_slip]),
             np.stack([*slack_rate, direction * rate.u_t]),
         )

@@ -216,7 +216,7 @@ def _solver(baseline: Solution, value: float, *, make: Callable[[float], Contact
 
 
 def _elements(baseline: Solution, value: float) -> Case:
-    options = replace(baseline.scene.mesh, elements=max(3, round(value * baseline.mesh.n_elements)))
+    options = replace(baseline.scene.mesh, elements=max(3, round(value * baseline.mesh.whole.n_elements)))
     return Case(value, replace(baseline.scene, mesh=options))
 
 

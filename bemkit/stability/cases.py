@@ -124,6 +124,7 @@ def elements_at_ends(mesh: BoundaryMesh) -> np.ndarray[tuple[int, ...], np.dtype
     ends = np.array([1.0]), np.array([-1.0])
     arriving, leaving = (mesh.normals_at(e, xi)[:, 0] for e, xi in zip((incoming, outgoing), ends, strict=True))
     is_end = (np.abs(arriving - leaving).max(axis=1) > 1e-6) | (part[incoming] != part[outgoing])
+    is_end &= incoming != outgoing  # not on a symmetry line
     return np.unique(np.concatenate([incoming[is_end], outgoing[is_end]]))
 
 

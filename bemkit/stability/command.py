@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.complaint import bad_input
+
 if TYPE_CHECKING:
     from bemkit.scene import Scene
     from bemkit.stability.cases import Axis
@@ -46,16 +48,12 @@ def stability(
     uses_stdout = "-" in (csv_file, markdown)
     if csv_file == markdown == "-":
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
-    try:
+    with bad_input():
         _check_outputs(output, csv_file, markdown)
         chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation)
         axes = find_axes(all_axes(), names)
         rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
         _write(axes, rows, csv_file, markdown, folder)
-    except (ValueError, OSError) as error:
-        if not type(error).__module__.startswith("bemkit."):
-            raise
-        raise click.ClickException(str(error)) from error
     if not quiet and not uses_stdout:
         from bemkit.stability.report import print_verdicts
 
@@ -95,12 +93,12 @@ def _computed(
 
 def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> None:
     from bemkit.outputs import check_text
-    from bemkit.stability.files import CSV_START, MARKDOWN_START, check_rows_target, read_rows
+    from bemkit.stability.files import CSV_START, FILE, MARKDOWN_START
 
     if output is not None and Path(output).is_file():
-        read_rows(output)  # says more about a broken file than that it stands in the way
+        FILE.read(output)  # says more about a broken file than that it stands in the way
     if output is not None:
-        check_rows_target(output)
+        FILE.check_target(output)
     check_text(csv_file, "CSV file of stability rows", CSV_START)
     check_text(markdown, "Markdown file of stability tables", MARKDOWN_START)
 

@@ -15,6 +15,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators.rigid import possible_motions
 from bemkit.scene import Clamped, ConstantCollocation, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.solution import Solution
 
@@ -83,17 +84,19 @@ def examine(solution: Solution) -> Evidence:
 
     Notes
     -----
-    Tractions are measured by the largest traction on the boundary, lengths by the displacement that this traction
-    causes across the body, ``stress * diameter / E'``; what is left of rigid motions a million times longer is
-    round-off.
+    Tractions are measured by the largest traction on the boundary, but by no less than their round-off is worth, see
+    `_trusted_stress`. Lengths are measured by the displacement that this traction causes across the body, ``stress *
+    diameter / E'``; what is left of rigid motions a million times longer is round-off. If there are no tractions at
+    all, as in a body that has given way to an overlap, its displacement is the only length there is.
     """
     table = solution.contact
     stress, length = _scales(solution)
     normals = _contact_normals(solution)
     pressure, clearance = -table.sigma_n / stress, table.clearance / length
-    # friction given across the gap is no sign of contact
+    # Friction given across the gap is no sign of contact. A node that is held by less than it is away counts as open
+    # (its complementarity says by how much): whether cohesion acts shall not depend on a traction of 1e-16.
     held = np.maximum(np.abs(pressure), np.where(_acts_across_gap(solution), 0.0, np.abs(table.sigma_t) / stress))
-    bound = _friction_bound(solution, held * stress) / stress
+    bound = _friction_bound(solution, held > np.abs(clearance)) / stress
     shear, slip = table.sigma_t / stress, table.u_t / length
     if len(solution.scene.load_factors) > 1:
         slip = np.zeros_like(slip)  # an increment, of which the last state alone cannot tell
@@ -114,18 +117,29 @@ def _scales(solution: Solution) -> tuple[float, float]:
     """Return the traction [Pa] and the displacement [m] to measure by."""
     modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
     displacement = float(np.abs(solution.boundary.displacement).max())
-    at_contact = [np.abs(solution.contact.sigma_n).max(), np.abs(solution.contact.sigma_t).max()]
-    stress = max(float(np.abs(solution.boundary.traction).max()), *at_contact, _avoided_stress(solution))
+    table = solution.contact
+    tractions = [float(np.abs(each).max()) for each in (solution.boundary.traction, table.sigma_n, table.sigma_t)]
+    trusted = _trusted_stress(solution)
+    stress = max(*tractions, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
+    if max(tractions) <= CONTACT_LIMIT * trusted:  # the body has only moved: a hundredth of that, to be strict
+        length = max(length, 1e-2 * displacement)
     return stress or 1.0, length or 1.0
 
 
-def _avoided_stress(solution: Solution) -> float:
-    """Return the stress [Pa] below which a body that gives way to an overlap, or only moves, has round-off alone."""
-    overlap = float(np.maximum(-solution.contact.gap, 0.0).max())
-    displacement = float(np.abs(solution.boundary.displacement).max())
-    strain = max(1e-2 * overlap, 1e-4 * displacement) / solution.mesh.diameter
-    return strain * solution.scene.material.plane_modulus
+def _trusted_stress(solution: Solution) -> float:
+    """Return the stress [Pa] whose `CONTACT_LIMIT`-th part is the round-off of tractions: the least to measure by.
+
+    Numbers hold a displacement to some eps of its size. Across a contact node of length h that is the strain
+    ``eps |u| / h``, times E' a stress, which a bulk modulus beyond E' multiplies. A body that only moves, say because
+    an overlap has pushed it aside, has no tractions but these. Tiny elements and nearly incompressible bodies are no
+    excuse for tractions beyond 1e-10 of those by which the displacement would strain the whole body.
+    """
+    material, diameter = solution.scene.material, solution.mesh.diameter
+    freedom = 1.0 if material.is_incompressible else 1.0 - 2.0 * material.effective_poisson_ratio
+    digits = 64.0 * np.finfo(float).eps * diameter / (float(solution.contact.weight.min()) * freedom)
+    strain = float(np.abs(solution.boundary.displacement).max()) / diameter
+    return min(digits / CONTACT_LIMIT, 1e-4) * strain * material.plane_modulus
 
 
 def _contact_elements(solution: Solution) -> dict[str, IntArray]:
@@ -178,21 +192,25 @@ def _law(solution: Solution) -> FrictionLaw:
     return solution.scene.law_at(table.part, np.column_stack([table.x, table.y]))
 
 
-def _friction_bound(solution: Solution, held: FloatArray) -> FloatArray:
-    """Return the bound [Pa] at the present pressures; zero where nothing is held, unless the law acts there too."""
+def _friction_bound(solution: Solution, is_closed: BoolArray) -> FloatArray:
+    """Return the bound [Pa] at the present pressures; zero at open nodes, unless the law acts there too."""
     law = _law(solution)
     bound = law.bound(np.minimum(solution.contact.sigma_n, 0.0))
-    return np.where((held > 0.0) | np.asarray(law.acts_across_gap), bound, 0.0)
+    return np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)
 
 
 def _imbalance(solution: Solution, normals: FloatArray) -> float:
-    """Return the work of loads and contact tractions on free rigid motions over the work of their sizes."""
+    """Return the work of loads and contact tractions on free rigid motions over that of all forces on the body.
+
+    To these belong the reactions of supports, which squeeze a body by forces of any size without work on free motions.
+    """
     mesh, table = solution.mesh, solution.contact
     free = _free_motions(solution)
     tangents = np.column_stack([-normals[:, 1], normals[:, 0]])
     contact = table.weight[:, None] * (table.sigma_n[:, None] * normals + table.sigma_t[:, None] * tangents)
     work = contact.ravel() @ _motions(mesh, np.column_stack([table.x, table.y])).reshape(-1, 3)
-    size = float(np.abs(contact).sum()) + _avoided_stress(solution) * mesh.diameter
+    size = float(np.abs(contact).sum()) + _trusted_stress(solution) * mesh.diameter
+    size += float(np.abs(solution.boundary.traction * mesh.lengths[:, None]).sum())
     xi, weights = gauss_legendre(8)
     factor = solution.scene.load_factors[-1]
     space = solution.scene.discretisation.displacement_space(mesh)
@@ -221,9 +239,7 @@ def _motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
 def _free_motions(solution: Solution) -> FloatArray:
     """Return (n_free, 3) coefficients of the rigid motions that no support resists."""
     mesh = solution.mesh
-    if mesh.is_exterior:  # at rest at infinity
-        return np.zeros((0, 3))
-    rows = [np.zeros((1, 3))]
+    rows = [np.eye(3)[[motion for motion in range(3) if motion not in possible_motions(mesh)]], np.zeros((1, 3))]
     for part in solution.scene.parts:
         elements = mesh.part(part.name)
         for xi in (-0.7, 0.3):
@@ -258,7 +274,9 @@ def _reciprocity(solution: Solution, stress: float) -> float:
     nu = material.effective_poisson_ratio
     states = (([[1 - nu, 0], [0, -nu]], [[1, 0], [0, 0]]), ([[-nu, 0], [0, 1 - nu]], [[0, 0], [0, 1]]))
     worst = 0.0
-    for strain, unit in (*states, ([[0, 1], [1, 0]], [[0, 1], [1, 0]])):
+    # shear is not symmetric: about a symmetry line the images answer it with the opposite sign
+    shear = ([[0, 1], [1, 0]], [[0, 1], [1, 0]])
+    for strain, unit in states if mesh.symmetry else (*states, shear):
         given = np.einsum("nc,nqc,nq->nq", boundary.traction, places @ np.array(strain), shares)
         traction = 2.0 * material.shear_modulus * normals @ np.array(unit)
         answer = np.einsum("nqc,nqc,nq->nq", traction, displacement, shares)
@@ -270,7 +288,8 @@ def _reciprocity(solution: Solution, stress: float) -> float:
 def _displacement_at(solution: Solution, xi: FloatArray) -> FloatArray:
     """Return (n_elements, n_xi, 2) displacements [m] without their rigid part, which uniform stresses do not see."""
     mesh, boundary = solution.mesh, solution.boundary
-    motions = _motions(mesh, boundary.points).reshape(-1, 3)
+    possible = list(possible_motions(mesh))
+    motions = _motions(mesh, boundary.points)[:, :, possible].reshape(2 * len(boundary.points), len(possible))
     rigid = np.linalg.lstsq(motions, boundary.displacement.ravel(), rcond=None)[0]
     displacement = boundary.displacement - (motions @ rigid).reshape(-1, 2)
     space = solution.scene.discretisation.displacement_space(mesh)

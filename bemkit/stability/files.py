@@ -2,110 +2,40 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, fields
+from dataclasses import astuple, fields
 from pathlib import Path
 
 import numpy as np
 
-from bemkit.files import check_target
-from bemkit.hdf5 import ResultFileError, created, opened, write_attributes, write_table, write_text
-from bemkit.io import provenance
+from bemkit.rowfile import RowFile, csv_text
 from bemkit.stability.cases import Axis
 from bemkit.stability.sweep import Row
 
-FORMAT = "bemkit-stability"
-SCHEMA_VERSION = 1
+FILE = RowFile("bemkit-stability", 1, "bemkit stability", Row, ("scene",))
 CSV_START = "axis,value,verdict,status,"
 MARKDOWN_START = "### "
 
-_TEXTS = ("axis", "verdict", "status", "message")
-_COUNTS = ("linear_solves",)
-_NUMBERS = tuple(field.name for field in fields(Row) if field.name not in (*_TEXTS, *_COUNTS))
-_MAX_SCENE = 1_000_000
-
-
-def check_rows_target(path: str | Path) -> Path:
-    """Find out, before any work is done, whether rows can be written to a file; see `bemkit.files.check_target`."""
-    return check_target(Path(path), "bemkit stability file", _is_own)
-
 
 def write_rows(path: str | Path, scene: str, rows: Sequence[Row]) -> None:
-    """Write rows to an HDF5 file, replacing an older one at once or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    scene : str
-        The baseline as TOML.
-    rows : sequence of Row
-
-    Raises
-    ------
-    OutputFileError
-        If the file cannot be written, or a file that is not a bemkit stability file stands in the way.
-    """
-    target = check_rows_target(path)
-    with created(target) as file:
-        write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
-        write_text(file, "scene", scene)
-        write_attributes(file.create_group("provenance"), provenance())
-        columns = {name: [getattr(row, name) for row in rows] for name in _TEXTS}
-        numbers = {name: np.array([getattr(row, name) for row in rows], dtype=float) for name in _NUMBERS}
-        counts = {name: np.array([getattr(row, name) for row in rows], dtype=np.int64) for name in _COUNTS}
-        write_table(file.create_group("rows"), columns | numbers | counts)
+    """Write rows and the baseline as TOML to an HDF5 file; see `bemkit.rowfile.RowFile.write`."""
+    FILE.write(path, {"scene": scene}, rows)
 
 
 def read_rows(path: str | Path) -> tuple[str, tuple[Row, ...]]:
-    """Read the scene (TOML) and the rows of a stability file.
-
-    Raises
-    ------
-    ResultFileError
-        If the file is not a complete stability file of a known version.
-    """
-    with opened(Path(path), made_by="bemkit stability -o") as reader:
-        marks = reader.attributes("/")
-        if marks.get("format") != FORMAT:
-            raise reader.error("an HDF5 file, but not of 'bemkit stability -o': choose another name")
-        if marks.get("schema_version") != SCHEMA_VERSION:
-            raise reader.error(
-                f"has layout version {marks.get('schema_version')}, this bemkit reads version {SCHEMA_VERSION}: "
-                "use the bemkit that wrote it, or delete it to begin anew"
-            )
-        scene = reader.text("scene", _MAX_SCENE)
-        columns = reader.table("rows", texts=_TEXTS, floats=_NUMBERS, integers=_COUNTS)
-        values = zip(*columns.values(), strict=True)
-        rows = tuple(_row(dict(zip(columns, row, strict=True))) for row in values)
-        reader.check_seal()
-    return scene, rows
+    """Read the scene (TOML) and the rows of a stability file; see `bemkit.rowfile.RowFile.read`."""
+    labels, rows = FILE.read(path)
+    return labels["scene"], rows
 
 
 def finished_rows(path: str | Path, scene: str) -> dict[tuple[str, float], Row]:
-    """Return the rows of an earlier sweep of the same scene, nothing if there is no file.
-
-    Raises
-    ------
-    ResultFileError
-        If the file cannot be read, or belongs to another scene.
-    """
-    if not Path(path).exists():
-        return {}
-    earlier, rows = read_rows(path)
-    if earlier != scene:
-        raise ResultFileError(f"{path}: holds the sweep of another scene: choose another name or delete it first")
-    return {(row.axis, row.value): row for row in rows}
+    """Return the rows of an earlier sweep of the same scene; see `bemkit.rowfile.RowFile.finished`."""
+    return {(row.axis, row.value): row for row in FILE.finished(path, {"scene": scene})}
 
 
 def to_csv(rows: Iterable[Row]) -> str:
     """Return the rows as comma-separated values with a header line."""
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, [field.name for field in fields(Row)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in rows)
-    return stream.getvalue()
+    return csv_text([field.name for field in fields(Row)], map(astuple, rows))
 
 
 def to_markdown(axes: Sequence[Axis], rows: Sequence[Row]) -> str:
@@ -129,17 +59,3 @@ def cells(row: Row) -> list[str]:
 
 def _short(value: float) -> str:
     return "" if np.isnan(value) else f"{value:.0e}"
-
-
-def _row(values: dict[str, object]) -> Row:
-    texts = {name: str(values[name]) for name in _TEXTS}
-    counts = {name: int(values[name]) for name in _COUNTS}  # type: ignore[call-overload]
-    return Row(**texts, **counts, **{name: float(values[name]) for name in _NUMBERS})  # type: ignore[arg-type]
-
-
-def _is_own(path: Path) -> bool:
-    try:
-        read_rows(path)
-    except ResultFileError:
-        return False
-    return True

@@ -14,6 +14,7 @@ from bemkit.expression import ScalarField, evaluate_field
 from bemkit.geometry.curve import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Scene, Traction
 
 
@@ -46,6 +47,11 @@ class Stretch:
             return normals
         original = normals * np.array(self.factor)
         return np.asarray(original / np.hypot(*original.T)[:, None])
+
+    def moved(self, symmetry: Symmetry) -> Symmetry:
+        """Map symmetry lines."""
+        places = zip((symmetry.x, symmetry.y), self.factor, self.shift, strict=True)
+        return Symmetry(*(None if place is None else place * factor + shift for place, factor, shift in places))
 
     @property
     def is_uniform(self) -> bool:
@@ -166,7 +172,10 @@ def moved_scene(
     material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
     parts = tuple(_moved_part(part, stretch, stress, factor) for part in scene.parts)
     law = MovedLaw(scene.law, stretch, stress)
-    return replace(scene, shape=MovedShape(scene.shape, stretch), material=material, parts=parts, law=law)
+    symmetry = None if scene.symmetry is None else stretch.moved(scene.symmetry)
+    return replace(
+        scene, shape=MovedShape(scene.shape, stretch), material=material, parts=parts, law=law, symmetry=symmetry
+    )
 
 
 def with_gap_offset(scene: Scene, offset: float) -> Scene:

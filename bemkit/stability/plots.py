@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.outputs import save_figure
 from bemkit.stability.cases import Axis
 from bemkit.stability.sweep import Row, Verdict
 
@@ -23,7 +23,6 @@ _SERIES = (
     ("drift", "drift from the reference", "#9A9A9A", "x"),
 )
 _FLOOR = 1e-18
-_PNG_START = b"\x89PNG"
 
 
 def save_plots(axes: Sequence[Axis], rows: Sequence[Row], folder: str | Path) -> tuple[Path, ...]:
@@ -34,19 +33,10 @@ def save_plots(axes: Sequence[Axis], rows: Sequence[Row], folder: str | Path) ->
     OutputFileError
         If a file cannot be written, or a file of another kind stands in the way.
     """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputFileError(f"{folder}: cannot be made ({error.strerror}): choose another name") from error
-    paths = []
-    for axis in axes:
-        own = [row for row in rows if row.axis == axis.name]
-        target = check_target(folder / f"stability-{axis.name}.png", "figure", _is_png)
-        with replacing(target) as temporary:
-            draw_axis(axis, own).savefig(temporary, dpi=150, format="png", metadata={"Software": None})
-        paths.append(target)
-    return tuple(paths)
+    own = {axis.name: [row for row in rows if row.axis == axis.name] for axis in axes}
+    return tuple(
+        save_figure(draw_axis(axis, own[axis.name]), Path(folder) / f"stability-{axis.name}.png") for axis in axes
+    )
 
 
 def draw_axis(axis: Axis, rows: Sequence[Row]) -> Figure:
@@ -77,8 +67,3 @@ def draw_axis(axis: Axis, rows: Sequence[Row]) -> Figure:
     plot.spines[["top", "right"]].set_visible(False)
     plot.legend(fontsize="small", frameon=False)
     return figure
-
-
-def _is_png(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(len(_PNG_START)) == _PNG_START

@@ -133,9 +133,11 @@ def sweep(
     Raises
     ------
     StabilityError
-        If the scene itself has no converged solution.
+        If the scene itself has no converged solution, or no contact.
     """
     finished = {} if finished is None else finished
+    if not scene.contact_parts:
+        raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     baseline = attempt(scene)
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")

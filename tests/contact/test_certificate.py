@@ -8,7 +8,7 @@ from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.handmade import block_problem
+from tests.handmade import block_body, block_problem
 
 SOLVED = block_problem(Coulomb(0.5))
 SOLUTION = solve(SOLVED, SemismoothNewton())
@@ -95,11 +95,12 @@ def test_units_do_not_matter(length, stress):
     assert certify(problem, ContactState(u * length, t * stress)).as_dict() == pytest.approx(expected, rel=1e-9)
 
 
-def test_nothing_loaded_nothing_moved_is_perfect():
+@pytest.mark.parametrize("law", [Coulomb(0.3), Tresca(0.3)], ids=["coulomb", "tresca"])
+def test_nothing_loaded_nothing_moved_is_perfect(law):
     body = DenseBody(np.eye(4), np.zeros(4), np.ones(2))
     rest = ContactState(np.zeros((2, 2)), np.zeros((2, 2)))
     for gap in (np.zeros(2), np.ones(2), np.full(2, np.inf)):
-        assert certify(ContactProblem(body, gap, Coulomb(0.3)), rest).worst == 0.0
+        assert certify(ContactProblem(body, gap, law), rest).worst == 0.0
 
 
 def test_open_nodes_carry_shear_only_under_friction_given_across_the_gap():
@@ -113,3 +114,38 @@ def test_open_nodes_carry_shear_only_under_friction_given_across_the_gap():
     free = ContactState(np.array([[-1.0, 0.4]]), np.zeros((1, 2)))
     assert certify(replace(given, law=CohesiveCoulomb(0.0, 0.3)), free).worst < 1e-15
     assert certify(given, free).slip_opposition > 0.1
+
+
+def test_what_is_left_of_tractions_is_measured_by_itself_not_by_those_that_would_hold_the_body():
+    """A loose body lifted out of an overlap of one: 1e-9 of the glued tractions are no round-off."""
+    body = block_body(press=0.0, push=0.0, is_held_sideways=False)
+    problem = ContactProblem(body, np.full(body.n_contact, -1.0), Coulomb(0.5))
+    lifted = -body.motions[0]
+    glued = np.abs(problem.glued_state.traction).max()
+    clean = ContactState(lifted, np.zeros_like(lifted))
+    assert certify(problem, clean).worst < 1e-12
+    left = clean.traction.copy()
+    left[4, 0] = 1e-9 * glued
+    assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-3)
+    left[4, 0] = 1e-14 * glued  # the round-off of sums of terms as large as the glued tractions
+    assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-14)
+
+
+def test_lengths_without_tractions_are_measured_by_the_displacement():
+    body = block_body(press=0.0, push=0.0, is_held_sideways=False)
+    for size in (1e-9, 1.0, 1e9):
+        problem = ContactProblem(body, np.full(body.n_contact, -size), Coulomb(0.5))
+        lifted = -(1.0 - 1e-6) * size * body.motions[0]
+        certificate = certify(problem, ContactState(lifted, np.zeros_like(lifted)))
+        assert certificate.penetration == pytest.approx(1e-6, rel=1e-5)
+
+
+def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_hold_the_body():
+    body = block_body(press=0.0, push=0.0, is_held_sideways=False)
+    problem = ContactProblem(body, np.full(body.n_contact, -1.0), Tresca(0.0))
+    glued = np.abs(problem.glued_state.traction).max()
+    slid = -2.0 * body.motions[0] + body.motions[1]
+    state = ContactState(slid, np.zeros_like(slid))
+    assert certify(problem, state).worst < 1e-12
+    resisted = problem.with_law(Tresca(1e-10 * glued))
+    assert certify(resisted, state).slip_opposition == pytest.approx(1e-3)

@@ -1,5 +1,7 @@
 """Each status is produced, and no failure passes for a success."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ class OnlyClamped:
     n_contact = 2
     weights = np.ones(2)
     stiffness_scale = 1.0
+    tangent_is_free = np.zeros(2, bool)
 
     def __init__(self, *, never=False):
         self.never = never
@@ -96,6 +99,12 @@ CASES = {
         {},
     ),
     "unsolvable load": (Status.UNSOLVABLE_LOAD, block_problem(Coulomb(0.5), press=-1.0), SemismoothNewton(), {}),
+    "too far": (
+        Status.TOO_FAR,
+        replace(block_problem(Coulomb(0.5)), gap=np.full(12, 1e12)),
+        SemismoothNewton(),
+        {},
+    ),
     "inner failed, augmented": (
         Status.INNER_FAILED,
         block_problem(Coulomb(0.5)),
@@ -147,6 +156,7 @@ def test_every_status_has_a_case():
         ("singular later", "the sockets are empty"),
         ("singular at the start", "the sockets are empty"),
         ("unsolvable load", "the load pushes the body away from the obstacle"),
+        ("too far", "times the deformation"),
         ("inner failed, augmented", "inner Newton iteration unfinished after 1 linear solves"),
         ("inner failed, fixed point", "Tresca problem of this step: MAX_STEPS"),
         ("singular stiffness, lemke", "motions that are not listed as rigid"),
@@ -155,6 +165,18 @@ def test_every_status_has_a_case():
 def test_messages_name_the_reason(case, words):
     _, problem, driver, options = CASES[case]
     assert words in solve(problem, driver, throw=False, **options).message
+
+
+@pytest.mark.parametrize("far", [1e8, 1e12])
+def test_only_an_obstacle_that_the_load_needs_is_too_far(far):
+    """A distant obstacle is no trouble where a near one holds the load, and is not blamed for other failures."""
+    problem = block_problem(Coulomb(0.5))
+    gap = np.where(np.arange(12) < 6, far, 0.0)
+    assert solve(replace(problem, gap=gap), SemismoothNewton()).is_converged
+    steps = {"max_steps": 0, "throw": False}
+    assert solve(replace(problem, gap=gap), AugmentedLagrangian(rho_n=1e-4), **steps).status is Status.MAX_STEPS
+    stalled = solve(replace(problem, gap=gap), AugmentedLagrangian(inner=InnerNewton(max_steps=1)), throw=False)
+    assert stalled.status is Status.INNER_FAILED
 
 
 @pytest.mark.parametrize("seed", [11, 16, 71, 120, 245, 397, 479])

@@ -84,3 +84,23 @@ def test_tresca_friction_across_a_gap_and_loose_bodies_pass() -> None:
         for discretisation in (LINEAR, CONSTANT):
             evidence = examine(bk.run(block(FLOOR, push, load, law=law, discretisation=discretisation)))
             assert evidence.worst <= 1e-9
+
+
+def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on_it() -> None:
+    inside = bk.Part("inside", bk.Contact(bk.Circle((0.5, -9.99), 10.0)), sides=("bottom",))
+    solution = bk.run(block(inside))
+    table = solution.contact
+    assert examine(solution).is_good
+    assert examine(solution).tension == 0.0
+    # 1e-12 E' per displacement of the body's size: a thousandth of what the old measure, the overlap, let pass
+    per_strain = solution.scene.material.plane_modulus * float(np.abs(table.u_n).max())
+
+    def tension(share: float) -> float:
+        left = np.zeros(table.n_contact)
+        left[3] = share * per_strain
+        return tampered(solution, sigma_n=left).tension
+
+    assert tension(1e-12) > 1e-6
+    assert tension(1e-14) <= 1e-6  # some eps, divided by the share of an element in the body
+    inward = table.clearance - 1e-6 * float(np.abs(table.u_n).max())
+    assert tampered(solution, clearance=inward).penetration > 1e-6

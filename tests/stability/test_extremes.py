@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 
 import bemkit as bk
 from bemkit.runner import UnsolvableSceneError
+from bemkit.solvers.base import Status
 from bemkit.stability.axes import all_axes
 from bemkit.stability.cases import find_axes
 from bemkit.stability.evidence import examine
@@ -202,6 +204,92 @@ def test_a_body_too_far_from_the_origin_is_refused_and_a_far_one_is_not_held_by_
     # the nodes of the wall share their x exactly, or a slanted roller would hold the body against the pull
     with pytest.raises(UnsolvableSceneError, match="upward"):
         bk.run(lifted(0.7e6))
+
+
+@DISCRETISATIONS
+@pytest.mark.parametrize("distance", [1e5, 0.9e7])
+def test_rollers_on_a_far_slanted_wall_do_not_hold_a_body_that_is_pulled_off(
+    discretisation: bk.LinearGalerkin, distance: float
+) -> None:
+    # out there the normals of the elements of one straight wall differ by eps distance / length of an element, 1e-8
+    def turned(pressure: float) -> bk.Scene:
+        axes = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+        corners = [0.7 * distance, 0.6 * distance] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) @ axes
+        vertices = tuple((x, y) for x, y in corners.tolist())
+        floor = bk.Contact(bk.HalfPlane(point=vertices[0], normal=tuple(axes[1].tolist())))
+        parts = (
+            bk.Part("floor", floor, sides=("side-1",)),
+            bk.Part("wall", bk.Roller(), sides=("side-2",)),
+            bk.Part("press", bk.Pressure(pressure), sides=("side-3",)),
+        )
+        return block(*parts, shape=bk.Polygon(vertices), discretisation=discretisation)
+
+    with pytest.raises(UnsolvableSceneError, match=r"at 107\.2 degrees .* 0\.001 N/m; nothing holds it"):
+        bk.run(turned(-1e-3))
+    solution = bk.run(turned(1e-3))
+    assert solution.is_converged
+    assert solution.force_normal == pytest.approx(1e-3, rel=1e-6)  # the length of the wall has nine digits
+
+
+@DISCRETISATIONS
+@pytest.mark.parametrize(("gap", "pressure"), [(1e9, 1e-2), (1e3, 1e-6)])
+def test_a_gap_that_hides_the_deformation_is_named(
+    discretisation: bk.LinearGalerkin, gap: float, pressure: float
+) -> None:
+    low = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -gap))), sides=("bottom",))
+    solution = bk.run(block(low, WALL, press(pressure), discretisation=discretisation))
+    assert solution.status is Status.TOO_FAR
+    assert re.search(r"move body and obstacle together.*the travel is \d\.\de\+\d\d times", solution.message)
+
+
+def loose_scenes() -> dict[str, bk.Scene]:
+    """Bodies that some motion carries nowhere: their open nodes have no traction, not a little."""
+    disk = bk.Disk(1.0, centre=(0.0, 1.0))
+    rollers = [bk.Part(name, bk.Roller(), sides=(name,)) for name in ("arc-3", "arc-4")]
+    far = bk.Part("far", bk.Contact(bk.Gap(0.2)), sides=("arc-2",))
+    tight = bk.Part("tight", bk.Contact(bk.Gap(-6.3e-3)), sides=("arc-3",))
+    below = bk.Part("below", bk.Contact(bk.Circle((0.0, -20.0), 20.0)), sides=("arc-1",))
+    pulls = [bk.Part(name, bk.Pressure(-3.1e-5), sides=(name,)) for name in ("arc-2", "arc-4")]
+    bump, dent = (bk.Contact(bk.Gap(bk.Expression(f"{gap} + x**2"))) for gap in (-1e-2, 0.0))
+    level = bk.Contact(bk.HalfPlane(point=(0.0, 1e-2)))
+    sides = [bk.Part(f"side-{k}", each, sides=(f"side-{k}",)) for k, each in enumerate((bump, level, dent), 1)]
+    lifted = bk.Part("right", bk.PrescribedDisplacement(y=5e-4), sides=("right",))
+    sticky, rough = bk.CohesiveCoulomb(0.0, 4e-9, cap=4e-8), bk.CohesiveCoulomb(100.0, 2.7e-4, cap=2.7e-3)
+    mesh = bk.MeshOptions(22, bk.Algebraic(2.0))
+    return {
+        "may turn between rollers": block(
+            far, bk.Part("p", bk.Pressure(2e-6), sides=("arc-1",)), *rollers, shape=disk, law=sticky, mesh=mesh
+        ),
+        "may turn where it is pinched": block(
+            tight, below, *pulls, shape=disk, law=rough, mesh=bk.MeshOptions(22), discretisation=CONSTANT
+        ),
+        "is pushed out of overlaps": block(
+            *sides,
+            shape=bk.Polygon(((0.14467, 0.51906), (-0.46116, 0.27872), (0.53884, 0.0))),
+            material=bk.Material(1.0, 0.2),
+            law=bk.Coulomb(0.5),
+            solver=bk.AugmentedLagrangian(max_steps=50),
+            discretisation=bk.QuadraticGalerkin(),
+            mesh=mesh,
+        ),
+        "is lifted by its support": block(
+            bk.Part("far", bk.Contact(bk.Gap(bk.Expression("8 + x**2"))), sides=("bottom", "top")),
+            lifted,
+            law=rough,
+            mesh=mesh,
+        ),
+    }
+
+
+@pytest.mark.parametrize("name", loose_scenes())
+def test_open_nodes_of_a_body_that_may_still_move_have_no_traction_at_all(name: str) -> None:
+    solution = bk.run(loose_scenes()[name])
+    assert solution.is_converged
+    is_open = solution.contact.clearance > 1e-9 * np.abs(solution.boundary.displacement).max()
+    assert is_open.any()
+    assert not solution.contact.sigma_n[is_open].any()
+    assert not solution.contact.sigma_t[is_open].any()
+    assert examine(solution).is_good
 
 
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.QuadraticGalerkin()])
