@@ -7,34 +7,42 @@ it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.boundary_data import (
+    Units,
+    contact_elements,
+    find_units,
+    frictionless_nodes,
+    nodal_forces,
+    parts_on,
+    supports_on,
+)
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation import CondensedBody, ContactNodes, condense
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace, LinearSpace, QuadraticSpace, break_nodes, dof_points
-from bemkit.operators.nodal import Support, supported
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare, TractionField
+from bemkit.geometry.space import BoundarySpace, dof_points
+from bemkit.operators.material import Material
+from bemkit.operators.nodal import supported
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.work import Work
+from bemkit.plan import Decisions, Formulation, Plan, make_plan
 from bemkit.scene import (
-    Clamped,
-    ConstantCollocation,
     Contact,
     Part,
     PrescribedDisplacement,
     Pressure,
-    QuadraticGalerkin,
-    Roller,
     Scene,
     Traction,
 )
+from bemkit.scene_symmetry import check_symmetry
 
 _FARTHEST = 1e7
 """Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
@@ -42,37 +50,6 @@ _FARTHEST = 1e7
 
 class TooFarError(ValueError):
     """A body whose coordinates are so large that they no longer hold its shape."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """The physical size of one dimensionless unit.
-
-    Parameters
-    ----------
-    centre : (2,) array [m]
-        Where the dimensionless origin sits.
-    length : float [m]
-        Diameter of the body.
-    modulus : float [Pa]
-        E' of the material.
-    stress : float [Pa]
-        The largest load, or the stress that the largest prescribed displacement or interference suggests.
-    """
-
-    centre: FloatArray
-    length: float
-    modulus: float
-    stress: float
-
-    @property
-    def displacement(self) -> float:
-        """Unit of displacements and gaps [m]."""
-        return self.stress / self.modulus * self.length
-
-    def to_physical(self, points: FloatArray) -> FloatArray:
-        """Return dimensionless points [-] in metres."""
-        return self.centre + self.length * points
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +80,8 @@ class Model:
     def under(self, scene: Scene) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
+        Only a law with friction where this model's has none makes it condense the body anew.
+
         Parameters
         ----------
         scene : Scene
@@ -113,12 +92,23 @@ class Model:
         ValueError
             If the scene has another body, other parts, or other kinds of conditions.
         """
-        _check_same_body(self.scene, scene)
+        check_same_body(self.scene, scene)
+        check_symmetry(scene, self.mesh)
         space = self.elastic.displacement_space
-        prescribed = supported(space, _supports(scene, self.mesh, self.units, space)).displacement
-        body = self.body.under(prescribed, _nodal_forces(scene, self.mesh, self.elastic, self.units))
+        supports = supports_on(scene, self.mesh, self.units, space)
+        force = nodal_forces(scene, self.mesh, space, self.units)
+        is_frictionless = frictionless_nodes(scene, self.mesh, space)
+        if np.any(self.body.tangent_is_free & ~is_frictionless[self.nodes.nodes]):
+            body, _ = condense(self.elastic, supports, contact_elements(scene, self.mesh), force, is_frictionless)
+        else:
+            body = self.body.under(supported(space, supports).displacement, force)
         problem = _problem(scene, self.mesh, self.units, body, space)
         return replace(self, scene=scene, body=body, problem=problem)
+
+    @property
+    def work(self) -> Work:
+        """What it took to come here, from the operators on."""
+        return self.body.work
 
     @property
     def places(self) -> tuple[tuple[str, ...], FloatArray]:
@@ -140,18 +130,7 @@ class Model:
         displacement, force = self.body.recover(state)
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
-        traction *= self.units.stress
-        for part, elements, _ in _parts(self.scene, self.mesh):
-            if isinstance(part.condition, Traction | Pressure):
-                traction[elements] = _mean_load(part.condition, self.mesh, elements)
-        is_loose = np.ones(self.mesh.n_elements, bool)
-        for _, elements, _ in _parts(self.scene, self.mesh):
-            is_loose[elements] = False
-        traction[is_loose] = 0.0
-        energy = (
-            0.5 * float(np.sum(displacement * force)) * self.units.stress * self.units.displacement * self.units.length
-        )
-        return displacement * self.units.displacement, traction, energy
+        return physical_fields(self.scene, self.mesh, self.units, displacement, force, traction)
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Give each contact element the mean of the tractions that its nodes interpolate."""
@@ -165,7 +144,7 @@ class Model:
         )
 
 
-def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Model:
+def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None, plan: Plan | None = None) -> Model:
     """Assemble the operators of a scene and condense the body onto its contact boundary.
 
     Parameters
@@ -175,6 +154,8 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) ->
         As made by `Scene.build_mesh`, or a refinement of it.
     units : Units, optional
         By default `find_units` of the scene.
+    plan : Plan, optional
+        Whose decisions are followed; by default `make_plan` of the scene.
 
     Returns
     -------
@@ -188,18 +169,20 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) ->
         If the supports contradict each other or do not hold the body even with glued contact, or an expression is not
         finite somewhere.
     """
-    _check_position(mesh)
+    check_position(mesh)
+    check_symmetry(scene, mesh)
     units = find_units(scene, mesh) if units is None else units
-    unit_mesh = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / units.length)
-    elastic = _elastic_map(scene, unit_mesh, units)
-    force = _nodal_forces(scene, mesh, elastic, units)
-    supports = _supports(scene, mesh, units, elastic.displacement_space)
-    body, nodes = condense(elastic, supports, contact_elements(scene, mesh), force)
+    plan = make_plan(scene, mesh) if plan is None else plan
+    elastic = elastic_map(plan.decisions, mesh.unit, scene.material.scaled(units.modulus))
+    force = nodal_forces(scene, mesh, elastic.displacement_space, units)
+    supports = supports_on(scene, mesh, units, elastic.displacement_space)
+    is_frictionless = frictionless_nodes(scene, mesh, elastic.displacement_space)
+    body, nodes = condense(elastic, supports, contact_elements(scene, mesh), force, is_frictionless)
     problem = _problem(scene, mesh, units, body, elastic.displacement_space)
     return Model(scene, mesh, units, elastic, body, nodes, problem)
 
 
-def _check_position(mesh: BoundaryMesh) -> None:
+def check_position(mesh: BoundaryMesh) -> None:
     """Refuse a body so far from the origin that its coordinates hold too few digits of its shape."""
     distance = float(np.abs(mesh.nodes).max()) / mesh.diameter
     if distance > _FARTHEST:
@@ -218,17 +201,41 @@ def _problem(
     return ContactProblem(body, _gap(scene, mesh, body.nodes, space, units), law.scaled(units.stress))
 
 
-def _nodal_forces(scene: Scene, mesh: BoundaryMesh, elastic: SteklovPoincare, units: Units) -> FloatArray:
-    force = np.zeros((elastic.displacement_space.n_dofs // 2, 2))
-    for part, elements, _ in _parts(scene, mesh):
+def physical_fields(
+    scene: Scene,
+    mesh: BoundaryMesh,
+    units: Units,
+    displacement: FloatArray,
+    force: FloatArray,
+    traction: FloatArray,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the physical fields on the whole boundary that belong to dimensionless ones.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : BoundaryMesh
+    units : Units
+    displacement, force : (n_nodes, 2) arrays [-]
+        Of the nodes of the displacement space.
+    traction : (n_elements, 2) array [-]
+        Its reactions and contact tractions are kept, loads come from the scene.
+
+    Returns
+    -------
+    displacement : (n_nodes, 2) array [m]
+    traction : (n_elements, 2) array [Pa]
+    energy : float [J/m]
+    """
+    traction = traction * units.stress
+    is_loose = np.ones(mesh.n_elements, bool)
+    for part, elements, _ in parts_on(scene, mesh):
+        is_loose[elements] = False
         if isinstance(part.condition, Traction | Pressure):
-            force += elastic.nodal_forces(elements, _dimensionless_load(part.condition, units))
-    return force
-
-
-def contact_elements(scene: Scene, mesh: BoundaryMesh) -> IntArray:
-    """Return the elements of all contact parts, in order along each."""
-    return np.concatenate([along_boundary(mesh, mesh.part(part.name)) for part in scene.contact_parts])
+            traction[elements] = _mean_load(part.condition, mesh, elements)
+    traction[is_loose] = 0.0
+    energy = 0.5 * float(np.sum(displacement * force)) * units.stress * units.displacement * units.length
+    return displacement * units.displacement, traction, energy
 
 
 def contact_places(
@@ -256,17 +263,17 @@ def contact_places(
     return tuple(names[dof] for dof in nodes.nodes.tolist()), arc_length[nodes.nodes]
 
 
-def _elastic_map(scene: Scene, mesh: BoundaryMesh, units: Units) -> SteklovPoincare:
-    material = scene.material.scaled(units.modulus)
-    if isinstance(scene.discretisation, ConstantCollocation):
-        return CollocationMap(mesh, material)
-    if isinstance(scene.discretisation, QuadraticGalerkin):
-        return GalerkinMap(mesh, material, QuadraticSpace(mesh), LinearSpace(mesh, break_nodes(mesh)))
-    return GalerkinMap(mesh, material)
+def elastic_map(decisions: Decisions, mesh: BoundaryMesh, material: Material) -> SteklovPoincare:
+    """Return the map from displacements to forces that was chosen for a scene."""
+    if decisions.formulation is Formulation.COLLOCATION:
+        return CollocationMap(mesh, material, slopes=decisions.takes_slopes)
+    displacements, tractions = decisions.displacement_space(mesh), decisions.traction_space(mesh)
+    return GalerkinMap(mesh, material, displacements, tractions, decisions.linear_solver)
 
 
-def _check_same_body(scene: Scene, other: Scene) -> None:
-    for name in ("shape", "material", "discretisation"):
+def check_same_body(scene: Scene, other: Scene) -> None:
+    """Refuse another scene whose matrices would be others."""
+    for name in ("shape", "material", "symmetry", "discretisation"):
         if getattr(scene, name) != getattr(other, name):
             raise ValueError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
     for part, changed in zip_longest(scene.parts, other.parts):
@@ -281,72 +288,12 @@ def _layout(part: Part) -> tuple[object, ...]:
     return part.name, part.sides, part.where, type(condition), components
 
 
-def _parts(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, FloatArray]]:
-    """List the parts with their elements and the outward normals of these."""
-    return [(part, mesh.part(part.name), mesh.normals[mesh.part(part.name)]) for part in scene.parts]
-
-
-def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
-    """Choose the units by the largest load, prescribed displacement or interference."""
-    modulus, length = scene.material.plane_modulus, mesh.diameter
-    stresses = [0.0]
-    gaps = [0.0]
-    for part, elements, normals in _parts(scene, mesh):
-        points = mesh.points(elements, np.array([-1.0, 0.0, 1.0]))
-        for k in range(points.shape[1]):
-            if isinstance(part.condition, Traction | Pressure):
-                stresses.append(float(np.abs(part.condition.at(points[:, k], normals)).max()))
-            elif isinstance(part.condition, PrescribedDisplacement):
-                stresses.append(float(np.abs(part.condition.at(points[:, k])).max()) / length * modulus)
-            elif isinstance(part.condition, Contact):
-                gap = part.condition.obstacle.gap(points[:, k], normals)
-                # an overlap or gap below the round-off of the coordinates is no measure of anything
-                gap = np.where(np.abs(gap) > 1e-18 * length, gap, 0.0)
-                stresses.append(float(np.maximum(-gap, 0.0).max()) / length * modulus)
-                gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
-    stress = max(stresses) or max(gaps) / length * modulus or modulus
-    return Units(mesh.centre, length, modulus, stress)
-
-
-def _dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField:
-    def field(points: FloatArray, normals: FloatArray) -> FloatArray:
-        return load.at(units.to_physical(points), normals) / units.stress
-
-    return field
-
-
 def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray) -> FloatArray:
     xi, weights = gauss_legendre(5)
     points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
-    values = [0.5 * weight * load.at(points[:, k], normals[:, k]) for k, weight in enumerate(weights)]
-    mean: FloatArray = np.sum(values, axis=0)
+    values = load.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+    mean: FloatArray = np.einsum("q,eqc->ec", 0.5 * weights, values)
     return mean
-
-
-def _supports(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
-    result = []
-    for part, elements, _ in _parts(scene, mesh):
-        condition = part.condition
-        axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
-        if isinstance(condition, Roller):
-            normals = mesh.normals_at(elements, space.local_nodes)
-            result.append(Support(part.name, elements, normals[:, :, None, :]))
-        elif isinstance(condition, Clamped):
-            result.append(Support(part.name, elements, axes))
-        elif isinstance(condition, PrescribedDisplacement):
-            result.append(
-                Support(
-                    part.name, elements, axes[:, list(condition.is_prescribed)], _dimensionless_motion(condition, units)
-                )
-            )
-    return result
-
-
-def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Callable[[FloatArray], FloatArray]:
-    def field(points: FloatArray) -> FloatArray:
-        return condition.at(units.to_physical(points)) / units.displacement
-
-    return field
 
 
 def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, space: BoundarySpace, units: Units) -> FloatArray:

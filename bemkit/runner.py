@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
 
+from bemkit.boundary_data import Units, find_units
+from bemkit.clock import StageClock
 from bemkit.contact.admissibility import find_unsolvable_load
-from bemkit.contact.body import ContactState
+from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
 from bemkit.history import load_steps
-from bemkit.model import Model, build_model, find_units
+from bemkit.model import Model, build_model
+from bemkit.operators.stopwatch import assembly_time
 from bemkit.operators.threads import blas_threads_for
-from bemkit.plan import Plan, make_plan
-from bemkit.scene import Scene
-from bemkit.solution import BoundaryFields, ContactTable, Solution, find_transitions
+from bemkit.plan import Plan, Stage, check_memory, make_plan
+from bemkit.scene import NoContactError, Scene
+from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
 from bemkit.solvers.probe import probe
 from bemkit.warm_start import state_on
@@ -50,7 +52,7 @@ def run(
         accuracy needs.
     start : Solution, optional
         Where to start, on any mesh; see `bemkit.cascade.run_cascade`. By default every node sticks. Where a scene has
-        several solutions the start chooses among them.
+        several solutions the start chooses among them. Refused without contact, where there is only one.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 
@@ -64,6 +66,8 @@ def run(
     ------
     UnsolvableSceneError
         If no contact tractions can balance the load, or the body can move freely.
+    FreeBodyError
+        If no part is in contact and the supports leave a rigid motion free.
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
@@ -106,11 +110,12 @@ def run_history(
     steps = [step for scene in scenes for step in load_steps(scene)]
     if not steps:
         raise ValueError("scenes is empty: give at least one scene")
-    clock = [time.perf_counter()]
+    clock = StageClock.start()
     mesh = steps[0].build_mesh() if mesh is None else mesh
-    plan = make_plan(scenes[0], mesh)
-    clock.append(time.perf_counter())
-    with blas_threads_for(steps[0].discretisation.displacement_space(mesh).n_dofs):
+    plan = make_plan(scenes[0], mesh, steps=steps)
+    check_memory(plan)
+    clock = clock.closed(Stage.MESH)
+    with blas_threads_for(plan.sizes.n_displacements):
         return tuple(_solve_in_turn(steps, mesh, plan, start, callback, clock))
 
 
@@ -120,24 +125,57 @@ def _solve_in_turn(
     plan: Plan,
     start: Solution | None,
     callback: Callable[[StepRecord], None] | None,
-    clock: list[float],
+    clock: StageClock,
 ) -> list[Solution]:
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
-    model = build_model(steps[0], mesh, units)
+    if not plan.decisions.has_contact:
+        if start is not None:
+            raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+        return _solve_without_contact(steps, mesh, units, plan, callback, clock)
+    with assembly_time() as assembly:
+        model = build_model(steps[0], mesh, units, plan)
+    clock = clock.closed_build(assembly)
     state = None if start is None else state_on(model, start)
     solutions: list[Solution] = []
     for step in steps:
         if solutions and state is not None:
             model = model.under(step)
             model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
-        clock.append(time.perf_counter())
+        clock = clock.closed(Stage.CONDENSE)
         result = solve(model.problem, step.solver, start=state, throw=False, callback=callback)
         if not result.history:
             raise UnsolvableSceneError(_reason(model, result))
-        clock.append(time.perf_counter())
+        clock = clock.closed(Stage.SOLVE)
         solutions.append(_solution(model, result, plan, clock))
-        clock = [clock[-1]] * 2  # the later steps build no mesh
+        clock = StageClock.start()
         state = result.state
+        if not result.is_converged:
+            break
+    return solutions
+
+
+def _solve_without_contact(
+    steps: Sequence[Scene],
+    mesh: BoundaryMesh,
+    units: Units,
+    plan: Plan,
+    callback: Callable[[StepRecord], None] | None,
+    clock: StageClock,
+) -> list[Solution]:
+    with assembly_time() as assembly:
+        model = build_elastic_model(steps[0], mesh, units, plan)
+    clock = clock.closed_build(assembly)
+    solutions: list[Solution] = []
+    for step in steps:
+        if solutions:
+            model = model.under(step)
+        clock = clock.closed(Stage.CONDENSE)
+        result = model.certified()
+        if callback is not None:
+            callback(result.history[-1])
+        clock = clock.closed(Stage.SOLVE)
+        solutions.append(_solution(model, result, plan, clock))
+        clock = StageClock.start()
         if not result.is_converged:
             break
     return solutions
@@ -148,13 +186,19 @@ def _reason(model: Model, result: ContactSolution) -> str:
     return result.message if escape is None else describe_escape(model, escape)
 
 
-def _solution(model: Model, result: ContactSolution, plan: Plan, clock: list[float]) -> Solution:
-    """Turn what the driver found into physical fields; appends to the clock when that is done."""
-    fields, energy = _fields(model, result.state)
-    table = _contact_table(model, result)
-    clock.append(time.perf_counter())
-    timings = dict(zip(("mesh", "assemble", "solve", "recover"), np.diff(clock).tolist(), strict=True))
-    timings["total"] = clock[-1] - clock[0]
+def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, clock: StageClock) -> Solution:
+    """Turn what the driver found into physical fields."""
+    transitions: tuple[Transition, ...] = ()
+    if isinstance(model, ElasticModel):
+        displacement, traction, energy = model.boundary_fields()
+        table = ContactTable.empty()
+    else:
+        displacement, traction, energy = model.boundary_fields(result.state)
+        table = _contact_table(model, result)
+        transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
+    points = dof_points(model.elastic.displacement_space, model.mesh)
+    fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
+    clock = clock.closed(Stage.RECOVER)
     return Solution(
         scene=model.scene,
         mesh=model.mesh,
@@ -165,12 +209,14 @@ def _solution(model: Model, result: ContactSolution, plan: Plan, clock: list[flo
         history=result.history,
         linear_solves=result.linear_solves,
         outer_steps=result.steps,
-        force_normal=-float(np.sum(table.weight * table.sigma_n)),
+        force_normal=float(np.sum(-table.weight * table.sigma_n)),
         force_tangential=float(np.sum(table.weight * table.sigma_t)),
         energy=energy,
-        transitions=find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement),
-        timings=timings,
+        transitions=transitions,
+        timings=clock.timings,
+        memory=clock.memory,
         plan=plan,
+        work=model.work,
         message=result.message,
     )
 
@@ -192,6 +238,7 @@ def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
         linear_solves=spent,
         outer_steps=sum(step.outer_steps for step in steps),
         timings={name: sum(step.timings[name] for step in steps) for name in last.timings},
+        memory={name: max(step.memory.get(name, 0) for step in steps) for name in steps[0].memory},
         message=f"load step {len(steps)} of {len(scene.load_factors)}: {last.message}",
     )
 
@@ -222,20 +269,25 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     UnsolvableSceneError, ValueError
         As for `run`; also if the scene has a load history or `n_starts` is negative.
     """
+    if not scene.contact_parts:
+        raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if len(scene.load_factors) > 1:
         raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
-    clock = [time.perf_counter()]
+    clock = StageClock.start()
     mesh = scene.build_mesh() if mesh is None else mesh
     plan = make_plan(scene, mesh)
-    clock.append(time.perf_counter())
-    model = build_model(scene, mesh)
+    check_memory(plan)
+    clock = clock.closed(Stage.MESH)
+    with assembly_time() as assembly:
+        model = build_model(scene, mesh, plan=plan)
+    clock = clock.closed_build(assembly)
     escape = find_unsolvable_load(model.problem)
     if escape is not None:
         raise UnsolvableSceneError(describe_escape(model, escape))
-    clock.append(time.perf_counter())
+    clock = clock.closed(Stage.CONDENSE)
     found = probe(model.problem, scene.solver, n_starts=n_starts)
-    clock.append(time.perf_counter())
-    return tuple(_solution(model, result, plan, list(clock)) for result in found)
+    clock = clock.closed(Stage.SOLVE)
+    return tuple(_solution(model, result, plan, clock) for result in found)
 
 
 def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution]:
@@ -254,12 +306,6 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
         In the order of the scenes.
     """
     return list(map(run, scenes)) if executor is None else list(executor.map(run, scenes))
-
-
-def _fields(model: Model, state: ContactState) -> tuple[BoundaryFields, float]:
-    displacement, traction, energy = model.boundary_fields(state)
-    points = dof_points(model.elastic.displacement_space, model.mesh)
-    return BoundaryFields(points, displacement, model.mesh.centres.copy(), traction), energy
 
 
 def _contact_table(model: Model, result: ContactSolution) -> ContactTable:

@@ -7,7 +7,7 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +17,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
 from bemkit.estimate import element_errors
+from bemkit.geometry.folding import unfolded
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.work import Work
 from bemkit.plan import Plan
 from bemkit.scene import ConstantCollocation, Scene
 from bemkit.solvers.active_sets import NodeStatus
@@ -81,6 +83,12 @@ class ContactTable:
         wrong = np.flatnonzero(~np.isin(self.status, [int(status) for status in NodeStatus]))
         if wrong.size:
             raise ValueError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
+
+    @classmethod
+    def empty(cls) -> ContactTable:
+        """Return the table of a scene without contact."""
+        none = np.zeros(0)
+        return cls((), *(none,) * 9, np.zeros(0, np.intp), none)
 
     @property
     def n_contact(self) -> int:
@@ -279,7 +287,12 @@ class Solution:
         Elastic energy 1/2 a(u, u).
     transitions : tuple of Transition
     timings : mapping of str to float [s]
+        Of each stage of the run, and of all.
     plan : Plan
+    work : Work
+        What was computed; equal to ``plan.work`` if all load steps converged.
+    memory : mapping of str to int [bytes]
+        Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
     """
 
     scene: Scene
@@ -297,7 +310,9 @@ class Solution:
     transitions: tuple[Transition, ...]
     timings: Mapping[str, float]
     plan: Plan
+    work: Work
     message: str = ""
+    memory: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def is_converged(self) -> bool:
@@ -309,8 +324,11 @@ class Solution:
         """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
         if isinstance(self.scene.discretisation, ConstantCollocation):
             return None
-        space = self.scene.discretisation.displacement_space(self.mesh)
-        return element_errors(space, self.boundary.displacement, self.scene.material.plane_modulus)
+        make_space = self.scene.discretisation.displacement_space
+        whole = make_space(self.mesh.whole)
+        displacement = unfolded(make_space(self.mesh), whole, self.boundary.displacement)
+        errors = element_errors(whole, displacement, self.scene.material.plane_modulus)
+        return errors[: self.mesh.n_elements]
 
     @cached_property
     def estimated_error(self) -> float | None:
@@ -328,7 +346,8 @@ class Solution:
             ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
             ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
             ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``,
-            ``timings`` [s], ``plan``.
+            ``timings`` [s], ``plan``, ``work``,
+            ``memory`` [bytes].
         """
         return {
             "title": self.scene.title,
@@ -347,4 +366,6 @@ class Solution:
             "certificate": self.certificate.as_dict(),
             "timings": dict(self.timings),
             "plan": self.plan.as_dict(),
+            "work": self.work.as_dict(),
+            "memory": dict(self.memory),
         }
