@@ -39,10 +39,12 @@ if TYPE_CHECKING:
     from bemkit.geometry.shapes import Polygon as Polygon
     from bemkit.geometry.shapes import Rectangle as Rectangle
     from bemkit.geometry.shapes import Ring as Ring
+    from bemkit.geometry.shapes import Sector as Sector
     from bemkit.geometry.space import ConstantSpace as ConstantSpace
     from bemkit.geometry.space import LinearSpace as LinearSpace
     from bemkit.geometry.space import QuadraticSpace as QuadraticSpace
     from bemkit.geometry.space import corner_nodes as corner_nodes
+    from bemkit.geometry.symmetry import Symmetry as Symmetry
     from bemkit.interior import interior_fields as interior_fields
     from bemkit.io import read_result as read_result
     from bemkit.io import write_result as write_result
@@ -52,6 +54,9 @@ if TYPE_CHECKING:
     from bemkit.operators.boundary import hypersingular as hypersingular
     from bemkit.operators.boundary import mass as mass
     from bemkit.operators.boundary import single_layer as single_layer
+    from bemkit.operators.linear import Automatic as Automatic
+    from bemkit.operators.linear import DenseCholesky as DenseCholesky
+    from bemkit.operators.linear import Krylov as Krylov
     from bemkit.operators.material import Material as Material
     from bemkit.operators.material import Plane as Plane
     from bemkit.operators.representation import InteriorFields as InteriorFields
@@ -60,6 +65,7 @@ if TYPE_CHECKING:
     from bemkit.operators.stress import principal_stresses as principal_stresses
     from bemkit.operators.stress import von_mises as von_mises
     from bemkit.plan import make_plan as make_plan
+    from bemkit.reference.shipped import find_reference as find_reference
     from bemkit.runner import run as run
     from bemkit.runner import run_all as run_all
     from bemkit.runner import run_history as run_history
@@ -97,8 +103,9 @@ _HOME = {
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
     "geometry.selection": ("Selection",),
-    "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring"),
+    "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring", "Sector"),
     "geometry.space": ("ConstantSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
+    "geometry.symmetry": ("Symmetry",),
     "interior": ("interior_fields",),
     "io": ("read_result", "write_result"),
     "operators.boundary": (
@@ -109,11 +116,13 @@ _HOME = {
         "mass",
         "single_layer",
     ),
+    "operators.linear": ("Automatic", "DenseCholesky", "Krylov"),
     "operators.material": ("Material", "Plane"),
     "operators.representation": ("InteriorFields",),
     "operators.steklov_poincare": ("CollocationMap", "GalerkinMap"),
     "operators.stress": ("principal_stresses", "von_mises"),
     "plan": ("make_plan",),
+    "reference.shipped": ("find_reference",),
     "runner": ("run", "run_all", "run_history", "run_probe"),
     "scene": (
         "Clamped",

@@ -1,6 +1,18 @@
-"""Run the command line with `python -m bemkit`."""
+"""The entry of the command line, as `bemkit` and as `python -m bemkit`."""
 
-from bemkit.cli import main
+import sys
+
+
+def main() -> None:
+    """Load the command line and run it; Ctrl-C while it loads ends like Ctrl-C later."""
+    try:
+        from bemkit.cli import main as run
+
+        run()
+    except KeyboardInterrupt:
+        sys.stderr.write("bemkit: error: interrupted; no file is half written\n")
+        sys.exit(130)
+
 
 if __name__ == "__main__":
     main()

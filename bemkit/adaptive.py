@@ -15,9 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.partition import SPREAD, Partition, better_partition
 from bemkit.mesh_options import MOST_ELEMENTS
+from bemkit.plan import make_plan, this_machine
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
@@ -62,12 +64,13 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         raise ValueError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
     begin = time.perf_counter()
     contact = [part.name for part in scene.contact_parts]
-    partition = options.first_partition(scene.shape.outline(), scene.selections, contact)
+    partition = options.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
     solutions: list[Solution] = []
     most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
     while True:
         started = time.perf_counter()
-        solution = run(scene, mesh=partition.mesh, start=solutions[-1] if solutions else None, callback=callback)
+        start = solutions[-1] if solutions and contact else None
+        solution = run(scene, mesh=partition.mesh, start=start, callback=callback)
         solutions.append(solution)
         now = time.perf_counter()
         if not solution.is_converged:
@@ -85,9 +88,17 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         n_elements = len(partition.sides)
         if n_elements > most_elements:
             return _ending(solutions, f"more than {most_elements} elements would be needed")
-        expected = (now - started) * (n_elements / solution.mesh.n_elements) ** 2
-        if options.most_seconds is not None and now - begin + expected > options.most_seconds:
-            return _ending(solutions, f"more than {options.most_seconds:g} s would be needed")
+        if options.most_seconds is not None:
+            expected = _expected_seconds(solution, now - started, partition.mesh)
+            if now - begin + expected > options.most_seconds:
+                return _ending(solutions, f"more than {options.most_seconds:g} s would be needed")
+
+
+def _expected_seconds(solution: Solution, spent: float, mesh: BoundaryMesh) -> float:
+    """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
+    machine = this_machine()
+    planned, before = (sum(plan.seconds(machine).values()) for plan in (make_plan(solution.scene, mesh), solution.plan))
+    return spent * planned / before
 
 
 def _error(solution: Solution) -> float:
@@ -115,7 +126,8 @@ def _next_size(solution: Solution, accuracy: float) -> int:
     """Return the number of elements that the accuracy needs, or a step towards it."""
     rate, wish = _rate(solution), _wish(solution)
     allowed = (SAFETY * accuracy) ** 2 * 2.0 * solution.energy
-    needed = (wish.sum() / allowed) ** (1.0 / rate) * wish.sum() / (1.0 - SPREAD) if allowed > 0.0 else 0.0
+    spread = SPREAD if solution.scene.contact_parts else 0.0
+    needed = (wish.sum() / allowed) ** (1.0 / rate) * wish.sum() / (1.0 - spread) if allowed > 0.0 else 0.0
     n_elements = solution.mesh.n_elements
     smallest = SMALLEST_GROWTH if _error(solution) > accuracy else 1.0
     return int(np.clip(needed, smallest * n_elements, LARGEST_GROWTH * n_elements))

@@ -41,12 +41,14 @@ def run_cascade(
     Raises
     ------
     CascadeError
-        If the scene has a load history, whose memory belongs to one mesh.
+        If the scene has a load history, whose memory belongs to one mesh, or no contact.
     ValueError
         If `coarsest` is too small for any mesh, or for the reasons of `bemkit.run`.
     """
     if coarsest < 3:
         raise ValueError(f"coarsest = {coarsest}: give at least 3 elements")
+    if not scene.contact_parts:
+        raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if len(scene.load_factors) > 1:
         raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
     if scene.mesh.accuracy is not None:

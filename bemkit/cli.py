@@ -8,15 +8,17 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from bemkit import __version__
+from bemkit.complaint import bad_input
 from bemkit.stability.command import stability
+from bemkit.study.command import study
 
 if TYPE_CHECKING:
     from bemkit.scene import Scene
@@ -80,6 +82,7 @@ def commands() -> None:
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
+@click.option("--explain", is_flag=True, help="Print planned against measured time and memory, and what was left out.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
 def run(
     scene: str,
@@ -93,23 +96,36 @@ def run(
     solver: str | None,
     rho: float | None,
     cascade: bool,
+    explain: bool,
     quiet: bool,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     from bemkit.outputs import Outputs
 
-    with _bad_input():
+    with bad_input():
         wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
         wanted.check()
         chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
-    with _bad_input(scene):
-        solution = _solve(chosen, cascade=cascade, is_live=not quiet and sys.stderr.isatty())
-    with _bad_input():
+    is_live = not quiet and sys.stderr.isatty()
+    with bad_input(scene):
+        solution = _solve(chosen, cascade=cascade, is_live=is_live)
+        if explain:
+            from bemkit.explain import with_memory
+
+            solution = with_memory(solution, lambda: _solve(chosen, cascade=cascade, is_live=False))
+    solution = replace(solution, plan=solution.plan.with_outputs(wanted.wishes))
+    begin = time.perf_counter()
+    with bad_input():
         wanted.write(solution)
+    output_seconds = time.perf_counter() - begin
     if not quiet and not wanted.uses_stdout:
         from bemkit.report import print_summary
 
         print_summary(solution)
+    if explain:
+        from bemkit.explain import print_explanation
+
+        print_explanation(solution, output_seconds, to_stderr=wanted.uses_stdout)
     return 0 if solution.is_converged else NOT_CONVERGED
 
 
@@ -127,7 +143,7 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    with _bad_input():
+    with bad_input():
         wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
         wanted.check()
         solution = read_result(result)
@@ -158,77 +174,26 @@ def scenes() -> None:
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
 def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.plan import make_plan
+    from bemkit.plan import make_plan, this_machine
+    from bemkit.scene_symmetry import find_symmetry
 
-    with _bad_input():
+    with bad_input():
         chosen = _load(scene, elements, discretisation)
-    with _bad_input(scene):
-        made = make_plan(chosen, chosen.build_mesh())
+    with bad_input(scene):
+        proposal = find_symmetry(chosen) if chosen.symmetry is None else None
+        made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
     if is_json:
         import json
 
-        click.echo(json.dumps(made.as_dict(), indent=2))
+        click.echo(json.dumps(made.as_dict(this_machine()), indent=2))
     else:
         from bemkit.report import print_plan
 
-        print_plan(chosen.title, made)
+        print_plan(chosen.title, made, this_machine())
 
 
+commands.add_command(study)
 commands.add_command(stability)
-
-
-@commands.group()
-def study() -> None:
-    """Many runs that answer one question."""
-
-
-@study.command("paper-tables")
-@click.option("--json", "json_file", metavar="FILE", help="Write the tables as JSON; - is standard output.")
-@click.option("--csv", "csv_file", metavar="FILE", help="Write one row for each pair of rho; - is standard output.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither the progress bar nor the tables.")
-def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> None:
-    """Reproduce the source paper's Tables 1 and 2: outer steps of the augmented Lagrangian method over rho."""
-    from bemkit.outputs import STDOUT, check_text, write_text
-    from bemkit.study import report
-
-    if json_file == csv_file == STDOUT:
-        raise click.UsageError("--csv - and --json - both print to standard output: give one of them")
-    with _bad_input():
-        check_text(json_file, "JSON file", "{")
-        check_text(csv_file, "CSV file of the paper's tables", "table,rho_1")
-        tables = report.compute_with_progress(is_live=not quiet and sys.stderr.isatty())
-        if json_file is not None:
-            write_text(json_file, report.to_json(tables))
-        if csv_file is not None:
-            write_text(csv_file, report.to_csv(tables))
-    if not quiet and STDOUT not in (json_file, csv_file):
-        report.print_paper_tables(tables)
-
-
-@study.command()
-@click.argument("scene")
-@click.option("--starts", type=click.IntRange(min=0), default=8, metavar="N", help="Number of starts (8).")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--json", "json_file", metavar="FILE", help="Write all summaries as JSON; - is standard output.")
-def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
-    """Look for several solutions of SCENE from several starts."""
-    from bemkit.outputs import STDOUT, check_text, write_text
-    from bemkit.plan import check_memory
-    from bemkit.runner import run_probe
-    from bemkit.study import report
-
-    with _bad_input():
-        check_text(json_file, "JSON file", "{")
-        chosen = _load(scene, elements, None)
-    with _bad_input(scene):
-        check_memory(chosen)
-        found = run_probe(chosen, n_starts=starts)
-    with _bad_input():
-        if json_file is not None:
-            write_text(json_file, report.solutions_to_json(found, starts))
-    if json_file != STDOUT:
-        report.print_solutions(found, starts)
-    return 0 if found else NOT_CONVERGED
 
 
 def _load(
@@ -248,10 +213,8 @@ def _load(
 
 
 def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
-    from bemkit.plan import check_memory
     from bemkit.runner import run as solve_scene
 
-    check_memory(scene)
     callback = None
     if is_live:
         from bemkit.report import ConvergenceTable
@@ -266,18 +229,6 @@ def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
 
 def _path(name: str | None) -> Path | None:
     return None if name is None else Path(name)
-
-
-@contextmanager
-def _bad_input(prefix: str = "") -> Iterator[None]:
-    """Turn the errors that bemkit itself names into one line; anything else is a defect and keeps its traceback."""
-    try:
-        yield
-    except (ValueError, OSError) as error:
-        if type(error).__module__.partition(".")[0] != "bemkit":
-            raise
-        message = f"{prefix}: {error}" if prefix else str(error)
-        raise click.ClickException(message) from error
 
 
 def _drop_stdout() -> None:

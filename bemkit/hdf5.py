@@ -172,7 +172,10 @@ class Reader:
 
     def has(self, path: str) -> bool:
         """Whether there is something at a path."""
-        return path in self._file
+        try:
+            return path in self._file
+        except (OSError, RuntimeError, KeyError) as error:
+            raise self.error(f"{path} cannot be read") from error
 
     def floats(self, path: str) -> FloatArray:
         """Return an array of floats."""

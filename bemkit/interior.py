@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bemkit.geometry.folding import unfolded
 from bemkit.geometry.space import ConstantSpace
 from bemkit.operators.representation import InteriorFields
 from bemkit.solution import Solution
@@ -19,8 +20,8 @@ def interior_fields(solution: Solution) -> InteriorFields:
     Returns
     -------
     InteriorFields
-        In physical units; evaluate it at points with ``displacement(points)`` and ``stress(points)``, and see
-        `von_mises` and `principal_stresses`.
+        In physical units, on the whole body also where a symmetry halves it; evaluate it at points with
+        ``displacement(points)`` and ``stress(points)``, and see `von_mises` and `principal_stresses`.
 
     Notes
     -----
@@ -29,8 +30,9 @@ def interior_fields(solution: Solution) -> InteriorFields:
     stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
     mesh = solution.mesh
-    space = solution.scene.discretisation.displacement_space(mesh)
-    boundary = solution.boundary
-    return InteriorFields(
-        mesh, solution.scene.material, space, boundary.displacement, ConstantSpace(mesh), boundary.traction
-    )
+    make_space = solution.scene.discretisation.displacement_space
+    space = make_space(mesh.whole)
+    tractions = ConstantSpace(mesh.whole)
+    displacement = unfolded(make_space(mesh), space, solution.boundary.displacement)
+    traction = unfolded(ConstantSpace(mesh), tractions, solution.boundary.traction)
+    return InteriorFields(mesh.whole, solution.scene.material, space, displacement, tractions, traction)

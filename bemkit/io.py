@@ -5,18 +5,19 @@ stranger runs no code. The layout, version 1:
 
     /                attributes format = "bemkit-result", schema_version, and sha256: a checksum of all the rest
     /scene           text, the scene as TOML
-    /provenance, /summary, /certificate, /timings     attributes
-    /mesh            nodes, elements, part_elements, table parts; attribute is_exterior;
+    /provenance, /summary, /certificate, /timings, /memory     attributes
+    /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
+                     with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
     /boundary        points, displacement, centres, traction
-    /contact, /transitions, /history, /plan           tables: one dataset per column, all of one length
+    /contact, /transitions, /history, /plan, /work    tables: one dataset per column, all of one length;
+                     those of plan and work with numbers as attributes
 """
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -28,8 +29,9 @@ import bemkit
 from bemkit.contact.certificate import Certificate
 from bemkit.files import OutputFileError, check_target
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text
-from bemkit.plan import Plan, PlanItem
+from bemkit.planfile import read_plan, read_work, write_plan, write_work
 from bemkit.scene import Scene
 from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition
@@ -100,7 +102,9 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_table(file.create_group("contact"), contact)
         write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
         write_table(file.create_group("history"), history_columns(solution.history))
-        write_table(file.create_group("plan"), _plan_columns(solution.plan))
+        write_plan(file.create_group("plan"), solution.plan)
+        write_work(file.create_group("work"), solution.work)
+        write_attributes(file.create_group("memory"), solution.memory)
 
 
 def read_result(path: str | Path) -> Solution:
@@ -171,7 +175,9 @@ def _summary(solution: Solution) -> dict[str, Any]:
 
 
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
-    write_attributes(group, {"is_exterior": int(mesh.is_exterior)})
+    lines = {} if mesh.symmetry is None else {"symmetry_x": mesh.symmetry.x, "symmetry_y": mesh.symmetry.y}
+    lines = {name: place for name, place in lines.items() if place is not None}
+    write_attributes(group, {"is_exterior": int(mesh.is_exterior), **lines})
     group["nodes"] = mesh.nodes
     group["elements"] = mesh.elements.astype(np.int64)
     if mesh.element_curve is not None and mesh.element_span is not None:
@@ -187,6 +193,8 @@ def _read_mesh(reader: Reader, scene: Scene) -> BoundaryMesh:
     ends = np.cumsum(parts_table["n_elements"])
     pieces = np.split(reader.integers("mesh/part_elements"), ends)
     is_curved = reader.has("mesh/element_curve")
+    marks = reader.attributes("mesh")
+    x, y = marks.get("symmetry_x"), marks.get("symmetry_y")
     return BoundaryMesh(
         nodes=reader.floats("mesh/nodes"),
         elements=reader.integers("mesh/elements"),
@@ -195,7 +203,8 @@ def _read_mesh(reader: Reader, scene: Scene) -> BoundaryMesh:
         curves=scene.build_mesh().curves if is_curved else (),
         element_curve=reader.integers("mesh/element_curve") if is_curved else None,
         element_span=reader.floats("mesh/element_span") if is_curved else None,
-        is_exterior=bool(reader.attributes("mesh")["is_exterior"]),
+        is_exterior=bool(marks["is_exterior"]),
+        symmetry=None if x is None and y is None else Symmetry(x=x, y=y),
     )
 
 
@@ -221,7 +230,9 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         energy=float(summary["energy"]),
         transitions=_read_transitions(reader),
         timings={name: float(value) for name, value in reader.attributes("timings").items()},
-        plan=_read_plan(reader),
+        plan=read_plan(reader, scene),
+        work=read_work(reader),
+        memory={name: int(value) for name, value in reader.attributes("memory").items()},
         message=str(summary["message"]),
     )
 
@@ -256,19 +267,6 @@ def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
             message=row["message"],
         )
         for row in _rows(columns)
-    )
-
-
-def _plan_columns(plan: Plan) -> dict[str, Any]:
-    rows = [asdict(item) for item in plan.items]
-    texts = {name: [row[name] for row in rows] for name in ("name", "reason")}
-    return texts | {name: np.array([row[name] for row in rows], dtype=np.int64) for name in ("is_needed", "size")}
-
-
-def _read_plan(reader: Reader) -> Plan:
-    columns = reader.table("plan", texts=("name", "reason"), integers=("is_needed", "size"))
-    return Plan(
-        tuple(PlanItem(row["name"], bool(row["is_needed"]), row["reason"], int(row["size"])) for row in _rows(columns))
     )
 
 

@@ -85,6 +85,7 @@ SHAPES = Family(
             "rectangle": "bemkit.geometry.shapes:Rectangle",
             "polygon": "bemkit.geometry.shapes:Polygon",
             "disk": "bemkit.geometry.shapes:Disk",
+            "sector": "bemkit.geometry.shapes:Sector",
             "ring": "bemkit.geometry.shapes:Ring",
             "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
             "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
@@ -148,9 +149,20 @@ DISCRETISATIONS = Family(
     "discretisation",
     MappingProxyType(
         {
-            "linear": "bemkit.scene:LinearGalerkin",
-            "quadratic": "bemkit.scene:QuadraticGalerkin",
-            "constant": "bemkit.scene:ConstantCollocation",
+            "linear": "bemkit.discretisations:LinearGalerkin",
+            "quadratic": "bemkit.discretisations:QuadraticGalerkin",
+            "constant": "bemkit.discretisations:ConstantCollocation",
+        }
+    ),
+)
+
+LINEAR_SOLVERS = Family(
+    "linear solver",
+    MappingProxyType(
+        {
+            "automatic": "bemkit.operators.linear:Automatic",
+            "direct": "bemkit.operators.linear:DenseCholesky",
+            "krylov": "bemkit.operators.linear:Krylov",
         }
     ),
 )

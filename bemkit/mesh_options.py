@@ -11,6 +11,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.partition import Partition, first_partition
 from bemkit.geometry.selection import Selection
+from bemkit.geometry.symmetry import Symmetry
 
 DEFAULT_ELEMENTS = 320
 """Elements where neither a number nor an accuracy is given."""
@@ -27,7 +28,8 @@ class MeshOptions:
     Parameters
     ----------
     elements : int, optional
-        Number of boundary elements in total; 320 if neither this nor an accuracy is given.
+        Number of boundary elements in total; 320 if neither this nor an accuracy is given. Of a scene with a symmetry
+        these are the elements of the whole body, of which a half or a quarter carries unknowns.
     grading : Grading
         Distribution along each piece between corners and ends of parts.
     density : mapping of str to float
@@ -36,7 +38,8 @@ class MeshOptions:
         Wanted error in the energy norm relative to the solution, instead of a number of elements. Meshes then follow
         the solution: see `bemkit.adaptive.run_adaptive`.
     most_elements : int, optional
-        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out.
+        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Of a scene with
+        a symmetry these are the elements with unknowns.
     most_seconds : float, optional [s]
         No mesh is begun that would take longer, all meshes counted; no limit if left out.
 
@@ -84,12 +87,31 @@ class MeshOptions:
         """Number of elements to begin with: `elements`, or those of the first mesh if the accuracy decides."""
         return FIRST_ELEMENTS if self.elements is None else self.elements
 
-    def first_partition(self, outline: Outline, parts: Mapping[str, Selection], contact: Collection[str]) -> Partition:
+    def first_partition(
+        self,
+        outline: Outline,
+        parts: Mapping[str, Selection],
+        contact: Collection[str],
+        symmetry: Symmetry | None = None,
+    ) -> Partition:
         """Divide an outline for the first time if the accuracy decides; `contact` names the contact parts."""
-        return first_partition(outline, parts, FIRST_ELEMENTS, even=contact)
+        return first_partition(outline, parts, FIRST_ELEMENTS, even=contact, symmetry=symmetry)
 
-    def divide(self, outline: Outline, parts: Mapping[str, Selection], contact: Collection[str]) -> BoundaryMesh:
+    def divide(
+        self,
+        outline: Outline,
+        parts: Mapping[str, Selection],
+        contact: Collection[str],
+        symmetry: Symmetry | None = None,
+    ) -> BoundaryMesh:
         """Divide an outline, for the first time if the accuracy decides; `contact` names the contact parts."""
         if self.elements is None:
-            return self.first_partition(outline, parts, contact).mesh
-        return discretise(outline, n_elements=self.elements, parts=parts, grading=self.grading, density=self.density)
+            return self.first_partition(outline, parts, contact, symmetry).mesh
+        return discretise(
+            outline,
+            n_elements=self.elements,
+            parts=parts,
+            grading=self.grading,
+            density=self.density,
+            symmetry=symmetry,
+        )

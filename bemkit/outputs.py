@@ -7,12 +7,18 @@ import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.plan import Wishes
 from bemkit.solution import Solution
 from bemkit.tables import CSV_STARTS, to_json, write_csv
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 STDOUT = "-"
+PNG_START = "\x89PNG"
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,11 @@ class Outputs:
         """Whether standard output is taken by data, so that nothing else may be printed there."""
         return STDOUT in (self.json, self.csv)
 
+    @property
+    def wishes(self) -> Wishes:
+        """What of this a plan knows."""
+        return Wishes(result_file=self.result is not None, figures=self.plots is not None)
+
     def check(self) -> None:
         """Find out, before any work is done, whether everything can be written.
 
@@ -66,7 +77,7 @@ class Outputs:
             shown = ", ".join(str(place) for place in (self.result, self.json, self.csv) if place is not None)
             raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
         if self.plots is not None:
-            self._check_plots(self.plots)
+            check_figures(self.plots, "deformation.png")
 
     def write(self, solution: Solution) -> None:
         """Write everything that is wanted.
@@ -98,27 +109,58 @@ class Outputs:
             save_figures(solution, self.plots)
 
     def _is_csv(self, path: Path) -> bool:
-        return _begins_with(path, CSV_STARTS[self.table])
-
-    @staticmethod
-    def _check_plots(folder: Path) -> None:
-        if find_spec("matplotlib") is None:
-            raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
-        if folder.exists() and not folder.is_dir():
-            raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
-        # any file in the folder, existing or not, could be written if this one can
-        inside = folder / "deformation.png" if folder.exists() else folder
-        check_target(inside, "figure", lambda path: _begins_with(path, "\x89PNG"))
+        return begins_with(path, CSV_STARTS[self.table])
 
 
 def _is_json(path: Path) -> bool:
-    return _begins_with(path, "{")
+    return begins_with(path, "{")
 
 
-def _begins_with(path: Path, start: str) -> bool:
+def begins_with(path: Path, start: str) -> bool:
+    """Tell whether a file begins like one of its kind; every character stands for one byte."""
     expected = start.encode("latin-1")
     with path.open("rb") as stream:
         return stream.read(len(expected)) == expected
+
+
+def check_figures(folder: Path, name: str) -> None:
+    """Find out, before any work is done, whether figures can be drawn and written.
+
+    Parameters
+    ----------
+    folder : Path
+        Need not exist yet.
+    name : str
+        One of the figures: if it can be written, any other can.
+
+    Raises
+    ------
+    OutputFileError
+    """
+    if find_spec("matplotlib") is None:
+        raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
+    if folder.exists() and not folder.is_dir():
+        raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
+    check_target(folder / name if folder.exists() else folder, "figure", lambda path: begins_with(path, PNG_START))
+
+
+def save_figure(figure: Figure, path: Path, dots_per_inch: int = 150) -> Path:
+    """Write a figure as PNG, all or nothing, into a folder that is made if need be; return its path.
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written, or a file of another kind stands in the way.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputFileError(f"{path.parent}: cannot be made ({error.strerror}): choose another name") from error
+    target = check_target(path, "figure", lambda existing: begins_with(existing, PNG_START))
+    with replacing(target) as temporary:
+        # without the time and version stamps the same picture is the same file
+        figure.savefig(temporary, dpi=dots_per_inch, format="png", metadata={"Software": None})
+    return target
 
 
 def check_text(place: str | None, kind: str, start: str) -> None:
@@ -138,7 +180,7 @@ def check_text(place: str | None, kind: str, start: str) -> None:
     OutputFileError
     """
     if place not in (None, STDOUT):
-        check_target(Path(str(place)), kind, lambda path: _begins_with(path, start))
+        check_target(Path(str(place)), kind, lambda path: begins_with(path, start))
 
 
 def write_text(place: str, text: str) -> None:

@@ -1,5 +1,7 @@
 """Figures of a solution: the deformed body, and displacements, tractions and status along the contact boundary.
 
+Without contact, the tractions along the whole boundary instead; see `bemkit.boundary_figure`.
+
 Drawn with matplotlib's object interface, so that no display and no global state is involved.
 """
 
@@ -16,9 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.boundary_figure import draw_boundary_traction
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.files import OutputFileError, check_target, replacing
+from bemkit.geometry.folding import unfolded
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene import ConstantCollocation
 from bemkit.solution import Solution
 
@@ -62,7 +67,7 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
     -------
     tuple of Path
         ``deformation.png``, and for each contact part ``contact-displacement.png``, ``contact-traction.png`` and
-        ``contact-status.png``, numbered if there are several.
+        ``contact-status.png``, numbered if there are several; without contact ``boundary-traction.png``.
 
     Raises
     ------
@@ -77,6 +82,8 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
         raise OutputFileError(f"{target}: the folder cannot be made ({error.strerror}): choose another") from error
     figures = {"deformation": draw_deformation(solution, units=units)}
     parts = list(dict.fromkeys(solution.contact.part))
+    if not parts:
+        figures["boundary-traction"] = draw_boundary_traction(solution, length=units.length, stress=units.stress)
     for number, part in enumerate(parts, start=1):
         suffix = f"-{number}" if len(parts) > 1 else ""
         figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
@@ -100,7 +107,7 @@ def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figur
     from matplotlib.figure import Figure
 
     units = Units() if units is None else units
-    mesh = solution.mesh
+    mesh = solution.mesh.whole
     displacement = node_displacement(solution)
     factor = exaggeration(mesh.diameter, displacement)
     deformed = mesh.nodes + factor * displacement
@@ -113,6 +120,7 @@ def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figur
         axes.plot(*deformed[order].T, color=BLUE, linewidth=1.8, label=enlarged)
     if not mesh.is_exterior:
         _fill(axes, [deformed[mesh.elements[loop, 0]] for loop in mesh.loops])
+    _draw_symmetry_lines(axes, solution.mesh.symmetry)
     axes.set_aspect("equal")
     axes.margins(0.08)
     _draw_obstacles(axes, solution)
@@ -250,14 +258,16 @@ def node_displacement(solution: Solution) -> FloatArray:
     Returns
     -------
     (n_nodes, 2) array [m]
-        Given there directly, or interpolated between the two elements that meet.
+        At the nodes of ``solution.mesh.whole``: given there directly, or interpolated between the two elements that
+        meet.
     """
-    mesh, boundary = solution.mesh, solution.boundary
+    mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
+    displacement = unfolded(make_space(solution.mesh), make_space(mesh), solution.boundary.displacement)
     if isinstance(solution.scene.discretisation, ConstantCollocation):
         before, after = mesh.node_elements.T
         share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
-        return np.asarray(share * boundary.displacement[before] + (1.0 - share) * boundary.displacement[after])
-    return boundary.displacement[: mesh.n_nodes]
+        return np.asarray(share * displacement[before] + (1.0 - share) * displacement[after])
+    return displacement[: mesh.n_nodes]
 
 
 _LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "markersize": 2.0})
@@ -334,6 +344,14 @@ def _fill(axes: Axes, loops: list[FloatArray]) -> None:
 
     outline = Outline.make_compound_path(*(Outline(np.vstack([loop, loop[:1]]), closed=True) for loop in loops))
     axes.add_patch(PathPatch(outline, facecolor="#DCEBF5", edgecolor="none", zorder=1))
+
+
+def _draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
+    style: dict[str, Any] = {"color": "black", "linestyle": "-.", "linewidth": 0.8}
+    if symmetry is not None and symmetry.x is not None:
+        axes.axvline(symmetry.x, **style)
+    if symmetry is not None and symmetry.y is not None:
+        axes.axhline(symmetry.y, **style)
 
 
 def _draw_obstacles(axes: Axes, solution: Solution) -> None:

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bemkit.kinds import DISCRETISATIONS, SOLVERS
-from bemkit.plan import Plan
+from bemkit.plan import Machine, Plan
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -36,22 +36,26 @@ def print_summary(solution: Solution, console: Console | None = None) -> None:
     console.print(table)
 
 
-def print_plan(title: str, plan: Plan) -> None:
-    """Print what a scene needs and what it leaves out."""
+def print_plan(title: str, plan: Plan, machine: Machine) -> None:
+    """Print what a scene needs and what it leaves out, with the costs on a computer."""
     console = Console(highlight=False)
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("")
     table.add_column("item", overflow="fold")
     table.add_column("why", overflow="fold")
     table.add_column("memory", justify="right", no_wrap=True)
+    table.add_column("time", justify="right", no_wrap=True)
     for item in plan.items:
         style = "" if item.is_needed else "dim"
         mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
-        size = format_size(item.size) if item.size else ""
-        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style), size)
+        size = format_size(item.cost.size) if item.cost.size else ""
+        seconds = item.cost.seconds(machine)
+        spent = format_seconds(seconds) if seconds else ""
+        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style), size, spent)
     console.print(Text(title, style="bold"))
     console.print(table)
-    console.print(f"memory about {format_size(plan.memory)}")
+    total = sum(plan.seconds(machine).values())
+    console.print(f"about {format_seconds(total)}, and {format_size(plan.memory)} of memory at the largest moment")
 
 
 class ConvergenceTable:
@@ -92,8 +96,12 @@ def format_size(n_bytes: int) -> str:
     return f"{size:.3g} TB"
 
 
+def format_seconds(seconds: float) -> str:
+    """Return a time in words such as ``3.3 ms``."""
+    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+
+
 def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
-    counts = Counter(solution.contact.status_words())
     certificate = solution.certificate
     worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
     timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
@@ -106,23 +114,42 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     rows = [
         ("status", status),
         ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
-        (
-            "contact nodes",
-            Text(
-                f"{solution.contact.n_contact}: {counts['separated']} separated, {counts['slip']} slip, "
-                f"{counts['stick']} stick"
-            ),
-        ),
-        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
-        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
+        *_symmetry(solution),
+        *_contact(solution),
         ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
         *_estimate(solution),
-        ("transitions", Text("\n".join(_transition_lines(solution)))),
-        ("linear solves", Text(f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})")),
+        *_solve(solution),
         ("certificate", Text(f"worst entry {certificate.worst:.1e} ({worst_name.replace('_', ' ')})")),
         ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
     ]
     return rows
+
+
+def _symmetry(solution: Solution) -> list[tuple[str, Text]]:
+    mesh = solution.mesh
+    if mesh.symmetry is None:
+        return []
+    values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
+    return [("symmetry", Text(f"about {mesh.symmetry}: {values}"))]
+
+
+def _contact(solution: Solution) -> list[tuple[str, Text]]:
+    if not solution.contact.n_contact:
+        return [("contact", Text("none"))]
+    counts = Counter(solution.contact.status_words())
+    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+    return [
+        ("contact nodes", Text(f"{solution.contact.n_contact}: {nodes}")),
+        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
+        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
+    ]
+
+
+def _solve(solution: Solution) -> list[tuple[str, Text]]:
+    if not solution.contact.n_contact:
+        return []
+    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})"
+    return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
 
 
 def _estimate(solution: Solution) -> list[tuple[str, Text]]:

@@ -18,18 +18,27 @@ from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.obstacle import Obstacle
 from bemkit.contact.partwise import PartwiseLaw
 from bemkit.contact.problem import LawError
+from bemkit.discretisations import ConstantCollocation as ConstantCollocation
+from bemkit.discretisations import Discretisation as Discretisation
+from bemkit.discretisations import LinearGalerkin as LinearGalerkin
+from bemkit.discretisations import QuadraticGalerkin as QuadraticGalerkin
 from bemkit.expression import Expression, ScalarField, check_field, closest, evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.mesh_options import MeshOptions as MeshOptions
+from bemkit.operators.linear import Automatic, Krylov, LinearSolverWish
 from bemkit.operators.material import Material
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 
 Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
 """A condition on the coordinates, such as ``Expression("x > 0.5")``."""
+
+
+class NoContactError(ValueError):
+    """A question about contact, asked of a scene without any."""
 
 
 @dataclass(frozen=True)
@@ -192,45 +201,11 @@ class Part:
         return Selection(sides=self.sides, where=self.where)
 
 
-@dataclass(frozen=True)
-class LinearGalerkin:
-    """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
-
-    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the space of the displacements; its nodes carry the contact conditions."""
-        return LinearSpace(mesh)
-
-
-@dataclass(frozen=True)
-class QuadraticGalerkin:
-    """Symmetric Galerkin: displacements continuous and quadratic, tractions linear on each element.
-
-    Tractions are continuous except at corners and at ends of boundary parts. Contact conditions hold at the ends and
-    the middles of elements.
-    """
-
-    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the space of the displacements; the nodes of the mesh are its first dofs."""
-        return QuadraticSpace(mesh)
-
-
-@dataclass(frozen=True)
-class ConstantCollocation:
-    """Direct collocation with displacements and tractions constant on each element, as in the source paper."""
-
-    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the space of the displacements; its nodes are the centres of elements."""
-        return ConstantSpace(mesh)
-
-
-Discretisation: TypeAlias = LinearGalerkin | QuadraticGalerkin | ConstantCollocation
-
-
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """One contact problem: everything that determines its solution.
+    """One body with its supports, loads and contacts: everything that determines the solution.
 
-    Boundary that belongs to no part is free of traction.
+    Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity alone.
 
     Parameters
     ----------
@@ -238,14 +213,19 @@ class Scene:
     shape : Shape
     material : Material
     parts : tuple of Part
-        At least one of them in contact. They must not overlap (checked when the boundary is divided).
+        They must not overlap (checked when the boundary is divided).
     law : FrictionLaw
         On all contact parts that have no law of their own.
     load_factors : tuple of float
         The load history: all tractions, pressures and prescribed displacements times these numbers, one step after
         the other. A single number (the default is 1) is the static law, which judges slip by the total displacement;
         with several, slip counts from the end of the step before (the incremental law).
+    symmetry : Symmetry, optional
+        Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
+        x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
     discretisation : Discretisation
+    linear_solver : LinearSolver or Automatic
+        How the displacements of the body away from the contact boundary are solved for.
     mesh : MeshOptions
     solver : ContactSolver
     description, reference : str
@@ -254,8 +234,9 @@ class Scene:
     Raises
     ------
     ValueError
-        If the title is empty, no part is in contact, two parts share a name, a part names an unknown side, a load
-        factor is missing or not finite, or an accuracy is asked of collocation or of a load history.
+        If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
+        finite, an accuracy is asked of collocation or of a load history, conjugate gradients are asked of collocation,
+        or a law with friction or a solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -266,7 +247,9 @@ class Scene:
     parts: tuple[Part, ...]
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
+    symmetry: Symmetry | None = None
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    linear_solver: LinearSolverWish = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
     description: str = ""
@@ -279,9 +262,14 @@ class Scene:
         if repeated:
             raise ValueError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
         if not self.contact_parts:
-            raise ValueError("parts: no part is in contact: give one part the condition 'contact' with an obstacle")
+            self._check_without_contact()
         if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
             raise ValueError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        if isinstance(self.discretisation, ConstantCollocation) and isinstance(self.linear_solver, Krylov):
+            raise ValueError(
+                f"linear_solver is {self.linear_solver}, which needs symmetric equations, and those of collocation are "
+                "not: choose the discretisation 'linear' or 'quadratic', or leave the linear solver out"
+            )
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         names = [side.name for loop in self.shape.outline().loops for side in loop]
@@ -292,6 +280,14 @@ class Scene:
                     raise ValueError(
                         f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
                     )
+
+    def _check_without_contact(self) -> None:
+        for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
+            if getattr(self, name) != default:
+                raise ValueError(
+                    f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
+                    "part the condition 'contact' with an obstacle"
+                )
 
     def _check_accuracy(self, accuracy: float) -> None:
         if isinstance(self.discretisation, ConstantCollocation):
@@ -309,6 +305,12 @@ class Scene:
     def contact_parts(self) -> tuple[Part, ...]:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    @property
+    def laws(self) -> dict[str, FrictionLaw]:
+        """The friction law of each contact part, by name."""
+        own = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
+        return {name: self.law if law is None else law for name, law in own.items()}
 
     @property
     def selections(self) -> dict[str, Selection]:
@@ -334,13 +336,12 @@ class Scene:
             If a coefficient is not finite or negative somewhere; the message names the part.
         """
         laws, nodes = [], []
-        for part in self.contact_parts:
-            own = np.flatnonzero([name == part.name for name in parts])
-            law = part.condition.law if isinstance(part.condition, Contact) else None
+        for name, law in self.laws.items():
+            own = np.flatnonzero([part == name for part in parts])
             try:
-                laws.append((self.law if law is None else law).at(points[own]))
+                laws.append(law.at(points[own]))
             except ValueError as error:
-                raise LawError(f"part {part.name!r}: friction law: {error}") from error
+                raise LawError(f"part {name!r}: friction law: {error}") from error
             nodes.append(own)
         if len(laws) == 1 or all(law is laws[0] for law in laws):
             return laws[0]
@@ -356,6 +357,12 @@ class Scene:
         Raises
         ------
         GeometryError
-            If parts overlap or are empty, or there are too few elements.
+            If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
         """
-        return self.mesh.divide(self.shape.outline(), self.selections, [part.name for part in self.contact_parts])
+        names = [part.name for part in self.contact_parts]
+        mesh = self.mesh.divide(self.shape.outline(), self.selections, names, self.symmetry)
+        if self.symmetry is not None:
+            from bemkit.scene_symmetry import check_symmetry  # which compares the conditions defined here
+
+            check_symmetry(self, mesh)
+        return mesh

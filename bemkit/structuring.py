@@ -24,7 +24,8 @@ from bemkit.contact.obstacle import Obstacle
 from bemkit.expression import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
-from bemkit.kinds import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, OBSTACLES, SHAPES, SOLVERS, Family
+from bemkit.kinds import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, LINEAR_SOLVERS, OBSTACLES, SHAPES, SOLVERS, Family
+from bemkit.operators.linear import LinearSolverWish
 from bemkit.scene import Condition, Discretisation, Part
 from bemkit.solvers.base import ContactSolver
 
@@ -37,6 +38,7 @@ _FAMILIES: tuple[tuple[Any, Family], ...] = (
     (Obstacle, OBSTACLES),
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),
+    (LinearSolverWish, LINEAR_SOLVERS),
     (ContactSolver, SOLVERS),
 )
 
@@ -47,7 +49,7 @@ _MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
         "title": "add a line such as title = 'Block on a foundation'",
         "shape": "add a table [shape] with kind = 'rectangle', width = 1.0, height = 1.0, or another shape",
         "material": "add a table [material] with youngs_modulus and poisson_ratio",
-        "parts": "add tables [parts.NAME] with sides and condition, at least one of them in contact",
+        "parts": "add tables [parts.NAME] with sides and condition",
         "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
         "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
     }

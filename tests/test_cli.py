@@ -11,10 +11,12 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 
 import pytest
 
+import bemkit.__main__
 import bemkit.io
 import bemkit.runner
 from bemkit.cli import main
@@ -118,7 +120,48 @@ def test_scenes_and_plan(capsys: pytest.CaptureFixture[str]) -> None:
     assert "hypersingular" in output
     assert call("plan", "paper-1", "--json", "--elements", "64", "--discretisation", "linear") == 0
     names = {item["name"]: item["needed"] for item in json.loads(capsys.readouterr().out)["items"]}
-    assert names["hypersingular operator"]
+    assert names["hypersingular operator W"]
+
+
+def test_explain_prints_what_was_planned_and_what_it_took(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-1", "--elements", "40", "--explain") == 0
+    output = capsys.readouterr().out
+    rows = {line.split("  ")[0]: line.split() for line in output.splitlines() if line.strip()}
+    for stage in ("mesh", "assemble", "condense", "solve", "recover"):
+        assert len(rows[stage]) == 9  # two times and two sizes, each with its unit
+    assert rows["element pairs integrated"][-2:] == ["1,600", "1,600"]
+    assert rows["factorisations and their orders"][-4:] == ["LU", "83", "LU", "83"]
+    assert "columns of V on the free surface" in rows
+    assert call("run", "paper-1", "--elements", "40", "--explain", "--json", "-", "-o", "r.h5") == 0
+    shown = capsys.readouterr()
+    summary = json.loads(shown.out)
+    assert set(summary["memory"]) == {"mesh", "assemble", "condense", "solve", "recover"}
+    assert {item["name"]: item["needed"] for item in summary["plan"]["items"]}["result file (h5py)"]
+    assert "what was computed" in shown.err
+
+
+def test_a_symmetry_is_proposed(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("block.toml").write_text(
+        """
+title = "block"
+law = "frictionless"
+shape = { kind = "rectangle", width = 2.0, height = 1.0 }
+material = { youngs_modulus = 1.0, poisson_ratio = 0.3 }
+mesh = { elements = 24 }
+parts.floor = { sides = ["bottom"], condition = { kind = "contact", obstacle = "half-plane" } }
+parts.load = { sides = ["top"], condition = { kind = "pressure", pressure = 1.0 } }
+""",
+        "utf-8",
+    )
+    assert call("plan", "block.toml", "--json") == 0
+    reasons = {item["name"]: item["reason"] for item in json.loads(capsys.readouterr().out)["items"]}
+    assert reasons["symmetry"] == "proposed: the scene is symmetric about x = 1, and half of its unknowns would do"
+    text = Path("block.toml").read_text("utf-8")
+    Path("block.toml").write_text(text.replace("law =", "symmetry = { x = 1.0 }\nlaw ="))
+    assert call("plan", "block.toml", "--json") == 0
+    items = {item["name"]: item for item in json.loads(capsys.readouterr().out)["items"]}
+    assert items["symmetry"]["needed"]
+    assert items["symmetry"]["reason"] == "about x = 1: 12 of 24 elements carry unknowns"
 
 
 def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -141,7 +184,7 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--accuracy", "1e-3"], "collocation has no error estimate"),
         (["run", "paper-1", "--accuracy", "1e-3", "--elements", "40"], "give one of them"),
         (["run", "paper-1", "--elements", "many"], "'many' is not a valid integer.*bemkit run --help"),
-        (["run", "paper-1", "--elements", "1000000"], "use at most"),
+        (["run", "paper-1", "--elements", "100000"], "use at most"),
         (["run", "paper-1", "--solver", "newtn"], "unknown solver 'newtn'"),
         (["run", "paper-1", "--discretisation", "cubic"], "unknown discretisation 'cubic'"),
         (["run", "paper-1", "--rho", "-1"], "rho"),
@@ -256,6 +299,19 @@ def test_a_real_ctrl_c_ends_with_130() -> None:
     assert os.listdir() == []
 
 
+def test_an_interrupt_while_the_command_line_loads_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Loading(types.ModuleType):
+        def __getattr__(self, name: str) -> object:
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "bemkit.cli", Loading("bemkit.cli"))
+    with pytest.raises(SystemExit, match="130"):
+        bemkit.__main__.main()
+    assert capsys.readouterr().err == "bemkit: error: interrupted; no file is half written\n"
+
+
 def test_a_closed_pipe_is_no_error() -> None:
     command = f"{sys.executable} -c 'from bemkit.cli import main; main()' run paper-1 --csv - | head -n 1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
@@ -283,7 +339,9 @@ try:
     main(["run", "paper-1", "--elements", "40", "--json", "-"])
 except SystemExit as end:
     assert end.code == 0
-wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed"}
+wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
+wanted |= {f"bemkit.operators.{name}" for name in ("representation", "inner_moments", "multigrid", "cache")}
+wanted |= {f"bemkit.{name}" for name in ("interior", "plotting", "io", "hdf5", "explain", "adaptive")}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

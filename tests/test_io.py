@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import bemkit.io
+from bemkit.hdf5 import Reader
 from bemkit.io import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.runner import run
 from bemkit.scene import Part, Traction
@@ -116,7 +117,7 @@ def test_an_interrupt_while_writing_leaves_the_old_result(
     def interrupted(*arguments: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.io, "_plan_columns", interrupted)
+    monkeypatch.setattr(bemkit.io, "write_work", interrupted)
     with pytest.raises(error):
         write_result(file, dataclasses.replace(solution, message="never"))
     assert os.listdir(file.parent) == ["result.h5"]
@@ -192,6 +193,16 @@ def virtual(stored: h5py.File) -> None:
     stored.create_virtual_dataset("contact/x", layout)
 
 
+def test_a_damaged_list_of_contents_is_named() -> None:
+    class Damaged:
+        def __contains__(self, name: str) -> bool:
+            raise RuntimeError("unable to offset into local heap data block")
+
+    reader = Reader("r.h5", 1, Damaged())  # type: ignore[arg-type]
+    with pytest.raises(ResultFileError, match=r"r\.h5: mesh/element_curve cannot be read"):
+        reader.has("mesh/element_curve")
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -201,7 +212,10 @@ def virtual(stored: h5py.File) -> None:
         (attribute("summary", "energy", "much"), "inconsistent content"),
         (attribute("summary", "energy", np.zeros(3)), "'energy' of summary is not a single text or number"),
         (deleted("contact/x"), "contact/x is missing"),
-        (deleted("plan"), "plan/name is missing"),
+        (deleted("plan"), "plan is missing"),
+        (deleted("plan/name"), "plan/name is missing"),
+        (deleted("work"), "work is missing"),
+        (attribute("work", "element_pairs", "many"), "inconsistent content"),
         (deleted("summary"), "summary is missing"),
         (replaced("contact/x", data=np.zeros(3)), "columns of contact differ in length"),
         (replaced("contact/x", data=np.zeros(11, "i8")), "contact/x holds .*int64"),

@@ -15,17 +15,17 @@ PACKAGE = Path(bemkit.__file__).parent
 
 # imports point up only: a module may import those of its own layer and of earlier ones
 LAYERS = [
-    {"arrays", "expression", "files", "hdf5"},
+    {"arrays", "complaint", "expression", "files", "hdf5"},
     {"geometry"},
     {"operators"},
     {"contact"},
     {"solvers"},
-    {"mesh_options", "scene"},
-    {"estimate", "plan", "kinds", "model", "history", "structuring", "shipped"},
-    {"solution", "scenefile", "escape"},
+    {"discretisations", "mesh_options", "scene", "scene_symmetry"},
+    {"boundary_data", "elasticity", "estimate", "plan", "kinds", "model", "history", "structuring", "shipped"},
+    {"clock", "solution", "scenefile", "escape"},
     {"warm_start"},
-    {"io", "tables", "plotting", "interior", "runner", "adaptive", "reference"},
-    {"outputs", "report", "testing", "cascade"},
+    {"planfile", "io", "tables", "boundary_figure", "plotting", "interior", "runner", "adaptive", "reference"},
+    {"outputs", "report", "explain", "rowfile", "testing", "cascade"},
     {"study", "stability"},
     {"cli"},
 ]

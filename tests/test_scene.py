@@ -66,8 +66,6 @@ def test_overlapping_parts_are_found_when_the_boundary_is_divided() -> None:
     [
         (lambda: scene(title=""), "title is ''"),
         (lambda: scene(title="two\nlines"), "title is"),
-        (lambda: scene(parts=()), "no part is in contact"),
-        (lambda: scene(parts=(Part("a", Clamped()),)), "no part is in contact"),
         (lambda: scene(parts=(FOUNDATION, FOUNDATION)), "'foundation' is the name of two parts"),
         (lambda: scene(parts=(dataclasses.replace(FOUNDATION, sides=("floor",)),)), "unknown side 'floor'.*bottom"),
         (lambda: scene(shape=Polygon(((0.0, 0.0), (0.0, 1.0), (1.0, 0.0)))), "anticlockwise"),

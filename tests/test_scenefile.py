@@ -15,7 +15,7 @@ from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
 from bemkit.expression import Expression
 from bemkit.geometry.grading import Algebraic, Geometric, Uniform
-from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring
+from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
 from bemkit.scene import (
     Clamped,
@@ -88,6 +88,7 @@ texts = st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min
 shapes = st.one_of(
     st.builds(Rectangle, positive, positive, points),
     st.builds(Disk, positive, points),
+    st.builds(lambda a, b, c: Sector(a, b, b + 77.0, c), positive, st.floats(-180.0, 180.0), points),
     st.builds(lambda a, b, c: Ring(a, a + b, c), positive, positive, points),
     st.builds(lambda a, c: PlateWithHole(4.0 * a, 5.0 * a, a, c), positive, points),
     st.builds(lambda a: ExteriorOf(Disk(a)), positive),

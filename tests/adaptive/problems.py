@@ -16,7 +16,7 @@ from bemkit.geometry.curve import Arc, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model import build_model
 
-REFERENCE = Path(__file__).parents[1] / "paper" / "reference"
+REFERENCE = Path(bk.__file__).parent / "reference" / "data"
 
 
 @dataclass(frozen=True)
@@ -112,36 +112,40 @@ def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
 @lru_cache
 def reference_table(example: int) -> Any:
     """Return the columns x, u_n, u_t, sigma_n, sigma_t of the independent reference."""
-    return np.genfromtxt(REFERENCE / f"paper_example{example}.csv", delimiter=",", names=True)
+    return np.genfromtxt(REFERENCE / f"paper-{example}.csv", delimiter=",", names=True)
 
 
 @lru_cache
 def reference_values(example: int) -> tuple[dict[str, float], list[float]]:
     """Return the scalars and the transition points of the independent reference."""
-    data = json.loads((REFERENCE / f"paper_example{example}.json").read_text())
+    data = json.loads((REFERENCE / f"paper-{example}.json").read_text())
     return {name: entry["value"] for name, entry in data["scalars"].items()}, [t["x"] for t in data["transitions"]]
 
 
 def contact_error(solution: bk.Solution, example: int, *names: str) -> float:
-    """Return the relative L2 error on the contact side at the points of the reference, evaluated by the elements.
+    """Return the relative L2 error of columns of the contact table on the contact side, evaluated by the elements."""
+    return table_error(example, {name: contact_values(solution, example, name) for name in names})
 
-    The columns of the contact table are interpolated by the displacement space, not linearly.
-    """
-    table, mesh = reference_table(example), solution.mesh
+
+def table_error(example: int, fields: dict[str, Any]) -> float:
+    """Return the relative L2 error on the contact side of some fields at the points of the reference, together."""
+    table = reference_table(example)
+    weights = np.gradient(table["x"])
+    miss = sum(float(weights @ (values - table[name]) ** 2) for name, values in fields.items())
+    return float(np.sqrt(miss / sum(float(weights @ table[name] ** 2) for name in fields)))
+
+
+def contact_values(solution: bk.Solution, example: int, name: str) -> Any:
+    """Return a column of the contact table at the points of the reference, interpolated by the displacement space."""
+    x, mesh = reference_table(example)["x"], solution.mesh
     space = solution.scene.discretisation.displacement_space(mesh)
     elements = mesh.part("foundation")  # in order of x on the bottom side
     ends = mesh.end[elements, 0]
-    own = elements[np.minimum(np.searchsorted(ends, table["x"] - 1e-14), elements.size - 1)]
+    own = elements[np.minimum(np.searchsorted(ends, x - 1e-14), elements.size - 1)]
     start, end = mesh.start[own, 0], mesh.end[own, 0]
-    xi = np.clip((2.0 * table["x"] - start - end) / (end - start), -1.0, 1.0)
-    at_dofs = np.zeros(space.n_dofs // 2)
+    xi = np.clip((2.0 * x - start - end) / (end - start), -1.0, 1.0)
     chain = space.element_dofs[elements].ravel()
     chain = chain[np.sort(np.unique(chain, return_index=True)[1])]
-    weights = np.gradient(table["x"])
-    miss = size = 0.0
-    for name in names:
-        at_dofs[chain] = getattr(solution.contact, name)
-        values = np.einsum("pn,np->n", space.basis(xi), at_dofs[space.element_dofs[own]])
-        miss += float(weights @ (values - table[name]) ** 2)
-        size += float(weights @ table[name] ** 2)
-    return float(np.sqrt(miss / size))
+    at_dofs = np.zeros(space.n_dofs // 2)
+    at_dofs[chain] = getattr(solution.contact, name)
+    return np.einsum("pn,np->n", space.basis(xi), at_dofs[space.element_dofs[own]])

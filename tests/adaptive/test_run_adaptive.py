@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.adaptive import run_adaptive
+from bemkit.adaptive import _expected_seconds, run_adaptive
 from bemkit.geometry.partition import STEEPEST
 from tests.adaptive.problems import contact_error, disc, paper, reference_values, wavy
 
@@ -169,3 +169,12 @@ def test_scene_files_hold_the_accuracy() -> None:
     assert "accuracy = 0.001" in text
     assert "elements = 320" not in text
     assert bk.scene_from_toml(text).mesh == scene.mesh
+
+
+def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
+    """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
+    scene = paper(1, bk.LinearGalerkin(), bk.MeshOptions(elements=40))
+    solution = bk.run(scene)
+    finer = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=400)).build_mesh()
+    assert _expected_seconds(solution, 1.0, solution.mesh) == pytest.approx(1.0)
+    assert 2.0 < _expected_seconds(solution, 1.0, finer) < 100.0

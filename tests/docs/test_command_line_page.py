@@ -82,6 +82,7 @@ def test_json_fields() -> None:
     assert re.findall(r"`(\w+)`", rows["timings"]) == list(summary["timings"])
     plan_words = [*summary["plan"], *summary["plan"]["items"][0]]
     assert re.findall(r"`(\w+)`", rows["plan"]) == plan_words
+    assert re.findall(r"`(\w+)`", rows["work"]) == list(summary["work"])
 
 
 @pytest.mark.parametrize("name", TABLES)

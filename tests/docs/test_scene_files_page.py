@@ -12,6 +12,7 @@ import tomli_w
 
 from bemkit import expression, kinds
 from bemkit.expression import Expression
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import MeshOptions, Part, Scene
 from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml
@@ -27,9 +28,10 @@ FAMILIES = {
     "Shapes": kinds.SHAPES,
     "Gradings": kinds.GRADINGS,
     "Discretisations": kinds.DISCRETISATIONS,
+    "Linear solvers": kinds.LINEAR_SOLVERS,
     "Solvers": kinds.SOLVERS,
 }
-TABLES = {"The scene": Scene, "Material": Material, "Parts": Part, "Mesh": MeshOptions}
+TABLES = {"The scene": Scene, "Material": Material, "Parts": Part, "Symmetry": Symmetry, "Mesh": MeshOptions}
 
 
 def as_text(fragment: str) -> str:
@@ -52,7 +54,7 @@ EXAMPLES = [
 @pytest.mark.parametrize("fragment", [content for content, error in EXAMPLES if not error])
 def test_every_example_is_a_scene_that_can_be_divided(fragment: str) -> None:
     scene = scene_from_toml(as_text(fragment))
-    assert scene.build_mesh().n_elements == scene.mesh.elements
+    assert scene.build_mesh().whole.n_elements == scene.mesh.elements
 
 
 @pytest.mark.parametrize(("fragment", "error"), [example for example in EXAMPLES if example[1]])

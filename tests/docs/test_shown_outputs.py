@@ -39,7 +39,8 @@ def test_the_comparison_can_fail() -> None:
 
 
 @pytest.mark.parametrize(
-    ("page", "fewest"), [("tutorials/first-steps.md", 4), ("command-line.md", 4), ("paper-tables.md", 1)]
+    ("page", "fewest"),
+    [("tutorials/first-steps.md", 4), ("command-line.md", 4), ("plan.md", 2), ("paper-tables.md", 1)],
 )
 def test_shown_output(
     page: str, fewest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -13,7 +13,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 
-REFERENCE = Path(__file__).parent / "reference"
+REFERENCE = Path(bk.__file__).parent / "reference" / "data"
 DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
 SOLVERS = {"ssn": bk.SemismoothNewton(), "alm": bk.AugmentedLagrangian()}
 
@@ -27,14 +27,14 @@ def solved(example: int, discretisation: str, solver: str) -> bk.Solution:
 
 @lru_cache
 def scalars(example: int) -> dict[str, float]:
-    data = json.loads((REFERENCE / f"paper_example{example}.json").read_text())
+    data = json.loads((REFERENCE / f"paper-{example}.json").read_text())
     values = {name: entry["value"] for name, entry in data["scalars"].items()}
     return values | {f"transition_{k}": entry["x"] for k, entry in enumerate(data["transitions"])}
 
 
 def relative_error(example: int, solution: bk.Solution, *names: str) -> float:
     """Relative L2 error of some columns of the contact table."""
-    table = np.genfromtxt(REFERENCE / f"paper_example{example}.csv", delimiter=",", names=True)
+    table = np.genfromtxt(REFERENCE / f"paper-{example}.csv", delimiter=",", names=True)
     contact = solution.contact
     miss = size = 0.0
     for name in names:

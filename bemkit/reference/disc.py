@@ -1,0 +1,137 @@
+"""A disc between two rigid, frictionless, parallel plates: exact, from the complex symbols of the circle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.operators.material import Material
+from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
+from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
+
+
+@dataclass(frozen=True)
+class DiscBetweenPlates:
+    """A disc pressed by plates that each approach its centre.
+
+    Parameters
+    ----------
+    radius, approach : float [m]
+        The plates end at the distance radius - approach from the centre.
+    material : Material
+    n_terms : int
+        Coefficients of the pressure.
+
+    Raises
+    ------
+    ValueError
+        If the approach is not positive or not small.
+
+    Notes
+    -----
+    Gaps are measured along the normals of the undeformed circle, as everywhere in bemkit. Angles count from the middle
+    of the lower contact, anticlockwise.
+    """
+
+    radius: float
+    approach: float
+    material: Material
+    n_terms: int = N_TERMS
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.approach < 0.25 * self.radius:
+            raise ValueError(
+                f"approach is {self.approach}: give one between 0 and a quarter of the radius, {0.25 * self.radius:g}; "
+                "small strains end long before"
+            )
+
+    @cached_property
+    def half_angle(self) -> float:
+        """Where contact ends [rad]."""
+        # Hertz: approach / radius = e^2 / 2 times a slowly varying logarithm
+        share = self.approach / self.radius
+        near = 0.5 * np.sqrt(share)
+        for _ in range(20):
+            near = np.sqrt(2.0 * share / (np.log(4.0 / near) - 0.5))
+        return half_width_for(share, lambda e: self._solved(e)[1], near)
+
+    def reference(self, part: str = "plate", length: float | None = None) -> Reference:
+        """Return the fields along the arc from the lowest point on, and the resultants of a quarter of the disc.
+
+        Parameters
+        ----------
+        part : str
+            Name of the contact part, which begins at the lowest point and runs anticlockwise.
+        length : float, optional [m]
+            Length of the part; an arc of 90 degrees by default.
+        """
+        answer, places = self._answer(part, length)
+        coarser, _ = replace(self, n_terms=self.n_terms * 2 // 3)._answer(part, length)
+        reference = Reference("disc between plates by Chebyshev polynomials", (places,), answer)
+        return replace(reference, own_errors=errors_of(coarser, reference))
+
+    def _answer(self, part: str, length: float | None) -> tuple[Answer, Places]:
+        e = self.half_angle
+        pressure, _ = self._solved(e)
+        length = 0.5 * np.pi * self.radius if length is None else length
+        s, weight = places_along(length, (e * self.radius,))
+        angle = s / self.radius
+        u_r = np.where(
+            angle < e, self._gap(angle, self.approach), self.radius * pressure.displacement(self._radial, angle)
+        )
+        force = self.radius * pressure.integral(np.ones_like)
+        work = -self.radius * pressure.integral(lambda phi: self._gap(phi, self.approach))
+        answer = Answer(
+            u_n=u_r,
+            u_t=self.radius * pressure.displacement(self._circumferential, angle),
+            sigma_n=-pressure.at(angle),
+            sigma_t=np.zeros_like(s),
+            energy=0.25 * work,
+            force_normal=0.5 * force,
+            force_tangential=0.0,
+            zones=(Zone(part, e * self.radius, "slip", "separated"),),
+        )
+        return answer, Places(part, s, weight)
+
+    def pressure(self, angle: FloatArray) -> FloatArray:
+        """Return the contact pressure [Pa] at angles [rad]."""
+        return self._solved(self.half_angle)[0].at(angle)
+
+    def load(self) -> float:
+        """Return the force on each plate [N/m]."""
+        return self.radius * self._solved(self.half_angle)[0].integral(np.cos)
+
+    def _gap(self, angle: FloatArray, approach: float) -> FloatArray:
+        return np.asarray((self.radius - approach) / np.cos(angle) - self.radius)
+
+    def _solved(self, half_angle: float) -> tuple[EvenPressure, float]:
+        """Return the pressure over angles on a given zone, and the approach over the radius that belongs to it."""
+        return solve_pressure(
+            self._radial,
+            half_angle,
+            lambda angle: 1.0 / np.cos(angle),
+            lambda angle: 1.0 / np.cos(angle) - 1.0,
+            self.n_terms,
+        )
+
+    def _sums(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the sums of cos(n angle)/n and of sin(n angle)/n over odd n."""
+        return 0.5 * np.log(1.0 / np.tan(0.5 * np.abs(angle))), 0.25 * np.pi * np.sign(angle)
+
+    def _radial(self, angle: FloatArray) -> FloatArray:
+        """u_r / radius of unit line pressures at an angle and opposite to it."""
+        c, s = self._sums(angle)
+        along, across = np.cos(angle) * c, np.sin(angle) * s
+        kappa, shear = self.material.kappa, self.material.shear_modulus
+        total = 0.5 * (kappa - 1.0) + kappa * (along + across - 1.0) + along - across
+        return np.asarray(-total / (2.0 * np.pi * shear))
+
+    def _circumferential(self, angle: FloatArray) -> FloatArray:
+        """u_t / radius of the same pressures."""
+        c, s = self._sums(angle)
+        along, across = np.cos(angle) * s, np.sin(angle) * c
+        kappa, shear = self.material.kappa, self.material.shear_modulus
+        return np.asarray(-(kappa * (along - across) - (along + across)) / (2.0 * np.pi * shear))

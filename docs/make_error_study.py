@@ -1,0 +1,121 @@
+"""Fill the tables and figures of ``docs/error-against-run-time.md``: ``python docs/make_error_study.py``.
+
+It takes some minutes. Run it on a machine that does nothing else: the figures show run times.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from markers import between
+from matplotlib.figure import Figure
+from PIL import Image
+
+import bemkit as bk
+from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
+from bemkit.study.plots import draw_errors
+from bemkit.study.rows import Row, by_series, fitted_order, pareto_front
+from bemkit.study.runs import AdaptiveMeshes, all_runs, graded, uniform
+from bemkit.study.sweep import timed_rows
+
+PAGE = Path(__file__).parent / "error-against-run-time.md"
+IMAGES = Path(__file__).parent / "images"
+SCENES = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates", "clamped-angle")
+ELEMENTS = (40, 80, 160, 320, 640)
+ACCURACIES = (1e-2, 1e-3, 1e-4)
+FINEST = 600
+REPEAT = 3
+DOTS_PER_INCH = 90
+N_COLOURS = 48
+PANELS = ("energy", "sigma_n", "displacement", "transitions")
+TARGETS = (1e-1, 1e-2, 1e-3, 1e-4)
+
+
+def main() -> None:
+    """Run the studies of the scenes named on the command line, of all if there are none, and write what they show."""
+    IMAGES.mkdir(exist_ok=True)
+    for name in sys.argv[1:] or SCENES:
+        scene = bk.load_scene(name)
+        reference = find_reference(scene) or over_resolved(scene, FINEST)
+        rows = study(scene, reference)
+        figure = draw_errors(rows, PANELS, title=scene.title)
+        save_small(figure, IMAGES / f"error-study-{name}.png")
+        text = PAGE.read_text("utf-8")
+        text = between(text, f"{name}-orders", orders_table(rows))
+        text = between(text, f"{name}-choice", choice_table(rows))
+        text = between(text, f"{name}-reference", reference_sentence(reference))
+        PAGE.write_text(text, "utf-8")
+
+
+def save_small(figure: Figure, path: Path) -> None:
+    """Write a picture of few colours, which takes a third of the room."""
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=DOTS_PER_INCH, metadata={"Software": None})
+    Image.open(drawn).convert("RGB").quantize(N_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def study(scene: bk.Scene, reference: Reference) -> list[Row]:
+    """Return the rows: all elements and meshes by Newton, and the smaller ones by the augmented Lagrangian too."""
+    elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
+    meshes = (uniform(ELEMENTS), graded(ELEMENTS), AdaptiveMeshes(ACCURACIES))
+    newton = all_runs(scene, elements, meshes, [bk.SemismoothNewton()])
+    few = (uniform(ELEMENTS[:-1]), AdaptiveMeshes(ACCURACIES[:2]))
+    augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
+    # the finest meshes are for constant elements, which are fast and need them
+    runs = [run for run in (*newton, *augmented) if run.discretisation == "constant" or run.size != ELEMENTS[-1]]
+    return list(timed_rows(runs, reference, repeat=REPEAT))
+
+
+def reference_sentence(reference: Reference) -> str:
+    """Say what errors are measured against."""
+    own = [
+        f"{MEASURES[name]} {value:.0e}"
+        for name, value in reference.own_errors.items()
+        if math.isfinite(value) and name != "force_normal"
+    ]
+    return f"Reference: {reference.source}." + (f" Its own errors are at most: {', '.join(own)}." if own else "")
+
+
+def orders_table(rows: Sequence[Row]) -> str:
+    """Return the observed orders in the number of elements, Newton only: other drivers reach the same state."""
+    lines = [
+        f"| elements | meshes | {' | '.join(MEASURES[name] for name in PANELS)} |",
+        "|---|---|" + "---:|" * len(PANELS),
+    ]
+    for series in by_series(rows):
+        if series[0].solver == "semismooth-newton":
+            cells = [short(fitted_order(series, name), ".1f") for name in PANELS]
+            lines.append(f"| {series[0].discretisation} | {series[0].meshes} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def choice_table(rows: Sequence[Row]) -> str:
+    """Return the fastest run that reaches each error of the normal traction, and of the energy."""
+    lines = ["| wished error | in the normal traction | in the energy |", "|---|---|---|"]
+    for target in TARGETS:
+        cells = [fastest(rows, measure, target) for measure in ("sigma_n", "energy")]
+        lines.append(f"| {target:.0e} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def fastest(rows: Sequence[Row], measure: str, target: float) -> str:
+    """Describe the fastest run whose error is at most the target."""
+    good = [row for row in pareto_front(rows, measure) if getattr(row, measure) <= target]
+    if not good:
+        return "not reached"
+    row = good[0]
+    driver = "" if row.solver == "semismooth-newton" else f", {row.solver}"
+    return f"{row.discretisation}, {row.meshes}, {row.elements} elements{driver}: {1e3 * row.seconds:.0f} ms"
+
+
+def short(value: float, form: str) -> str:
+    """Format a number, a dash if there is none."""
+    return f"{value:{form}}" if math.isfinite(value) else "-"
+
+
+if __name__ == "__main__":
+    main()
