@@ -42,11 +42,6 @@ class Units:
     modulus: float
     stress: float
 
-    @classmethod
-    def of_the_user(cls) -> Units:
-        """Return the units in which nothing changes."""
-        return cls(np.zeros(2), 1.0, 1.0, 1.0)
-
     @property
     def displacement(self) -> float:
         """Unit of displacements and gaps [m]."""

@@ -104,6 +104,7 @@ def format_seconds(seconds: float) -> str:
 def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     certificate = solution.certificate
     worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
+    worst_name = f" ({worst_name.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
     timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
     status = Text(
         solution.status.name.lower().replace("_", " "), style="bold green" if solution.is_converged else "bold red"
@@ -119,7 +120,7 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
         ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
         *_estimate(solution),
         *_solve(solution),
-        ("certificate", Text(f"worst entry {certificate.worst:.1e} ({worst_name.replace('_', ' ')})")),
+        ("certificate", Text(f"worst entry {certificate.worst:.1e}{worst_name}")),
         ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
     ]
     return rows

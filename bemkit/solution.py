@@ -178,6 +178,8 @@ _CLOSE = 0.1
 """Distance, relative to the size of the zone, up to which that power holds closely."""
 _POWERS = (1.3, 1.7)
 """The powers that sliding friction may make of 3/2."""
+_LEAST_ZONE = 0.5
+"""Least length of a zone, relative to its length if it ends halfway between its nodes and its neighbours'."""
 
 
 def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
@@ -192,7 +194,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     Returns
     -------
     tuple of Transition
-        In order. A change of the direction of slip alone is not a transition.
+        In order along each part. A change of the direction of slip alone is not a transition.
 
     Notes
     -----
@@ -201,18 +203,33 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     at the transition; on the paper's examples this is within a quarter of the node distance. Sliding friction changes
     the power somewhat (to 1.56 at the separation point of Example 1): on meshes that are fine there it is fitted too,
     and the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
-    says nothing, as at the edge of an obstacle, the transition is put halfway between the two nodes that differ.
+    says nothing, as at the edge of an obstacle, or where two of them would swallow a narrow zone between them, the
+    transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip
+    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and _are_neighbours(contact, i)]
+    places = np.array([_transition_place(contact, slip, words, i) for i in changes])
     found = []
-    for i in range(contact.n_contact - 1):
-        if words[i] != words[i + 1] and _are_neighbours(contact, i):
-            s = _transition_place(contact, slip, words, i)
-            rows = [k for k, part in enumerate(contact.part) if part == contact.part[i]]
-            x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
-            found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
+    for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
+        rows = [k for k, part in enumerate(contact.part) if part == contact.part[i]]
+        x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
+        found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
     return tuple(found)
+
+
+def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:
+    """Put transitions halfway between their nodes where they leave next to nothing of a zone, which has nodes."""
+    kept = places.copy()
+    halfway = np.array([(contact.s[i] + contact.s[i + 1]) / 2.0 for i in changes])
+    for part in dict.fromkeys(contact.part[i] for i in changes):
+        own = [k for k, i in enumerate(changes) if contact.part[i] == part]
+        ends = contact.s[[name == part for name in contact.part]][[0, -1]]
+        least = _LEAST_ZONE * np.diff(halfway[own], prepend=ends[0], append=ends[1])
+        for _ in own:  # what moves back may meet the next transition
+            is_lost = np.diff(kept[own], prepend=ends[0], append=ends[1]) < least
+            kept[own] = np.where(is_lost[:-1] | is_lost[1:], halfway[own], kept[own])
+    return kept
 
 
 def _are_neighbours(contact: ContactTable, i: int) -> bool:
@@ -242,9 +259,7 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
     if distance is None:
         return middle
     gap = contact.s[tighter] - contact.s[last]
-    place = contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap
-    own = contact.s[[part == contact.part[last] for part in contact.part]]
-    return float(np.clip(place, own.min(), own.max()))
+    return float(contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap)
 
 
 def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:

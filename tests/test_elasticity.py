@@ -115,7 +115,9 @@ def test_the_plan_says_so(bent: Solution) -> None:
 
 def test_the_summary_speaks_of_elasticity_alone(bent: Solution, capsys: pytest.CaptureFixture[str]) -> None:
     print_summary(bent)
-    lines = [line.split("  ")[0].strip() for line in capsys.readouterr().out.splitlines()]
+    shown = capsys.readouterr().out
+    assert "penetration" not in shown
+    lines = [line.split("  ")[0].strip() for line in shown.splitlines()]
     assert lines[1:4] == ["status", "elements", "contact"]
     assert not {"friction force", "transitions", "linear solves"} & {*lines}
 

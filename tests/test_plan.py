@@ -12,7 +12,7 @@ import bemkit.plan.memory
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
-from bemkit.operators.linear import Krylov
+from bemkit.operators.linear import DefiniteOperator, Factor, Krylov, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.plan import Machine, Plan, Stage, TooLargeError, Wishes, check_memory, make_plan, this_machine
 from bemkit.scene import Clamped, Condition, Contact, MeshOptions, Part, PrescribedDisplacement, Roller, Scene
@@ -32,6 +32,20 @@ def needed(scene: Scene) -> dict[str, bool]:
 
 def reasons(scene: Scene) -> dict[str, str]:
     return {item.name: item.reason for item in plan_of(scene).items}
+
+
+class Borrowed:
+    """A linear solver of somebody else, which iterates."""
+
+    forms_matrix = False
+
+    def factor(self, operator: DefiniteOperator, name: str) -> Factor:
+        """Return what Krylov returns."""
+        return Krylov().factor(operator, name)
+
+
+def replace_solver(scene: Scene, solver: LinearSolver) -> Scene:
+    return dataclasses.replace(scene, linear_solver=solver)
 
 
 def block(*conditions: tuple[str, Condition]) -> Scene:
@@ -87,17 +101,36 @@ def test_what_is_left_out_depends_on_the_scene() -> None:
     assert not constant["quadrature on curved elements"]
     assert not constant["stress inside the body"]
     assert not constant["figures (matplotlib)"]
-    assert not linear["algebraic multigrid (pyamg)"]
-    assert needed(dataclasses.replace(with_overrides(scene, discretisation="linear"), linear_solver=Krylov()))[
-        "algebraic multigrid (pyamg)"
-    ]
+    assert not linear["second elastic body"]
     assert "columns of V on the free surface" not in linear  # Galerkin takes whole matrices
     held = [Part(side, Roller(), (side,)) for side in ("left", "right", "bottom", "top")]
     without = block(*((part.name, part.condition) for part in held if part.name != "bottom"))
     without = dataclasses.replace(without, parts=tuple(held), law=Frictionless())
     without = with_overrides(without, discretisation="constant")
     assert not needed(without)["contact system"]
+    assert "second elastic body" not in needed(without)
     assert not needed(without)["columns of V on the free surface"]
+
+
+def test_pyamg_is_needed_only_where_the_preconditioner_is_coarsened() -> None:
+    name, linear = "algebraic multigrid (pyamg)", block(("left", Clamped()))
+    n_free = plan_of(linear).sizes.n_free
+    factored, coarsened = (replace_solver(linear, Krylov(coarsest=n)) for n in (n_free, n_free - 1))
+    assert reasons(linear)[name] == "the linear solver is direct"
+    assert not needed(factored)[name]
+    assert reasons(factored)[name] == f"the preconditioner is factored: its order {n_free} does not exceed {n_free}"
+    assert needed(coarsened)[name]
+    assert reasons(replace_solver(linear, Borrowed()))[name] == "the linear solver is Borrowed"
+
+
+def test_the_pressure_of_an_incompressible_body_is_one_more_unknown_of_galerkin_maps_alone() -> None:
+    name, linear = "pressure that keeps the volume", block(("left", Clamped()))
+    assert reasons(linear)[name] == "the body is compressible"
+    linear = dataclasses.replace(linear, material=Material(1.0, 0.5))
+    assert needed(linear)[name]
+    constant = with_overrides(linear, discretisation="constant")
+    assert not needed(constant)[name]
+    assert reasons(constant)[name] == "collocation has it among the tractions"
 
 
 def test_a_plan_knows_the_outputs_that_are_asked_for() -> None:

@@ -81,6 +81,26 @@ def test_without_a_law_for_its_end_a_zone_ends_halfway() -> None:
     assert find_transitions(table([STICK] * 2 + [SEPARATED]))[0].x == 1.5
 
 
+def test_a_narrow_zone_keeps_its_nodes() -> None:
+    """Slip that is extrapolated from both sides past the only node, or to the middle of three nodes, that stick."""
+    x = np.arange(7, dtype=float)
+    crossing = table([FORWARD] * 3 + [STICK] + [FORWARD] * 3, u_t=np.abs(x - 3.0) + 5.0)
+    assert [found.s for found in find_transitions(crossing)] == [3.0, 4.0]
+    x = np.arange(9, dtype=float)
+    meeting = table([FORWARD] * 3 + [STICK] * 3 + [FORWARD] * 3, u_t=np.abs(x - 4.0) + 5.0)
+    assert [found.s for found in find_transitions(meeting)] == [3.0, 6.0]
+    half = table([FORWARD] * 3 + [STICK], u_t=8.0 - np.arange(4))
+    assert [found.s for found in find_transitions(half)] == [3.0]
+
+
+def test_what_moves_back_keeps_off_the_next_transition() -> None:
+    """Slip crosses the only node that sticks; put back there, it meets the end of separation, which came too far."""
+    x = np.arange(9, dtype=float)
+    status = [SEPARATED] * 3 + [FORWARD] * 2 + [STICK] + [FORWARD] * 3
+    beyond = table(status, clearance=10.0 - x, u_t=np.abs(x - 5.0) + 5.0)
+    assert [found.s for found in find_transitions(beyond)] == [3.0, 5.0, 6.0]
+
+
 def test_a_change_of_the_slip_direction_is_no_transition() -> None:
     assert find_transitions(table([FORWARD, FORWARD, BACKWARD])) == ()
 

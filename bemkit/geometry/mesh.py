@@ -1,7 +1,7 @@
 """Boundary meshes: elements in closed loops, with named parts."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -326,22 +326,27 @@ class BoundaryMesh:
         """
         shift = as_point(shift, "BoundaryMesh: shift")
         require_positive("BoundaryMesh", factor=factor)
-        return BoundaryMesh(
-            (self.nodes - np.array(shift)) * factor,
-            self.elements,
-            self.parts,
-            tuple(MovedCurve(curve, shift, factor) for curve in self.curves),
-            self.element_curve,
-            self.element_span,
-            self.is_exterior,
-            None if self.symmetry is None else self.symmetry.transformed(shift, factor),
-        )
+        return BoundaryMesh(*self._moved(shift, factor))
+
+    def _moved(self, shift: tuple[float, float], factor: float) -> tuple[Any, ...]:
+        """Return what the constructor takes."""
+        symmetry, nodes = self.symmetry, (self.nodes - np.array(shift)) * factor
+        if symmetry is not None:
+            symmetry = symmetry.transformed(shift, factor)
+            nodes = symmetry.snapped(nodes)
+        curves = tuple(MovedCurve(curve, shift, factor) for curve in self.curves)
+        content = self._content._replace(nodes=_frozen(nodes), curves=curves)
+        return (*content, self.is_exterior, symmetry)
 
     @cached_property
     def unit(self) -> "BoundaryMesh":
         """The same mesh about the origin, in units of its diameter."""
-        x, y = self.centre.tolist()
-        return self.transformed(shift=(x, y), factor=1.0 / self.diameter)
+        mesh = object.__new__(BoundaryMesh)  # coordinates lose nothing there: what was found valid is not checked again
+        for entry, value in zip(
+            fields(self), self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter), strict=True
+        ):
+            object.__setattr__(mesh, entry.name, value)
+        return mesh
 
     @cached_property
     def _unfolded(self) -> "BoundaryMesh":

@@ -286,4 +286,4 @@ class CurvedElements:
             middle = 0.5 * (low + high)
             pair, low, high = np.tile(pair, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
         pieces = zip(*done, strict=True)
-        return tuple(np.concatenate(piece) for piece in pieces)  # type: ignore[return-value]
+        return tuple(np.concatenate(piece) for piece in pieces)  # type: ignore[return-value]  # zip loses the length

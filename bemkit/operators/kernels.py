@@ -142,9 +142,3 @@ def quotient_moment(k: int, moments: Sequence[ComplexArray], eta: FloatArray) ->
     if constant:
         result += constant
     return result
-
-
-def gradient_moment(zeta_squared_minus_one: ComplexArray) -> ComplexArray:
-    """Return G_0 = int 1 / (zeta - t)**2 dt from (zeta + 1)(zeta - 1)."""
-    result: ComplexArray = 2.0 / zeta_squared_minus_one
-    return result

@@ -98,7 +98,7 @@ class DenseCholesky:
 
 @dataclass(frozen=True)
 class Krylov:
-    """Conjugate gradients for all right-hand sides at once, preconditioned by a multigrid cycle.
+    """Conjugate gradients for all right-hand sides at once, preconditioned by a factored matrix or a multigrid cycle.
 
     Parameters
     ----------

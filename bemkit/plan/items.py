@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.operators.linear import Krylov
 from bemkit.operators.linear_choice import krylov_cost
 from bemkit.plan.costs import CONTACT_STEPS, FLOPS_PER_NUMBER, Cost, Stage, assembly
 from bemkit.plan.decisions import Decisions, Formulation
@@ -198,12 +199,28 @@ def _condensation_items(decisions: Decisions, sizes: Sizes, why_solver: str) -> 
         size = _BYTES * (n * n + n * o)
     cost = Cost(flops=2.0 * flops, calls=50000.0, size=size)
     yield PlanItem("linear solver of the body", True, reason, Stage.CONDENSE, cost)
-    iterates = is_galerkin and not decisions.forms_matrix
-    reason = "preconditions the conjugate gradients" if iterates else "the linear solver is direct"
-    yield PlanItem("algebraic multigrid (pyamg)", iterates, reason, Stage.CONDENSE)
-    is_held = sizes.n_pressures > 0
-    reason = "Poisson's ratio is 1/2" if is_held else "the body is compressible"
-    yield PlanItem("pressure that keeps the volume", is_held and is_galerkin, reason, Stage.CONDENSE)
+    yield _multigrid(decisions, sizes)
+    yield _pressure(is_galerkin, sizes)
+
+
+def _multigrid(decisions: Decisions, sizes: Sizes) -> PlanItem:
+    solver, name = decisions.linear_solver, "algebraic multigrid (pyamg)"
+    if decisions.formulation is Formulation.COLLOCATION or decisions.forms_matrix:
+        return PlanItem(name, False, "the linear solver is direct", Stage.CONDENSE)
+    if not isinstance(solver, Krylov):
+        return PlanItem(name, False, f"the linear solver is {type(solver).__name__}", Stage.CONDENSE)
+    if sizes.n_free <= solver.coarsest:
+        reason = f"the preconditioner is factored: its order {sizes.n_free} does not exceed {solver.coarsest}"
+        return PlanItem(name, False, reason, Stage.CONDENSE)
+    return PlanItem(name, True, "preconditions the conjugate gradients", Stage.CONDENSE)
+
+
+def _pressure(is_galerkin: bool, sizes: Sizes) -> PlanItem:
+    is_incompressible = sizes.n_pressures > 0
+    reason = "Poisson's ratio is 1/2" if is_incompressible else "the body is compressible"
+    if is_incompressible and not is_galerkin:
+        reason = "collocation has it among the tractions"
+    return PlanItem("pressure that keeps the volume", is_incompressible and is_galerkin, reason, Stage.CONDENSE)
 
 
 def _contact_items(scene: Scene, decisions: Decisions, sizes: Sizes) -> Iterator[PlanItem]:
@@ -215,6 +232,7 @@ def _contact_items(scene: Scene, decisions: Decisions, sizes: Sizes) -> Iterator
     cost = Cost(flops=n_solves * of_step, calls=9000.0 * n_solves, size=3 * _BYTES * c * c)
     reason = f"{sizes.n_contact} nodes may touch; every contact step solves for {c} unknowns"
     yield PlanItem("contact system", True, reason, Stage.SOLVE, cost)
+    yield PlanItem("second elastic body", False, "the obstacles are rigid", Stage.SOLVE)
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in scene.laws.values() if not law.is_frictionless))
     kind = "static" if n_steps == 1 else "incremental"
     reason = f"law {names}, {kind}" if names else "the law allows no tangential traction"

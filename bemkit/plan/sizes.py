@@ -22,7 +22,7 @@ from bemkit.operators.nodal import NodalConditions, supported
 from bemkit.operators.rigid import possible_motions
 from bemkit.operators.steklov_poincare.given import GivenData
 from bemkit.operators.threads import n_threads
-from bemkit.plan.decisions import Decisions
+from bemkit.plan.decisions import Decisions, Formulation
 from bemkit.scene import Scene
 
 
@@ -43,7 +43,7 @@ class Sizes:
     n_fixed, n_free, n_open : int
         Displacement components that supports prescribe, that carry a known force, and that contact decides.
     n_sweeps : int
-        Load steps whose data are no multiple of those before; the first is one of them.
+        For collocation, load steps whose data are no multiple of those before; the first is one of them.
     n_loaded, n_moved : int
         Free components that carry a force, and fixed ones that move, summed over these steps.
     n_collocation_pairs : int
@@ -102,7 +102,7 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
     supports, is_frictionless = supports_on(scene, mesh, units, space), frictionless_nodes(scene, mesh, space)
     conditions, nodes = contact_conditions(space, supports, contact_elements(scene, mesh), is_frictionless)
     tangent_is_free = find_tangents(conditions, nodes, is_frictionless)
-    data = _data(steps, mesh, space, conditions)
+    data = _data(steps, mesh, space, conditions) if decisions.formulation is Formulation.COLLOCATION else []
     holds_volume = scene.material.is_incompressible and not mesh.is_exterior
     return Sizes(
         n_elements=mesh.n_elements,
@@ -118,7 +118,7 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
         n_loaded=sum(each.n_loaded for each in data),
         n_moved=sum(each.n_moved for each in data),
         n_sweeps=len(data),
-        n_collocation_pairs=_n_pairs(data, mesh) if space.degree == 0 else 0,
+        n_collocation_pairs=_n_pairs(data, mesh),
         n_contact=nodes.nodes.size,
         n_contact_unknowns=2 * nodes.nodes.size - int(np.count_nonzero(tangent_is_free)),
         n_motions=len(possible_motions(mesh)),
@@ -145,7 +145,7 @@ def _data(
 
 def _n_pairs(data: Sequence[GivenData], mesh: BoundaryMesh) -> int:
     """Count the pairs that collocation evaluates: all for the first data, later those of tractions if these suffice."""
-    n_elements = mesh.n_elements
+    n_elements = mesh.n_elements if data else 0
     for later in data[1:]:
         n_loaded = int(np.count_nonzero(later.force.any(axis=1)))
         n_elements += mesh.n_elements if later.n_moved else n_loaded

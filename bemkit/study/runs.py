@@ -164,22 +164,26 @@ def all_runs(
     Raises
     ------
     StudyError
-        If nothing is left to run, two runs could not be told apart, or the scene has no contact.
+        If nothing is left to run, two runs could not be told apart, the scene has no contact, or it does not allow an
+        element type, a mesh or a driver.
     """
     if not scene.contact_parts:
         raise StudyError("no part of the scene is in contact: errors are measured along the contact boundary")
-    runs = tuple(
-        Run(
-            sequence.name,
-            size,
-            replace(scene, discretisation=element, mesh=sequence.options(scene, size), solver=solver),
+    try:
+        runs = tuple(
+            Run(
+                sequence.name,
+                size,
+                replace(scene, discretisation=element, mesh=sequence.options(scene, size), solver=solver),
+            )
+            for element in discretisations
+            for sequence in meshes
+            if not (isinstance(element, ConstantCollocation) and isinstance(sequence, AdaptiveMeshes))
+            for solver in solvers
+            for size in sequence.sizes
         )
-        for element in discretisations
-        for sequence in meshes
-        if not (isinstance(element, ConstantCollocation) and isinstance(sequence, AdaptiveMeshes))
-        for solver in solvers
-        for size in sequence.sizes
-    )
+    except ValueError as error:  # of the mesh options or the scene, which name the number
+        raise StudyError(str(error)) from error
     if not runs:
         raise StudyError(
             "nothing to run: give at least one element type, driver and mesh, and with constant elements other than "

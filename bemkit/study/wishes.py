@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 from bemkit.expression import closest
 from bemkit.reference.compare import over_resolved
@@ -13,6 +13,7 @@ from bemkit.reference.values import MEASURES, Reference
 from bemkit.scene import Scene
 from bemkit.scenefile import load_scene, scene_to_toml, with_overrides
 from bemkit.solvers.base import ContactSolver
+from bemkit.structuring import structure
 from bemkit.study.cost import SUGGESTED, over_resolution_cost
 from bemkit.study.runs import AdaptiveMeshes, MeshSequence, Run, StudyError, all_runs, graded, uniform
 
@@ -138,7 +139,7 @@ def read_measures(text: str) -> tuple[str, ...]:
 
 def _solver(scene: Scene, word: str) -> ContactSolver:
     """Return the driver of a word: the scene's own, with its options, if it has that word."""
-    chosen = with_overrides(scene, solver=word).solver
+    chosen: ContactSolver = structure(word, cast(Any, ContactSolver))
     return scene.solver if type(chosen) is type(scene.solver) else chosen
 
 

@@ -12,6 +12,7 @@ import bemkit as bk
 from bemkit.adaptive import _expected_seconds, run_adaptive
 from bemkit.geometry.partition import STEEPEST
 from tests.adaptive.problems import contact_error, disc, paper, reference_values, wavy
+from tests.symmetry.scenes import square
 
 
 @lru_cache
@@ -82,6 +83,16 @@ def test_the_disc_between_plates_has_its_spectral_solution() -> None:
     solution = run_adaptive(dataclasses.replace(disc(), mesh=bk.MeshOptions(accuracy=1e-4)))[-1]
     assert solution.transitions[-1].s == pytest.approx(0.1, abs=2e-5)
     assert -solution.contact.sigma_n[0] == pytest.approx(0.050016, rel=1e-4)  # the digits printed
+
+
+def test_a_stick_zone_of_one_node_is_resolved() -> None:
+    """The whole body of Example 2: on the first mesh a single node sticks, between two zones that slip."""
+    first, *_, last = run_adaptive(square(mesh=bk.MeshOptions(accuracy=1e-2)))
+    assert first.contact.status_words().count("stick") == 1
+    places = reference_values(2)[1]
+    expected = [*places, *(1.0 - place for place in reversed(places))]
+    # an element at the transition has up to 3 % of the contact side
+    np.testing.assert_allclose([found.x for found in last.transitions], expected, rtol=0.0, atol=1e-3)
 
 
 def test_run_takes_the_accuracy_of_the_scene() -> None:
