@@ -22,6 +22,7 @@ import bemkit as bk
 from bemkit.contact.condensation import condense
 from bemkit.operators.linear import LinearSolver
 from bemkit.operators.linear_choice import direct_cost, krylov_cost
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.operators.threads import blas_threads_for
 
@@ -47,8 +48,8 @@ def mesh_of(name: str, n_elements: int) -> bk.BoundaryMesh:
     return bk.discretise(shape.outline(), n_elements=n_elements, grading=grading)
 
 
-def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> tuple[bk.GalerkinMap, float]:
-    """Condense a body onto n_open / 2 nodes; return the map and the time after assembly [s]."""
+def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> tuple[CondensedMap, float]:
+    """Condense a body onto n_open / 2 nodes; return what is left and the time after assembly [s]."""
     elastic = bk.GalerkinMap(mesh, bk.Material(1.0, 0.3), linear_solver=solver)
     lowest = np.array([mesh.nodes[:, 0].mean(), mesh.nodes[:, 1].min()])
     contact = np.sort(np.argsort(np.abs(mesh.centres - lowest).sum(axis=1))[: n_open // 2 - 1])
@@ -56,8 +57,8 @@ def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> tuple
     force[mesh.n_nodes // 2] = (0.3, -1.0)
     begin = time.perf_counter()
     with blas_threads_for(2 * mesh.n_nodes), assembly_time() as assembly:
-        condense(elastic, [], contact, force)
-    return elastic, time.perf_counter() - begin - assembly.seconds
+        body, _ = condense(elastic, [], contact, force)
+    return body.condensed, time.perf_counter() - begin - assembly.seconds
 
 
 def peak_of(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> int:

@@ -31,6 +31,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.multigrid import Multigrid
 from bemkit.operators.nodal import Support, supported
 from bemkit.operators.steklov_poincare import GalerkinMap
+from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 
 L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 SQUARE = Rectangle(1.0, 1.0)
@@ -61,6 +62,10 @@ def pressed(
     return body, elastic
 
 
+def free_stiffness(body: CondensedBody, elastic: GalerkinMap) -> FreeStiffness:
+    return FreeStiffness(elastic.layers, elastic.displacement_space, body.conditions)
+
+
 BODIES = {
     "square": (SQUARE, None),
     "L": (L_SHAPE, None),
@@ -72,7 +77,7 @@ BODIES = {
 
 
 def steps_of(name: str, n_elements: int, solver: Krylov) -> int:
-    (iterations,) = pressed(mesh_of(BODIES[name][0], n_elements, BODIES[name][1]), solver)[1].iterations
+    (iterations,) = pressed(mesh_of(BODIES[name][0], n_elements, BODIES[name][1]), solver)[0].condensed.iterations
     return iterations.n_steps
 
 
@@ -89,12 +94,12 @@ def test_steps_do_not_grow_with_the_number_of_elements(name: str) -> None:
 def test_steps_do_not_grow_up_to_800_elements(name: str, solver: Krylov, growth: int) -> None:
     steps = [steps_of(name, n_elements, solver) for n_elements in (100, 200, 400, 800)]
     assert min(steps) >= 9
-    assert max(steps) <= steps[0] + growth <= 23
+    assert max(steps) <= min(steps[0] + growth, 23)
 
 
 def test_more_columns_do_not_take_more_steps() -> None:
     mesh = mesh_of(L_SHAPE, 160)
-    few, many = (pressed(mesh, Krylov(), n_contact=n)[1].iterations[0] for n in (4, 20))
+    few, many = (pressed(mesh, Krylov(), n_contact=n)[0].condensed.iterations[0] for n in (4, 20))
     assert many.n_columns == 43
     assert many.n_steps <= few.n_steps
 
@@ -141,8 +146,8 @@ def test_answers_are_those_of_the_direct_solver(name: str) -> None:
         pressed(mesh, solver, poisson_ratio, is_quadratic=is_quadratic) for solver in solvers
     )
     assert_same(direct, iterated, (first, second))
-    assert not first.iterations
-    assert second.iterations
+    assert not direct.condensed.iterations
+    assert iterated.condensed.iterations
     own, other = direct.condensed.work, iterated.condensed.work
     assert own.element_pairs == other.element_pairs
     assert len(own.factorisations) == len(other.factorisations) + 1
@@ -160,8 +165,9 @@ def test_inclined_supports_and_other_loads() -> None:
     assert_same(direct, iterated, (first, second))
     random = np.random.default_rng(3)
     displacement, force = random.normal(size=(2, mesh.n_nodes, 2))
-    assert_same(direct.under(displacement, force), iterated.under(displacement, force), (first, second))
-    assert [one.n_columns for one in second.iterations] == [11, 1]
+    later = iterated.under(displacement, force)
+    assert_same(direct.under(displacement, force), later, (first, second))
+    assert [one.n_columns for one in later.condensed.iterations] == [11, 1]
     free = np.flatnonzero(direct.conditions.is_free)[::7]
     for one, two in zip(direct.condensed.follow(free), iterated.condensed.follow(free), strict=True):
         assert np.abs(one - two).max() < 1e-8 * np.abs(one).max()
@@ -251,10 +257,9 @@ def test_what_is_not_definite_is_refused(indefinite: str) -> None:
 
 
 def test_a_cycle_is_symmetric_definite_and_close_to_the_inverse() -> None:
-    _, elastic = pressed(mesh_of(SQUARE, 100), ALL_LEVELS)
-    factor = elastic._factors[0]
-    matrix = np.ascontiguousarray(factor.operator.equivalent())  # type: ignore[attr-defined]
-    cycle = Multigrid(matrix, factor.operator.neighbours(), coarsest=30, name="W")  # type: ignore[attr-defined]
+    operator = free_stiffness(*pressed(mesh_of(SQUARE, 100), ALL_LEVELS))
+    matrix = np.ascontiguousarray(operator.equivalent())
+    cycle = Multigrid(matrix, operator.neighbours(), coarsest=30, name="W")
     assert cycle.orders[0] == len(matrix)
     assert cycle.orders[-1] <= 30
     inverse = cycle.apply(np.eye(len(matrix)))
@@ -267,8 +272,7 @@ def test_a_cycle_is_symmetric_definite_and_close_to_the_inverse() -> None:
 
 def test_energies_of_w_and_s_are_close() -> None:
     for name, (shape, grading) in BODIES.items():
-        _, elastic = pressed(mesh_of(shape, 80, grading), Krylov())
-        operator = elastic._factors[0].operator  # type: ignore[attr-defined]
+        operator = free_stiffness(*pressed(mesh_of(shape, 80, grading), Krylov()))
         ratios = np.linalg.eigvals(np.linalg.solve(operator.equivalent(), operator.matrix())).real
         # S = W (1 + S'^-1 S) >= W, up to discretisation; added energies of a loop take some from its other motions
         assert ratios.min() > (0.1 if name == "hole" else 0.999)

@@ -11,10 +11,9 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
-from bemkit.operators.block_cg import Iterations
 from bemkit.operators.boundary import mass
 from bemkit.operators.dense import Cholesky
-from bemkit.operators.linear import DenseCholesky, Factor, LinearSolver, LinearSolverWish
+from bemkit.operators.linear import DenseCholesky, LinearSolver, LinearSolverWish
 from bemkit.operators.linear_choice import choose_linear_solver
 from bemkit.operators.material import Material
 from bemkit.operators.memory import physical_memory
@@ -89,12 +88,6 @@ class GalerkinMap:
         self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
         self.linear_solver = linear_solver
-        self._factors: list[Factor] = []
-
-    @property
-    def iterations(self) -> tuple[Iterations, ...]:
-        """What each solution for free displacements took that was found by iteration, in their order."""
-        return tuple(one for factor in self._factors for one in factor.iterations)
 
     @cached_property
     def factors(self) -> GalerkinFactors:
@@ -156,7 +149,6 @@ class GalerkinMap:
         stiffness = FreeStiffness(self.layers, self.displacement_space, conditions)
         check_is_held(stiffness, dof_points(self.displacement_space), _HELD_BODY)
         factor = solver.factor(stiffness, _HELD_BODY)
-        self._factors.append(factor)
         volume = rotate_rows(self._volume, conditions.frame)
         return IterativeCondensation(stiffness, factor, volume).condense(force, self.layers.work)
 

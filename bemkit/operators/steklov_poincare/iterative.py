@@ -143,7 +143,9 @@ class IterativeCondensation:
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             return response.displacements[directions], at_rest.displacements[directions]
 
-        return CondensedMap(0.5 * (stiffness + stiffness.T), load, recover, under, follow, self._sensitivity, work)
+        stiffness = 0.5 * (stiffness + stiffness.T)
+        counts = self.factor.iterations, work
+        return CondensedMap(stiffness, load, recover, under, follow, self._sensitivity, *counts)
 
 
 @dataclass(frozen=True, eq=False)

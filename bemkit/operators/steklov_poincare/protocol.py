@@ -8,6 +8,7 @@ from typing import Protocol
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.space import BoundarySpace
+from bemkit.operators.block_cg import Iterations
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.work import Work
 
@@ -37,6 +38,9 @@ class CondensedMap:
     sensitivity : (n_nodes, 2) array, optional
         Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
         above the forces themselves, which then are differences and carry its round-off.
+    iterations : tuple of Iterations
+        What each solution for free displacements so far took that was found by iteration; see
+        `bemkit.operators.linear.Krylov`.
     work : Work
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     """
@@ -47,6 +51,7 @@ class CondensedMap:
     under: Callable[[FloatArray, FloatArray], CondensedMap]
     follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
+    iterations: tuple[Iterations, ...] = ()
     work: Work = field(default_factory=Work)
 
 

@@ -90,4 +90,4 @@ class SchurCondensation:
             return response[rows], at_rest[rows]
 
         work = Work(right_hand_sides=1)
-        return CondensedMap(self._stiffness, load, recover, self.under, follow, self._sensitivity, work)
+        return CondensedMap(self._stiffness, load, recover, self.under, follow, self._sensitivity, work=work)
