@@ -1,5 +1,6 @@
-"""Names for the array types that every signature uses."""
+"""Names for the array types that every signature uses, and what is done to indices everywhere."""
 
+import itertools
 from typing import TypeAlias
 
 import numpy as np
@@ -14,3 +15,19 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 def read_only(array: npt.NDArray[np.generic]) -> None:
     """Forbid writing to an array that a frozen value holds."""
     array.setflags(write=False)
+
+
+Run: TypeAlias = tuple[slice, slice | IntArray]
+"""Positions in a list of indices, and the indices there."""
+
+
+def consecutive_runs(indices: IntArray) -> list[Run]:
+    """Cut indices into runs of consecutive numbers: pairs (positions, indices) of slices, which index without copies.
+
+    A list in no particular order is one run whose indices are an array.
+    """
+    breaks = np.flatnonzero(np.diff(indices) != 1) + 1
+    if breaks.size > 8:
+        return [(slice(0, indices.size), indices)]
+    edges = [0, *breaks.tolist(), indices.size]
+    return [(slice(i, j), slice(int(indices[i]), int(indices[i]) + j - i)) for i, j in itertools.pairwise(edges)]

@@ -10,7 +10,6 @@ all images of an element are gathered into its own, with the signs that the comp
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
@@ -18,7 +17,7 @@ from typing import Protocol, TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.folding import element_images, vanishing_dofs
 from bemkit.geometry.space import BoundarySpace
@@ -148,7 +147,7 @@ class _Target:
         self.test_coefficients = operator.test_coefficients
         self.terms = operator.trial_terms()
         self.images = [
-            (elements, signs.tolist(), [_runs(own) for own in dofs.T])
+            (elements, signs.tolist(), [consecutive_runs(own) for own in dofs.T])
             for elements, signs, dofs in element_images(operator.trial)
         ]
         self.matrix = np.zeros((self.test_dofs_total // 2, 2, self.n_trial, 2))
@@ -181,20 +180,8 @@ class _Target:
         for p, coefficient in enumerate(self.test_coefficients[:, a].tolist()):
             if not coefficient:
                 continue
-            for positions, dofs in _runs(self.test_dofs[rows, p]):
+            for positions, dofs in consecutive_runs(self.test_dofs[rows, p]):
                 for index, buffer in enumerate(gathered):
                     values = buffer[positions]
                     view = self.matrix[:, index // 2, :, index % 2]
                     view[dofs] += values if coefficient == 1.0 else coefficient * values
-
-
-def _runs(dofs: IntArray) -> list[tuple[slice, slice | IntArray]]:
-    """Cut a dof list into runs of consecutive numbers: pairs (positions, dofs) of slices, which index without copies.
-
-    A list in no particular order is one run whose dofs are an index array.
-    """
-    breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
-    if breaks.size > 8:
-        return [(slice(0, dofs.size), dofs)]
-    edges = [0, *breaks.tolist(), dofs.size]
-    return [(slice(i, j), slice(int(dofs[i]), int(dofs[i]) + j - i)) for i, j in itertools.pairwise(edges)]

@@ -9,10 +9,11 @@ the slope i everywhere, and so are held exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, IntArray
+from bemkit.arrays import ComplexArray, IntArray, Run, consecutive_runs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import corner_nodes
 from bemkit.operators.panels import Panels
@@ -63,8 +64,13 @@ class Slopes:
 
     def add_to(self, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool) -> None:
         """Add what slopes contribute to coefficients (n_rows, n_elements) of displacements, or of their conjugates."""
-        for weights, sources in ((self.own, None), (self.after, self.previous), (self.before, self.following)):
-            # the neighbour's slope takes this element as the one that follows, or precedes, it
-            moved = on_slope if sources is None else np.take(on_slope, sources, axis=1)
-            factor = weights if sources is None else weights[sources]
-            on += moved * (factor.conj() if is_conjugate else factor)
+        own, after, before = (w.conj() if is_conjugate else w for w in (self.own, self.after, self.before))
+        on += on_slope * own
+        # a neighbour's slope takes this element as the one that follows, or precedes, it
+        for weights, runs in ((after, self._runs[0]), (before, self._runs[1])):
+            for target, source in runs:
+                on[:, target] += on_slope[:, source] * weights[source]
+
+    @cached_property
+    def _runs(self) -> tuple[list[Run], list[Run]]:
+        return consecutive_runs(self.previous), consecutive_runs(self.following)
