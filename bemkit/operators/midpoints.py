@@ -106,19 +106,20 @@ class _Seen:
         columns = where[-1]
         nu = material.effective_poisson_ratio
         b = -1.0 / (4.0 * np.pi * (1.0 - nu))
-        turned = b * panels.tangent[columns] ** 2
-        result.on_displacement[where] = _complex(self.angle * (0.5 / np.pi), self.stretch * (b * (1.0 - 2.0 * nu)))
-        result.on_conjugate_displacement[where] = self.turn * turned
+        turned, rates = b * panels.tangent[columns] ** 2, (0.5 / np.pi, b * (1.0 - 2.0 * nu))
+        _join(result.on_displacement, where, self.angle * rates[0], self.stretch * rates[1])
+        _multiply(result.on_conjugate_displacement, where, self.turn, turned)
         if self.moments is not None:
             angle, stretch, turn = self.moments
-            result.on_slope[where] = angle * (0.5 / np.pi) + 1j * (stretch * (b * (1.0 - 2.0 * nu)))
-            result.on_conjugate_slope[where] = turn * turned
+            _join(result.on_slope, where, angle * rates[0], stretch * rates[1])
+            _multiply(result.on_conjugate_slope, where, turn, turned)
         if self.log is not None and self.half_quotient is not None:
             kappa = 3.0 - 4.0 * nu
             half = panels.half[columns]
             a = half / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
-            result.on_traction[where] = self.log * (-a * kappa) + a * (1.0 - 2.0 * kappa * np.log(half / r0))
-            result.on_conjugate_traction[where] = self.half_quotient * (a * panels.tangent[columns] ** 2)
+            _multiply(result.on_traction, where, self.log, -a * kappa)
+            result.on_traction[where] += a * (1.0 - 2.0 * kappa * np.log(half / r0))
+            _multiply(result.on_conjugate_traction, where, self.half_quotient, a * panels.tangent[columns] ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,6 +282,32 @@ def _seen(
     turn: ComplexArray = chord * eta / (plus * minus).conj()  # the difference of rho / conj(rho), without cancellation
     log, half_quotient = (inner.log[0], 0.5 * inner.quotient[0]) if has_single else (None, None)
     return _Seen(log, half_quotient, inner.double[0], stretch, turn, moments)
+
+
+def _multiply(
+    target: FloatArray | ComplexArray,
+    where: tuple[slice | IntArray, ...],
+    values: FloatArray | ComplexArray,
+    factor: FloatArray | ComplexArray,
+) -> None:
+    """Write a product, without a copy in between where slices say the place."""
+    if isinstance(where[0], slice):
+        np.multiply(values, factor, out=target[where])
+    else:
+        target[where] = values * factor
+
+
+def _join(
+    target: ComplexArray,
+    where: tuple[slice | IntArray, ...],
+    real: FloatArray | ComplexArray,
+    imaginary: FloatArray | ComplexArray,
+) -> None:
+    """Write real + i imaginary; the parts are complex themselves on curved elements."""
+    if np.iscomplexobj(real):
+        target[where] = real + 1j * imaginary
+    else:
+        target.real[where], target.imag[where] = real, imaginary
 
 
 def _complex(real: FloatArray, imaginary: FloatArray) -> ComplexArray:
