@@ -49,7 +49,7 @@ class Target:
 
 
 TARGETS = (
-    Target({"sigma_n": 1e-2}, 0.02, bk.MeshOptions(elements=44, density={"bottom": 6.0})),
+    Target({"sigma_n": 1e-2}, 0.02, bk.MeshOptions(elements=36, density={"bottom": 6.0}, grading=bk.Algebraic(1.2))),
     Target({"sigma_n": 1e-3, "sigma_t": 4e-3}, 0.15, bk.MeshOptions(accuracy=4e-3), bk.LinearGalerkin()),
     Target({"sigma_n": 1e-3, "sigma_t": 4e-3}, 0.15, bk.MeshOptions(accuracy=4e-3)),
     Target({"force": 1e-5, "energy": 1e-5}, 0.3, bk.MeshOptions(accuracy=1e-3)),
