@@ -33,15 +33,6 @@ class ColumnRun:
     along_x: FloatArray
     along_y: FloatArray
 
-    def cut(self, elements: slice) -> ColumnRun | None:
-        """Return the columns of those of its elements that lie in a range, or None."""
-        first, last = max(self.elements.start, elements.start), min(self.elements.stop, elements.stop)
-        if first >= last:
-            return None
-        own = slice(first - self.elements.start, last - self.elements.start)
-        direction = self.direction[own] if isinstance(self.direction, np.ndarray) else self.direction
-        return ColumnRun(slice(first, last), direction, self.along_x[:, own], self.along_y[:, own])
-
     def write(self, rows: slice, on: FloatArray | ComplexArray, on_conjugate: ComplexArray) -> None:
         """Write v -> on v + on_conjugate conj(v) for the columns of this run, in a range of rows."""
         x, y = self.along_x[rows], self.along_y[rows]

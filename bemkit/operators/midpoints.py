@@ -77,7 +77,7 @@ def _folded(
     """Add the coefficients of images: the signs (f, f) stand for v -> f v, and (f, -f) for v -> f conj(v)."""
     pieces = zip(images, np.split(on, len(images), axis=1), np.split(on_conjugate, len(images), axis=1), strict=True)
     total: ComplexArray = np.zeros((2, len(on), on.shape[1] // len(images)), complex)
-    with np.errstate(all="ignore"):  # what was not asked for holds anything
+    with np.errstate(all="ignore"):  # displacements that nobody asked for hold anything
         for (along_x, along_y), of_v, of_conjugate in pieces:
             total += along_x * np.array([of_v, of_conjugate] if along_x == along_y else [of_conjugate, of_v])
     return total[0], total[1]
