@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import Gap as Gap
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
+    from bemkit.contact.obstacle import PolygonalObstacle as PolygonalObstacle
     from bemkit.expression import Expression as Expression
     from bemkit.geometry.discretise import discretise as discretise
     from bemkit.geometry.grading import Algebraic as Algebraic
@@ -97,7 +98,7 @@ if TYPE_CHECKING:
 _HOME = {
     "cascade": ("run_cascade",),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
-    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
+    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle", "PolygonalObstacle"),
     "expression": ("Expression",),
     "geometry.discretise": ("discretise",),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.order import along_boundary
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators.nodal import Support
 from bemkit.operators.steklov_poincare import TractionField
@@ -71,32 +71,13 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
         elif isinstance(part.condition, PrescribedDisplacement):
             stresses.append(float(np.abs(part.condition.at(points)).max()) / length * modulus)
         elif isinstance(part.condition, Contact):
-            gap = part.condition.obstacle.gap(points, normals)
+            gap, _ = measure_contact(part.condition.obstacle, points, normals)
             # an overlap or gap below the round-off of the coordinates is no measure of anything
             gap = np.where(np.abs(gap) > 1e-18 * length, gap, 0.0)
             stresses.append(float(np.maximum(-gap, 0.0).max()) / length * modulus)
             gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
     stress = max(stresses) or max(gaps) / length * modulus or modulus
     return Units(mesh.centre, length, modulus, stress)
-
-
-def contact_elements(scene: Scene, mesh: BoundaryMesh) -> IntArray:
-    """Return the elements of all contact parts, in order along each."""
-    none = np.zeros(0, dtype=np.intp)
-    return np.concatenate([none, *(along_boundary(mesh, mesh.part(part.name)) for part in scene.contact_parts)])
-
-
-def frictionless_nodes(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> BoolArray:
-    """Return (n_nodes,) bool: the nodes of a space that lie on contact parts whose law knows no friction.
-
-    Notes
-    -----
-    A node of two parts belongs to the first. A coefficient that is a formula counts as friction, whatever its values.
-    """
-    is_frictionless = np.zeros(space.n_dofs // 2, bool)
-    for name, law in reversed(scene.laws.items()):
-        is_frictionless[space.element_dofs[mesh.part(name)]] = law.is_frictionless
-    return is_frictionless
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:

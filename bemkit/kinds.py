@@ -126,6 +126,7 @@ OBSTACLES = Family(
             "half-plane": "bemkit.contact.obstacle:HalfPlane",
             "circle": "bemkit.contact.obstacle:Circle",
             "cavity": "bemkit.contact.obstacle:Cavity",
+            "polygon": "bemkit.contact.obstacle:PolygonalObstacle",
             "gap": "bemkit.contact.obstacle:Gap",
         }
     ),

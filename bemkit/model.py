@@ -13,35 +13,20 @@ from itertools import zip_longest
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.boundary_data import (
-    Units,
-    contact_elements,
-    find_units,
-    frictionless_nodes,
-    nodal_forces,
-    parts_on,
-    supports_on,
-)
+from bemkit.boundary_data import Units, find_units, nodal_forces, parts_on, supports_on
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation import CondensedBody, ContactNodes, condense
+from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
+from bemkit.contact_data import ContactData, find_contact
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import supported
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 from bemkit.operators.work import Work
 from bemkit.plan import Decisions, Formulation, Plan, make_plan
-from bemkit.scene import (
-    Contact,
-    Part,
-    PrescribedDisplacement,
-    Pressure,
-    Scene,
-    Traction,
-)
+from bemkit.scene import Part, PrescribedDisplacement, Pressure, Scene, Traction
 from bemkit.scene_symmetry import check_symmetry
 
 _FARTHEST = 1e7
@@ -65,8 +50,11 @@ class Model:
     elastic : SteklovPoincare
         Dimensionless.
     body : CondensedBody
-    nodes : ContactNodes
+    contact : ContactData
+        Of the contact nodes of the body.
     problem : ContactProblem
+        Where supports hold contact nodes along the tangent its law is frictionless; see
+        `bemkit.held_friction.with_held_friction`.
     """
 
     scene: Scene
@@ -74,8 +62,13 @@ class Model:
     units: Units
     elastic: SteklovPoincare
     body: CondensedBody
-    nodes: ContactNodes
+    contact: ContactData
     problem: ContactProblem
+
+    @property
+    def nodes(self) -> ContactNodes:
+        """The contact nodes of the body."""
+        return self.body.nodes
 
     def under(self, scene: Scene) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
@@ -97,13 +90,16 @@ class Model:
         space = self.elastic.displacement_space
         supports = supports_on(scene, self.mesh, self.units, space)
         force = nodal_forces(scene, self.mesh, space, self.units)
-        is_frictionless = frictionless_nodes(scene, self.mesh, space)
-        if np.any(self.body.tangent_is_free & ~is_frictionless[self.nodes.nodes]):
-            body, _ = condense(self.elastic, supports, contact_elements(scene, self.mesh), force, is_frictionless)
+        contact = find_contact(scene, self.mesh, space)
+        stays = contact.of(self.nodes)
+        is_new_friction = self.nodes.is_frictionless & ~stays.nodes.is_frictionless
+        if stays.has_same_directions(self.contact) and not is_new_friction.any():
+            body, contact = self.body.under(supported(space, supports).displacement, force), stays
         else:
-            body = self.body.under(supported(space, supports).displacement, force)
-        problem = _problem(scene, self.mesh, self.units, body, space)
-        return replace(self, scene=scene, body=body, problem=problem)
+            body = condense(self.elastic, supports, contact.nodes, force)
+            contact = contact.of(body.nodes)
+        problem = _problem(scene, self.units, body, contact)
+        return replace(self, scene=scene, body=body, contact=contact, problem=problem)
 
     @property
     def work(self) -> Work:
@@ -111,9 +107,10 @@ class Model:
         return self.body.work
 
     @property
-    def places(self) -> tuple[tuple[str, ...], FloatArray]:
-        """The part of each contact node and its arc length along it [m]; see `contact_places`."""
-        return contact_places(self.scene, self.mesh, self.elastic.displacement_space, self.nodes)
+    def law(self) -> FrictionLaw:
+        """The friction law of the contact nodes, dimensionless, also where supports hold them."""
+        points = self.units.to_physical(self.nodes.points)
+        return self.scene.law_at(self.contact.parts, points).scaled(self.units.stress)
 
     def boundary_fields(self, state: ContactState) -> tuple[FloatArray, FloatArray, float]:
         """Return the physical fields of a contact state on the whole boundary.
@@ -137,7 +134,7 @@ class Model:
         space = self.elastic.displacement_space
         at_nodes = np.zeros((space.n_dofs // 2, 2))
         at_nodes[self.nodes.nodes] = np.einsum("nk,nkc->nc", state.traction, self.nodes.frame)
-        elements = contact_elements(self.scene, self.mesh)
+        elements = np.concatenate([self.mesh.part(part.name) for part in self.scene.contact_parts])
         xi, weights = gauss_legendre(space.degree + 1)
         traction[elements] = np.einsum(
             "p,epc->ec", space.basis(xi) @ weights / 2.0, at_nodes[space.element_dofs[elements]]
@@ -176,10 +173,10 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None, pl
     elastic = elastic_map(plan.decisions, mesh.unit, scene.material.scaled(units.modulus))
     force = nodal_forces(scene, mesh, elastic.displacement_space, units)
     supports = supports_on(scene, mesh, units, elastic.displacement_space)
-    is_frictionless = frictionless_nodes(scene, mesh, elastic.displacement_space)
-    body, nodes = condense(elastic, supports, contact_elements(scene, mesh), force, is_frictionless)
-    problem = _problem(scene, mesh, units, body, elastic.displacement_space)
-    return Model(scene, mesh, units, elastic, body, nodes, problem)
+    contact = find_contact(scene, mesh, elastic.displacement_space)
+    body = condense(elastic, supports, contact.nodes, force)
+    contact = contact.of(body.nodes)
+    return Model(scene, mesh, units, elastic, body, contact, _problem(scene, units, body, contact))
 
 
 def check_position(mesh: BoundaryMesh) -> None:
@@ -193,12 +190,9 @@ def check_position(mesh: BoundaryMesh) -> None:
         )
 
 
-def _problem(
-    scene: Scene, mesh: BoundaryMesh, units: Units, body: CondensedBody, space: BoundarySpace
-) -> ContactProblem:
-    parts, _ = contact_places(scene, mesh, space, body.nodes)
-    law = scene.law_at(parts, dof_points(space, mesh)[body.nodes.nodes])
-    return ContactProblem(body, _gap(scene, mesh, body.nodes, space, units), law.scaled(units.stress))
+def _problem(scene: Scene, units: Units, body: CondensedBody, contact: ContactData) -> ContactProblem:
+    law = scene.law_at(contact.parts, units.to_physical(contact.nodes.points), body.is_held)
+    return ContactProblem(body, contact.gap / units.displacement, law.scaled(units.stress))
 
 
 def physical_fields(
@@ -238,31 +232,6 @@ def physical_fields(
     return displacement * units.displacement, traction, energy
 
 
-def contact_places(
-    scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, nodes: ContactNodes
-) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the part of each contact node and its arc length along it; a node of two parts belongs to the first.
-
-    Returns
-    -------
-    parts : tuple of n_contact str
-    arc_length : (n_contact,) array [m]
-    """
-    n_scalar = space.n_dofs // 2
-    names: list[str] = [""] * n_scalar
-    arc_length = np.full(n_scalar, np.nan)
-    for part in scene.contact_parts:
-        elements = along_boundary(mesh, mesh.part(part.name))
-        lengths = mesh.lengths[elements]
-        begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-        dofs = space.element_dofs[elements]
-        s = begin[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0)
-        for dof, place in zip(dofs.ravel().tolist(), s.ravel().tolist(), strict=True):
-            if not names[dof]:
-                names[dof], arc_length[dof] = part.name, place
-    return tuple(names[dof] for dof in nodes.nodes.tolist()), arc_length[nodes.nodes]
-
-
 def elastic_map(decisions: Decisions, mesh: BoundaryMesh, material: Material) -> SteklovPoincare:
     """Return the map from displacements to forces that was chosen for a scene."""
     if decisions.formulation is Formulation.COLLOCATION:
@@ -294,16 +263,3 @@ def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray
     values = load.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
     mean: FloatArray = np.einsum("q,eqc->ec", 0.5 * weights, values)
     return mean
-
-
-def _gap(scene: Scene, mesh: BoundaryMesh, nodes: ContactNodes, space: BoundarySpace, units: Units) -> FloatArray:
-    """Measure the gap of each contact node to the nearest obstacle among the parts it belongs to."""
-    gap = np.full(space.n_dofs // 2, np.inf)
-    # not by way of the dimensionless points: a node on the obstacle shall have the gap zero, also far from the origin
-    points = dof_points(space, mesh)[nodes.nodes]
-    for part in scene.contact_parts:
-        if isinstance(part.condition, Contact):
-            own = np.isin(nodes.nodes, space.element_dofs[mesh.part(part.name)])
-            measured = part.condition.obstacle.gap(points[own], nodes.normals[own])
-            gap[nodes.nodes[own]] = np.minimum(gap[nodes.nodes[own]], measured)
-    return gap[nodes.nodes] / units.displacement

@@ -8,13 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from bemkit.arrays import IntArray
 from bemkit.boundary_data import Units, find_units
 from bemkit.clock import StageClock
 from bemkit.contact.admissibility import find_unsolvable_load
+from bemkit.contact.body import ContactState
 from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
+from bemkit.held_friction import with_held_friction
 from bemkit.history import load_steps
 from bemkit.model import Model, build_model
 from bemkit.operators.stopwatch import assembly_time
@@ -193,8 +196,9 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
         displacement, traction, energy = model.boundary_fields()
         table = ContactTable.empty()
     else:
-        displacement, traction, energy = model.boundary_fields(result.state)
-        table = _contact_table(model, result)
+        state, node_status = with_held_friction(model, result.state, result.node_status)
+        displacement, traction, energy = model.boundary_fields(state)
+        table = _contact_table(model, state, node_status)
         transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
@@ -308,23 +312,21 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
     return list(map(run, scenes)) if executor is None else list(executor.map(run, scenes))
 
 
-def _contact_table(model: Model, result: ContactSolution) -> ContactTable:
-    units, state = model.units, result.state
+def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:
+    units, contact = model.units, model.contact
     points = dof_points(model.elastic.displacement_space, model.mesh)[model.nodes.nodes]
-    parts, lengths = model.places
-    gap = model.problem.gap * units.displacement
     displacement = state.displacement * units.displacement
     return ContactTable(
-        part=parts,
+        part=contact.parts,
         x=points[:, 0].copy(),
         y=points[:, 1].copy(),
-        s=lengths,
+        s=contact.arc_length.copy(),
         u_n=displacement[:, 0].copy(),
         u_t=displacement[:, 1].copy(),
         sigma_n=state.sigma_n * units.stress,
         sigma_t=state.sigma_t * units.stress,
-        gap=gap,
-        clearance=gap - displacement[:, 0],
-        status=np.asarray(result.node_status).copy(),
+        gap=contact.gap.copy(),
+        clearance=contact.gap - displacement[:, 0],
+        status=np.asarray(node_status).copy(),
         weight=model.nodes.weights * units.length,
     )

@@ -317,7 +317,7 @@ class Scene:
         """The pieces of the outline that the parts cover, by name."""
         return {part.name: part.selection for part in self.parts}
 
-    def law_at(self, parts: Sequence[str], points: FloatArray) -> FrictionLaw:
+    def law_at(self, parts: Sequence[str], points: FloatArray, is_held: BoolArray | None = None) -> FrictionLaw:
         """Return the friction law of given contact nodes, every coefficient in numbers.
 
         Parameters
@@ -325,6 +325,8 @@ class Scene:
         parts : sequence of n_contact str
             The contact part that each node belongs to.
         points : (n_contact, 2) array [m]
+        is_held : (n_contact,) bool array, optional
+            Nodes without friction, whatever their part. None by default.
 
         Returns
         -------
@@ -335,9 +337,11 @@ class Scene:
         LawError
             If a coefficient is not finite or negative somewhere; the message names the part.
         """
-        laws, nodes = [], []
+        held = np.zeros(len(parts), bool) if is_held is None else is_held
+        laws: list[FrictionLaw] = [Frictionless()] if held.any() else []
+        nodes = [np.flatnonzero(held)] if held.any() else []
         for name, law in self.laws.items():
-            own = np.flatnonzero([part == name for part in parts])
+            own = np.flatnonzero(np.array([part == name for part in parts], bool) & ~held)
             try:
                 laws.append(law.at(points[own]))
             except ValueError as error:

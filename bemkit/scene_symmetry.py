@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.obstacle import measure_contact
 from bemkit.geometry.division import divide
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
@@ -194,7 +195,8 @@ def _acting(scene: Scene, part: Part | None, samples: _Samples) -> tuple[str, di
             law = (scene.law if own_law is None else own_law).at(points)
             pressures = [np.full(len(points), -p * scene.material.plane_modulus) for p in _PRESSURES]
             bounds = {f"friction bound at the pressure {-p[0]:.3g}": law.bound(p)[:, None] for p in pressures}
-            return "in contact", {"gap": obstacle.gap(points, normals)[:, None], **bounds}
+            gap, direction = measure_contact(obstacle, points, normals)
+            return "in contact", {"gap": gap[:, None], "direction of contact": direction, **bounds}
         case Traction() | Pressure() as load:
             return "free or loaded", {"traction": load.at(points, normals)}
         case PrescribedDisplacement() as motion:

@@ -35,7 +35,7 @@ def state_on(model: Model, solution: Solution) -> ContactState:
         "sigma_n": units.stress,
         "sigma_t": units.stress,
     }
-    parts, arc_length = model.places
+    parts, arc_length = model.contact.parts, model.contact.arc_length
     values = {name: np.zeros(len(parts)) for name in scales}
     for part in dict.fromkeys(parts):
         known = np.flatnonzero([name == part for name in table.part])

@@ -34,6 +34,8 @@ def block(*, push: Any = 0.2, press: Any = -1.0, law: bk.FrictionLaw | None = No
 def cylinder(radius: float, factors: tuple[float, ...], *, elements: int = 320, fineness: float = 2.0) -> bk.Scene:
     """Half of a block, pressed from below against a rigid cylinder; by symmetry a roller stands for the other half.
 
+    The gap is measured along the normals of the block, as in the theory of the half-plane.
+
     The contact half-width comes out near a = `radius`, small against the block of size 1, so that the block is nearly
     a half-plane.
     """
@@ -50,7 +52,7 @@ def cylinder(radius: float, factors: tuple[float, ...], *, elements: int = 320, 
         law=bk.Coulomb(0.3),
         load_factors=factors,
         parts=(
-            bk.Part("contact", bk.Contact(bk.Circle((0.0, 2.0), 1.0)), sides=("contact",)),
+            bk.Part("contact", bk.Contact(bk.Gap(bk.Expression("1 - sqrt(1 - x**2)"))), sides=("contact",)),
             bk.Part("symmetry", bk.Roller(), sides=("axis", "near-axis")),
             bk.Part("base", bk.PrescribedDisplacement(x=0.0, y=float(depth)), sides=("bottom",)),
         ),

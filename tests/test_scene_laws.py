@@ -52,7 +52,7 @@ def test_each_part_may_have_its_own_law() -> None:
     scene = scene_from_toml(PAPER_1.replace(WALL, condition))
     assert scene_from_toml(scene_to_toml(scene)).parts[1].condition.law.friction_coefficient == 0.1
     model = build_model(scene, scene.build_mesh())
-    parts, _ = model.places
+    parts = model.contact.parts
     assert isinstance(model.problem.law, PartwiseLaw)
     expected = np.where(np.array(parts) == "foundation", 0.5, 0.1)
     np.testing.assert_array_equal(model.problem.friction_bound(np.full(len(parts), -1.0)), expected)

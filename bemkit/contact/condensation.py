@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.dense import DenseBody
 from bemkit.contact.nodes import ContactNodes as ContactNodes
 from bemkit.contact.nodes import contact_conditions as contact_conditions
-from bemkit.contact.nodes import free_motions
+from bemkit.contact.nodes import free_motions, held_nodes
 from bemkit.contact.unknowns import Unknowns, find_free_tangents, find_tangents, find_unknowns
 from bemkit.geometry.space import dof_points
 from bemkit.operators.balance import resultant_imbalance, round_off_of
@@ -51,8 +51,8 @@ class CondensedBody:
     Notes
     -----
     At a node where a support prescribes one direction (a roller meets the contact boundary) only the other one is
-    open. Its normal motion and pressure are true; friction there is left to the support: under a law with friction the
-    tangential component is a decoupled spring without load, which rests.
+    open. Its displacements and its pressure are true; friction there cannot be told from the reaction of the support,
+    so that no friction acts in the contact problem; see `bemkit.contact.held_friction`.
     """
 
     dense: DenseBody
@@ -86,8 +86,12 @@ class CondensedBody:
     @property
     def moves(self) -> BoolArray:
         """(n_contact, 2) bool array: where `rigid_motions` are known; not along tangents that supports hold."""
-        is_supported = self.conditions.is_fixed[self.nodes.nodes].any(axis=1)
-        return np.stack([np.ones_like(is_supported), ~is_supported], axis=1)
+        return np.stack([np.ones_like(self.is_held), ~self.is_held], axis=1)
+
+    @property
+    def is_held(self) -> BoolArray:
+        """(n_contact,) bool array: nodes that a support holds in one direction, which have no friction of their own."""
+        return held_nodes(self.conditions, self.nodes)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return displacement and traction under two conditions per contact node."""
@@ -162,29 +166,23 @@ class CondensedBody:
 
 
 def condense(
-    elastic: SteklovPoincare,
-    supports: Sequence[Support],
-    contact_elements: IntArray,
-    force: FloatArray,
-    is_frictionless: BoolArray | None = None,
-) -> tuple[CondensedBody, ContactNodes]:
+    elastic: SteklovPoincare, supports: Sequence[Support], candidates: ContactNodes, force: FloatArray
+) -> CondensedBody:
     """Reduce a body to its contact boundary.
 
     Parameters
     ----------
     elastic : SteklovPoincare
     supports : sequence of Support
-    contact_elements : (m,) array
-        Elements that may touch an obstacle, in order.
+    candidates : ContactNodes
+        Nodes that may touch an obstacle, whatever holds them.
     force : (n_nodes, 2) array [N/m]
         Given nodal forces.
-    is_frictionless : (n_nodes,) bool array, optional
-        Nodes of the displacement space whose law is frictionless: their tangents are eliminated. None by default.
 
     Returns
     -------
-    body : CondensedBody
-    nodes : ContactNodes
+    CondensedBody
+        Its `nodes` are the candidates that can touch; the others are left to their supports.
 
     Raises
     ------
@@ -196,22 +194,17 @@ def condense(
         If even glued contact does not hold the body.
     """
     space = elastic.displacement_space
-    conditions, contact = contact_conditions(space, supports, contact_elements, is_frictionless)
+    conditions, contact = contact_conditions(space, supports, candidates)
     condensed = elastic.condense(conditions, force)
     if not contact.nodes.size:
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    is_free = find_tangents(conditions, contact, is_frictionless)
+    is_free = find_tangents(conditions, contact)
     unknowns = find_unknowns(conditions, contact, is_free)
     stiffness = unknowns.to_open.T @ condensed.stiffness @ unknowns.to_open
-    idle = np.flatnonzero(~unknowns.to_open.any(axis=0))
-    diagonal = np.diagonal(stiffness)
-    is_stiff = diagonal > 0.0
-    stiffness[idle, idle] = np.median(diagonal[is_stiff]) if is_stiff.any() else 1.0
     free = find_free_tangents(conditions, contact, is_free, unknowns, condensed)
     motions = free_motions(conditions, contact, space)
     dense = DenseBody(stiffness, unknowns.load(condensed), contact.weights, motions, free)
     points = dof_points(space)
-    body = CondensedBody(dense, condensed, unknowns, points, conditions, contact, possible_motions(space.mesh))
-    return body, contact
+    return CondensedBody(dense, condensed, unknowns, points, conditions, contact, possible_motions(space.mesh))

@@ -12,10 +12,14 @@ from bemkit.contact.tangents import open_tangents
 from bemkit.geometry.space import BoundarySpace, dof_points, dof_weights
 from bemkit.operators.nodal import NodalConditions, Support, supported, unsupported_motions
 
+CAN_TOUCH = 1e-3
+"""Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
+which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactNodes:
-    """The displacement nodes on the contact boundary.
+    """Displacement nodes that may touch an obstacle.
 
     Parameters
     ----------
@@ -23,38 +27,49 @@ class ContactNodes:
         Scalar dofs of the displacement space, in order along each contact part.
     points : (n_contact, 2) array [m]
     frame : (n_contact, 2, 2) array
-        Rows are the outward normal and the tangent.
+        Rows are the direction of contact d (into the obstacle, see `bemkit.contact.obstacle`) and the tangent
+        ``(-d_y, d_x)``. Where contact acts along the body's normal these are the outward normal and the tangent.
     weights : (n_contact,) array [m]
         Length of boundary that belongs to each node.
+    is_frictionless : (n_contact,) bool array
+        Nodes whose friction law knows no friction.
     """
 
     nodes: IntArray
     points: FloatArray
     frame: FloatArray
     weights: FloatArray
+    is_frictionless: BoolArray
 
     @property
-    def normals(self) -> FloatArray:
-        """(n_contact, 2) outward unit normals."""
+    def directions(self) -> FloatArray:
+        """(n_contact, 2) unit vectors: the directions of contact, of u_n and of sigma_n."""
         return self.frame[:, 0]
 
+    def take(self, rows: IntArray | BoolArray) -> ContactNodes:
+        """Return some of the nodes."""
+        return ContactNodes(*(column[rows] for column in vars(self).values()))
 
-def contact_nodes(space: BoundarySpace, elements: IntArray, conditions: NodalConditions) -> ContactNodes:
-    """Find the nodes of some contact elements that can move towards the obstacle.
+
+def contact_frame(directions: FloatArray) -> FloatArray:
+    """Return the frames (n, 2, 2) of directions of contact (n, 2); see `ContactNodes`."""
+    return np.stack([directions, np.stack([-directions[:, 1], directions[:, 0]], axis=1)], axis=1)
+
+
+def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return the nodes of some elements in their order, and the outward normals there.
 
     Parameters
     ----------
     space : BoundarySpace
-        The displacement space.
     elements : (m,) array
-        Contact elements in order along the boundary.
-    conditions : NodalConditions
-        The supports; a node whose normal direction is prescribed cannot come into contact and is left to its support.
 
     Returns
     -------
-    ContactNodes
-        Normals are averaged over the contact elements that meet at a node.
+    nodes : (n,) array
+        Scalar dofs.
+    normals : (n, 2) array
+        Unit normals, averaged over those of the elements that meet at a node.
     """
     dofs = space.element_dofs[elements]
     order = dofs.ravel()[np.sort(np.unique(dofs.ravel(), return_index=True)[1])]
@@ -62,19 +77,33 @@ def contact_nodes(space: BoundarySpace, elements: IntArray, conditions: NodalCon
     normals = np.zeros((space.n_dofs // 2, 2))
     np.add.at(normals, dofs, local_normals * space.mesh.lengths[elements][:, None, None])
     normals /= np.maximum(np.hypot(*normals.T), np.finfo(float).tiny)[:, None]
-    n = normals[order]
-    motion = np.where(conditions.is_fixed[order][:, :, None], 0.0, conditions.frame[order])
-    can_touch = np.abs(np.einsum("nkc,nc->nk", motion, n)).max(axis=1) > 1e-6
-    order, n = order[can_touch], n[can_touch]
-    frame = np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=1)
-    return ContactNodes(order, dof_points(space)[order], frame, dof_weights(space, elements)[order])
+    return order, normals[order]
+
+
+def contact_along_normals(space: BoundarySpace, elements: IntArray, *, is_frictionless: bool = False) -> ContactNodes:
+    """Return the nodes of some elements, contact acting along the body's normals.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        The displacement space.
+    elements : (m,) array
+        Contact elements in order along the boundary.
+    is_frictionless : bool
+        Of all nodes.
+
+    Returns
+    -------
+    ContactNodes
+    """
+    nodes, normals = nodes_on(space, elements)
+    weights = dof_weights(space, elements)[nodes]
+    law = np.full(nodes.size, is_frictionless)
+    return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights, law)
 
 
 def contact_conditions(
-    space: BoundarySpace,
-    supports: Sequence[Support],
-    contact_elements: IntArray,
-    is_frictionless: BoolArray | None = None,
+    space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes
 ) -> tuple[NodalConditions, ContactNodes]:
     """Find what is known at every node of a space: held by a support, open to contact, or free.
 
@@ -83,16 +112,16 @@ def contact_conditions(
     space : BoundarySpace
         The displacement space.
     supports : sequence of Support
-    contact_elements : (m,) array
-        Elements that may touch an obstacle, in order.
-    is_frictionless : (n_nodes,) bool array, optional
-        Nodes whose law is frictionless. None by default.
+    candidates : ContactNodes
+        Nodes that may touch, whatever holds them.
 
     Returns
     -------
     conditions : NodalConditions
         Their open directions are the unknowns of the contact system, but for tangents that supports hold.
-    nodes : ContactNodes
+    contact : ContactNodes
+        The candidates that can touch. The others are left to their supports, which let them move neither towards the
+        obstacle nor away from it.
 
     Raises
     ------
@@ -100,19 +129,24 @@ def contact_conditions(
         If supports contradict each other at a node.
     """
     conditions = supported(space, supports)
-    contact = contact_nodes(space, contact_elements, conditions)
-    has_tangent = np.ones(contact.nodes.size, bool)
-    if is_frictionless is not None and contact.nodes.size:
-        is_supported: BoolArray = np.any(conditions.is_fixed[contact.nodes], axis=1)
-        motions = free_motions(conditions, contact, space)
-        has_tangent = open_tangents(motions, is_frictionless[contact.nodes], is_supported)
+    motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
+    can_touch: BoolArray = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1) > CAN_TOUCH
+    contact = candidates.take(can_touch)
+    is_supported = held_nodes(conditions, contact)
+    motions = free_motions(conditions, contact, space)
+    has_tangent = open_tangents(motions, contact.is_frictionless, is_supported)
     return _opened(conditions, contact, has_tangent), contact
 
 
+def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+    """Return (n_contact,) bool: the contact nodes that a support holds in one direction."""
+    return np.asarray(np.any(conditions.is_fixed[contact.nodes], axis=1))
+
+
 def _opened(conditions: NodalConditions, contact: ContactNodes, has_tangent: BoolArray) -> NodalConditions:
-    """Open the normal directions of the contact nodes, and the tangential ones of some, that no support fixes."""
+    """Open the directions of contact of the contact nodes, and the tangential ones of some, that no support fixes."""
     frame, is_open = conditions.frame.copy(), conditions.is_open.copy()
-    unsupported = ~conditions.is_fixed[contact.nodes].any(axis=1)
+    unsupported = ~held_nodes(conditions, contact)
     frame[contact.nodes[unsupported]] = contact.frame[unsupported]
     is_open[contact.nodes] = ~conditions.is_fixed[contact.nodes]
     is_open[contact.nodes[unsupported & ~has_tangent], 1] = False
@@ -126,5 +160,5 @@ def free_motions(conditions: NodalConditions, contact: ContactNodes, space: Boun
     """
     motions = unsupported_motions(space, conditions)[:, contact.nodes]
     at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
-    at_contact[:, conditions.is_fixed[contact.nodes].any(axis=1), 1] = 0.0
+    at_contact[:, held_nodes(conditions, contact), 1] = 0.0
     return at_contact

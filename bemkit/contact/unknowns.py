@@ -65,7 +65,7 @@ def find_unknowns(conditions: NodalConditions, contact: ContactNodes, tangent_is
     for k in np.flatnonzero(is_supported):  # a handful: nodes where a support meets the contact boundary
         node = contact.nodes[k]
         free = int(np.argmax(number[k]))
-        along = conditions.frame[node] @ contact.normals[k]
+        along = conditions.frame[node] @ contact.directions[k]
         matrix[number[k, free], 2 * k] = 1.0 / along[free]
         offset[number[k, free]] = -along[1 - free] * conditions.displacement[node, 1 - free] / along[free]
     is_unknown = np.ones((contact.nodes.size, 2), bool)
@@ -102,9 +102,10 @@ def find_free_tangents(
     return FreeTangents(chosen, response, at_rest)
 
 
-def find_tangents(conditions: NodalConditions, contact: ContactNodes, is_frictionless: BoolArray | None) -> BoolArray:
-    """Return (n_contact,) bool: where the tangential displacement follows the unknowns, or a support."""
-    if is_frictionless is None:
-        return np.zeros(contact.nodes.size, bool)
-    is_free: BoolArray = is_frictionless[contact.nodes] & ~conditions.is_open[contact.nodes].all(axis=1)
-    return is_free
+def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+    """Return (n_contact,) bool: where the tangential displacement follows the unknowns.
+
+    That is at nodes without friction, but for the few that are kept open, and wherever a support holds the node: what
+    acts there along the tangent cannot be told from the reaction of the support.
+    """
+    return np.asarray(~np.all(conditions.is_open[contact.nodes], axis=1))

@@ -14,6 +14,7 @@ from bemkit.geometry.outline import Outline
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.transition import gradual_positions
 from bemkit.geometry.vectors import norms
 
 _N_PANELS = 256
@@ -42,7 +43,8 @@ def discretise(
     parts : mapping of str to Selection, optional
         Boundary parts by name; they must not overlap, and need not cover the boundary.
     grading : Grading, optional
-        Spacing of the elements on every piece; uniform if left out.
+        Spacing of the elements on every piece. Uniform if left out, but for lengths that grow gradually next to a piece
+        with elements of less than half the length.
     density : mapping of str to float, optional
         How densely sides are divided compared with the others, by the name of the side; 1 where left out.
     symmetry : Symmetry, optional
@@ -75,7 +77,11 @@ def discretise(
         for piece in division.pieces
     ]
     counts = share_elements(n_elements, np.array(weights))
-    positions = [_checked_positions(grading, int(count)) for count in counts]
+    if isinstance(grading, Uniform):
+        lengths = np.array([rulers[piece.side].length(*piece.span) for piece in division.pieces])
+        positions = _gradual(division, counts, lengths)
+    else:
+        positions = [_checked_positions(grading, int(count)) for count in counts]
     return division.mesh(
         [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(division.pieces, positions, strict=True)]
     )
@@ -132,6 +138,17 @@ class _Ruler:
             s: FloatArray = np.interp(lengths, self._arc_length, self._ends)
             return s
         return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
+
+
+def _gradual(division: Division, counts: IntArray, lengths: FloatArray) -> list[FloatArray]:
+    """Return positions on each piece that lead gradually to the elements of denser neighbours."""
+    sizes = lengths / counts
+    following = division.following
+    after = np.where(following >= 0, sizes[following], np.inf)  # none on a symmetry line
+    before = np.full(counts.size, np.inf)
+    before[following[following >= 0]] = sizes[following >= 0]
+    ends = zip(counts.tolist(), (before / lengths).tolist(), (after / lengths).tolist(), strict=True)
+    return [gradual_positions(*each) for each in ends]
 
 
 def _checked_positions(grading: Grading, n: int) -> FloatArray:

@@ -124,7 +124,7 @@ class Division:
         is_curved = np.array([not side.curve.is_straight for side in outline.sides])
         after = np.cumsum(counts)
         ends = np.arange(1, after[-1] + 1)
-        following = self._following
+        following = self.following
         ends[after - 1] = (after - counts)[following]
         loose = np.flatnonzero(following < 0)  # on a symmetry line
         ends[after[loose] - 1] = after[-1] + np.arange(len(loose))
@@ -141,7 +141,7 @@ class Division:
         )
 
     @property
-    def _following(self) -> IntArray:
+    def following(self) -> IntArray:
         """(n_pieces,) array: the piece that starts where each one ends; -1 on a symmetry line."""
         next_side = np.arange(1, len(self.outline.sides) + 1)
         after = np.cumsum([len(sides) for sides in self.outline.loops])

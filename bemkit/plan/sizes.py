@@ -7,15 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.boundary_data import (
-    contact_elements,
-    find_units,
-    frictionless_nodes,
-    nodal_forces,
-    supports_on,
-)
+from bemkit.boundary_data import find_units, nodal_forces, supports_on
 from bemkit.contact.nodes import contact_conditions, free_motions
 from bemkit.contact.unknowns import find_tangents
+from bemkit.contact_data import find_contact
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators.nodal import NodalConditions, supported
@@ -99,9 +94,9 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
     scene = steps[0]
     units = find_units(scene, mesh)
     space = decisions.displacement_space(mesh.unit)
-    supports, is_frictionless = supports_on(scene, mesh, units, space), frictionless_nodes(scene, mesh, space)
-    conditions, nodes = contact_conditions(space, supports, contact_elements(scene, mesh), is_frictionless)
-    tangent_is_free = find_tangents(conditions, nodes, is_frictionless)
+    supports, candidates = supports_on(scene, mesh, units, space), find_contact(scene, mesh, space).nodes
+    conditions, nodes = contact_conditions(space, supports, candidates)
+    tangent_is_free = find_tangents(conditions, nodes)
     data = _data(steps, mesh, space, conditions) if decisions.formulation is Formulation.COLLOCATION else []
     holds_volume = scene.material.is_incompressible and not mesh.is_exterior
     return Sizes(

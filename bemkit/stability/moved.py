@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.obstacle import Obstacle
+from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.expression import ScalarField, evaluate_field
 from bemkit.geometry.curve import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
@@ -47,6 +47,14 @@ class Stretch:
             return normals
         original = normals * np.array(self.factor)
         return np.asarray(original / np.hypot(*original.T)[:, None])
+
+    def normals_forward(self, normals: FloatArray) -> FloatArray:
+        """Return the unit normals of the stretched boundary that belong to normals of the original."""
+        return self._inverse.normals_back(normals)
+
+    @property
+    def _inverse(self) -> Stretch:
+        return Stretch((1.0 / self.factor[0], 1.0 / self.factor[1]))
 
     def moved(self, symmetry: Symmetry) -> Symmetry:
         """Map symmetry lines."""
@@ -98,6 +106,11 @@ class MovedObstacle:
         """Measure the gap at moved points; see `Obstacle.gap`."""
         original = self.obstacle.gap(self.stretch.back(points), self.stretch.normals_back(normals))
         return self.factor * original + self.offset
+
+    def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Return the direction of contact at moved points; see `DirectedObstacle.approach`."""
+        _, direction = measure_contact(self.obstacle, self.stretch.back(points), self.stretch.normals_back(normals))
+        return self.stretch.normals_forward(direction)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Gaps along the normal, against points moved until they touch."""
+"""Gaps and directions of contact: a point moved by its gap along its direction lies on the obstacle."""
 
 from __future__ import annotations
 
@@ -9,44 +9,76 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
+from bemkit.contact.obstacle import (
+    Cavity,
+    Circle,
+    DirectedObstacle,
+    Gap,
+    HalfPlane,
+    Obstacle,
+    PolygonalObstacle,
+    measure_contact,
+)
 from bemkit.expression import Expression
 
 coordinates = st.floats(-10.0, 10.0)
 points = st.tuples(coordinates, coordinates)
 angles = st.floats(-math.pi, math.pi)
 
+DART = ((0.0, 0.0), (4.0, -1.0), (1.0, 1.0), (2.0, 3.0))
+"""Not convex: the corner (1, 1) points inwards."""
 
-def direction(angle: float) -> tuple[float, float]:
+
+def unit(angle: float) -> tuple[float, float]:
     return math.cos(angle), math.sin(angle)
 
 
-@given(points, points, angles, angles)
-def test_a_point_moved_by_the_gap_lies_on_the_half_plane(
-    point: tuple[float, float], origin: tuple[float, float], facing: float, turn: float
+def touching(obstacle: DirectedObstacle, point: object) -> np.ndarray:  # type: ignore[type-arg]
+    """Return where a point touches the obstacle; its own normal says nothing about that."""
+    at, normals = np.array([point], float), np.array([[0.6, 0.8]])
+    direction = obstacle.approach(at, normals)
+    assert np.hypot(*direction[0]) == pytest.approx(1.0, abs=1e-14)
+    return np.asarray(at[0] + obstacle.gap(at, normals)[0] * direction[0])
+
+
+@given(points, points, angles)
+def test_a_point_touches_a_half_plane_at_its_nearest_point(
+    point: tuple[float, float], origin: tuple[float, float], facing: float
 ) -> None:
-    obstacle = HalfPlane(origin, tuple(3.0 * component for component in direction(facing)))
-    normal = np.array(direction(facing + math.pi + turn / 3.0))  # within 60 degrees of facing the obstacle
-    gap = obstacle.gap(np.array([point]), normal[None])[0]
-    touching = np.array(point) + gap * normal
-    # coordinates up to 10 and gaps up to 60 carry round-off of about 1e-14
-    assert (touching - np.array(origin)) @ np.array(direction(facing)) == pytest.approx(0.0, abs=1e-12)
+    obstacle = HalfPlane(origin, tuple(3.0 * component for component in unit(facing)))
+    normal, surface = np.array(unit(facing)), touching(obstacle, point) - np.array(origin)
+    # coordinates up to 10 and gaps up to 30 carry round-off of about 1e-14
+    assert surface @ normal == pytest.approx(0.0, abs=1e-12)
+    foot = np.array(point) - np.array(origin)
+    assert abs(foot[0] * normal[1] - foot[1] * normal[0]) == pytest.approx(
+        abs(surface[0] * normal[1] - surface[1] * normal[0]), abs=1e-12
+    )
 
 
 def test_the_half_plane_of_the_paper() -> None:
     points = np.array([[0.0, 0.25], [3.0, -0.5], [0.0, 1.0], [0.0, 1.0]])
     normals = np.array([[0.0, -1.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    np.testing.assert_array_equal(HalfPlane().gap(points, normals), [0.25, -0.5, np.inf, np.inf])
+    gap, direction = measure_contact(HalfPlane(), points, normals)
+    np.testing.assert_array_equal(gap, [0.25, -0.5, np.inf, np.inf])
+    np.testing.assert_array_equal(direction, [[0.0, -1.0]] * 4)
 
 
-@given(st.floats(1.5, 5.0), angles, st.floats(-0.2, 0.2))
-def test_a_point_moved_by_the_gap_lies_on_the_circle(distance: float, angle: float, turn: float) -> None:
+@pytest.mark.parametrize("shape", [Circle, Cavity])
+@given(point=points)
+def test_a_point_touches_a_circle_along_its_radius(shape: type, point: tuple[float, float]) -> None:
     centre, radius = np.array([1.0, -2.0]), 1.2
-    point = centre + distance * np.array(direction(angle))
-    normal = np.array(direction(angle + math.pi + turn))
-    gap = Circle((1.0, -2.0), radius).gap(point[None], normal[None])[0]
-    assert np.hypot(*(point + gap * normal - centre)) == pytest.approx(radius, rel=1e-12)
-    assert 0.0 < gap < distance * math.cos(turn)  # the near side, not the far one
+    from_centre = touching(shape((1.0, -2.0), radius), point) - centre
+    # distances up to 17 carry round-off of about 1e-14
+    assert np.hypot(*from_centre) == pytest.approx(radius, abs=1e-13)
+    assert from_centre @ (np.array(point) - centre) == pytest.approx(radius * math.dist(point, centre), abs=1e-12)
+
+
+def test_the_centre_of_a_circle_is_as_far_from_it_in_any_direction() -> None:
+    normal = np.array([[0.6, 0.8]])
+    for shape, gap in ((Circle, -2.0), (Cavity, 2.0)):
+        obstacle = shape((0.0, 0.0), 2.0)
+        np.testing.assert_array_equal(obstacle.approach(np.zeros((1, 2)), normal), normal)
+        assert obstacle.gap(np.zeros((1, 2)), normal)[0] == gap
 
 
 def test_interference_is_a_negative_gap() -> None:
@@ -59,13 +91,51 @@ def test_interference_is_a_negative_gap() -> None:
 def test_a_disc_in_a_ring_has_the_difference_of_the_radii_as_gap() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 17)
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    np.testing.assert_allclose(Cavity((0.0, 0.0), 1.25).gap(normals, normals), 0.25, rtol=1e-12)
-    np.testing.assert_array_equal(Circle((0.0, 0.0), 0.5).gap(normals, normals), np.inf)
+    gap, direction = measure_contact(Cavity((0.0, 0.0), 1.25), normals, normals)
+    np.testing.assert_allclose(gap, 0.25, rtol=1e-12)
+    np.testing.assert_allclose(direction, normals, atol=1e-15)  # round-off of the length
+    assert np.isinf(measure_contact(Circle((0.0, 0.0), 0.5), normals, normals)[0]).all()
 
 
-def test_a_normal_that_misses_the_circle_has_no_gap() -> None:
-    miss = Circle((0.0, 0.0), 1.0).gap(np.array([[2.0, 1.5]]), np.array([[-1.0, 0.0]]))
-    assert miss[0] == np.inf
+@pytest.mark.parametrize(
+    ("point", "gap", "direction"),
+    [
+        ((2.0, -2.0), 6.0 / math.sqrt(17.0), (1.0 / math.sqrt(17.0), 4.0 / math.sqrt(17.0))),  # below its long side
+        ((-3.0, -4.0), 5.0, (0.6, 0.8)),  # nearest to the corner at the origin
+        ((2.5, 2.0), 2.0 / math.sqrt(5.0), (-2.0 / math.sqrt(5.0), 1.0 / math.sqrt(5.0))),  # in the notch
+        ((1.0, 0.5), -1.5 / math.sqrt(13.0), (-2.0 / math.sqrt(13.0), -3.0 / math.sqrt(13.0))),  # inside
+    ],
+)
+@pytest.mark.parametrize("vertices", [DART, DART[::-1]])
+def test_distances_from_a_polygon(
+    vertices: tuple[tuple[float, float], ...], point: object, gap: float, direction: tuple[float, float]
+) -> None:
+    at, normals = np.array([point], float), np.array([[0.0, 1.0]])
+    obstacle = PolygonalObstacle(vertices)
+    assert obstacle.gap(at, normals)[0] == pytest.approx(gap, rel=1e-12)
+    np.testing.assert_allclose(obstacle.approach(at, normals)[0], direction, atol=1e-12)
+
+
+@given(points)
+def test_a_point_moved_by_its_gap_lies_on_the_polygon(point: tuple[float, float]) -> None:
+    obstacle = PolygonalObstacle(DART)
+    on_it = touching(obstacle, point)
+    # gaps up to 15 carry round-off of about 1e-14; points on the polygon itself are touched at once
+    assert obstacle.gap(on_it[None], np.array([[0.0, 1.0]]))[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_polygon_large_and_far_away_is_a_half_plane() -> None:
+    floor = PolygonalObstacle(((-1e3, -1e3), (1e3, -1e3), (1e3, 0.0), (-1e3, 0.0)))
+    at, down = np.array([[0.3, 0.2], [-0.4, -0.1]]), np.array([[0.0, -1.0]] * 2)
+    for mine, other in zip(measure_contact(floor, at, down), measure_contact(HalfPlane(), at, down), strict=True):
+        np.testing.assert_allclose(mine, other, atol=1e-15)
+
+
+def test_a_point_on_the_side_of_a_polygon_is_pushed_against_its_normal() -> None:
+    square = PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    gap, direction = measure_contact(square, np.array([[0.5, 1.0]]), np.array([[0.0, -1.0]]))
+    assert gap[0] == 0.0
+    np.testing.assert_array_equal(direction, [[0.0, -1.0]])
 
 
 def test_a_gap_may_be_a_number_a_formula_or_a_function() -> None:
@@ -73,6 +143,29 @@ def test_a_gap_may_be_a_number_a_formula_or_a_function() -> None:
     np.testing.assert_array_equal(Gap().gap(points, normals), [0.0, 0.0])
     np.testing.assert_array_equal(Gap(Expression("x**2")).gap(points, normals), [0.25, 1.0])
     np.testing.assert_array_equal(Gap(lambda x, y: 2.0 * x).gap(points, normals), [1.0, 2.0])
+
+
+def test_a_gap_acts_along_the_normal_of_the_body_or_as_it_is_told() -> None:
+    points, normals = np.array([[0.5, 0.0], [1.0, 0.0]]), np.array([[0.6, -0.8]] * 2)
+    np.testing.assert_array_equal(Gap(0.1).approach(points, normals), normals)
+    np.testing.assert_array_equal(Gap(0.1, direction=(0.0, -3.0)).approach(points, normals), [[0.0, -1.0]] * 2)
+    tilted = Gap(0.1, direction=(Expression("x"), -1.0)).approach(points, normals)
+    expected = np.array([[0.5, -1.0], [1.0, -1.0]])
+    np.testing.assert_allclose(tilted, expected / np.hypot(*expected.T)[:, None], rtol=1e-15)
+    with pytest.raises(ValueError, match=r"direction is \(0, 0\) at \(0.5, 0\): give the direction into the obstacle"):
+        Gap(0.1, direction=(Expression("x - 0.5"), 0.0)).approach(points, normals)
+
+
+def test_an_obstacle_of_ones_own_need_not_know_directions() -> None:
+    class Step:
+        def gap(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+            return np.where(points[:, 0] > 0.0, 0.0, 0.1)
+
+    own: Obstacle = Step()
+    normals = np.array([[0.6, -0.8], [0.0, -1.0]])
+    gap, direction = measure_contact(own, np.array([[-1.0, 0.0], [1.0, 0.0]]), normals)
+    np.testing.assert_array_equal(gap, [0.1, 0.0])
+    np.testing.assert_array_equal(direction, normals)
 
 
 @pytest.mark.parametrize(
@@ -85,6 +178,14 @@ def test_a_gap_may_be_a_number_a_formula_or_a_function() -> None:
         (lambda: Cavity((0.0, 0.0), -1.0), "radius is"),
         (lambda: Cavity((0.0, math.nan), 1.0), "centre is"),
         (lambda: Gap(math.inf), "value = inf"),
+        (lambda: Gap(0.0, direction=(0.0, math.nan)), r"direction\[1\] = nan"),
+        (lambda: Gap(0.0, direction=(1.0, 0.0, 0.0)), "direction has 3 components"),
+        (lambda: PolygonalObstacle(((0.0, 0.0), (1.0, 0.0))), "vertices has 2 points: give at least three"),
+        (
+            lambda: PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 0.0))),
+            r"vertices\[2\] is \(1.0, 0.0\), as is",
+        ),
+        (lambda: PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, math.inf))), r"vertices\[2\] is"),
     ],
 )
 def test_obstacles_check_what_they_are_given(make: object, message: str) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from bemkit.contact.condensation import condense
 from bemkit.contact.laws import Coulomb, Frictionless
+from bemkit.contact.nodes import contact_along_normals
 from bemkit.contact.obstacle import Circle
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import Disk, ExteriorOf, discretise
@@ -25,8 +26,9 @@ def test_shrink_fit(kind: type[GalerkinMap | CollocationMap], tolerance: float) 
     interference = 1e-3
     mesh = discretise(ExteriorOf(Disk(RADIUS)).outline(), n_elements=64)
     elastic = kind(mesh, MATERIAL)
-    body, nodes = condense(elastic, [], np.arange(64), np.zeros((64, 2)))
-    gap = Circle((0.0, 0.0), RADIUS + interference).gap(nodes.points, nodes.normals)
+    body = condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(64)), np.zeros((64, 2)))
+    nodes = body.nodes
+    gap = Circle((0.0, 0.0), RADIUS + interference).gap(nodes.points, nodes.directions)
     np.testing.assert_allclose(gap, -interference, rtol=1e-12)
     solution = solve(ContactProblem(body, gap, Coulomb(0.3)), SemismoothNewton())
     pressure = -solution.state.traction[:, 0]
@@ -37,8 +39,10 @@ def test_shrink_fit(kind: type[GalerkinMap | CollocationMap], tolerance: float) 
 
 def test_a_pushed_pin_separates_from_the_other_side_and_the_plate_carries_it() -> None:
     mesh = discretise(ExteriorOf(Disk(RADIUS)).outline(), n_elements=64)
-    body, nodes = condense(GalerkinMap(mesh, MATERIAL), [], np.arange(64), np.zeros((64, 2)))
-    gap = Circle((1e-3, 0.0), RADIUS).gap(nodes.points, nodes.normals)
+    elastic = GalerkinMap(mesh, MATERIAL)
+    body = condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(64)), np.zeros((64, 2)))
+    nodes = body.nodes
+    gap = Circle((1e-3, 0.0), RADIUS).gap(nodes.points, nodes.directions)
     solution = solve(ContactProblem(body, gap, Frictionless()), SemismoothNewton())
     traction = np.einsum("nk,nkc->nc", solution.state.traction, nodes.frame)
     force = nodes.weights @ traction

@@ -10,6 +10,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation import CondensedBody, condense
+from bemkit.contact.nodes import contact_along_normals
 from bemkit.geometry import (
     Algebraic,
     BoundaryMesh,
@@ -58,7 +59,7 @@ def pressed(
     contact = np.sort(np.argsort(np.abs(mesh.centres - lowest).sum(axis=1))[:n_contact])
     upper = np.flatnonzero(mesh.centres[:, 1] > mesh.centre[1])
     force = elastic.nodal_forces(upper, lambda x, _: np.stack([0.3 + 0.0 * x[:, 0], -1.0 - x[:, 0]], axis=1))
-    body, _ = condense(elastic, supports, contact, force)
+    body = condense(elastic, supports, contact_along_normals(elastic.displacement_space, contact), force)
     return body, elastic
 
 
@@ -298,10 +299,11 @@ def test_pyamg_is_loaded_by_a_hierarchy_alone() -> None:
     program = (
         "import sys, numpy as np, bemkit as bk\n"
         "from bemkit.contact.condensation import condense\n"
+        "from bemkit.contact.nodes import contact_along_normals\n"
         "mesh = bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=24)\n"
         "for solver in (bk.DenseCholesky(), bk.Krylov(), bk.Krylov(coarsest=8)):\n"
         "    elastic = bk.GalerkinMap(mesh, bk.Material(1.0, 0.3), linear_solver=solver)\n"
-        "    condense(elastic, [], np.arange(4), np.ones((24, 2)))\n"
+        "    condense(elastic, [], contact_along_normals(elastic.displacement_space, np.arange(4)), np.ones((24, 2)))\n"
         "    print('pyamg' in sys.modules)\n"
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
