@@ -1,0 +1,105 @@
+"""The contact nodes of a solution in frames of their own: direction into the obstacle, and a quarter turn on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.scene import Clamped, Contact, PrescribedDisplacement, Roller
+from bemkit.solution import Solution
+from bemkit.stability.evidence.boundary import Boundary
+from bemkit.stability.evidence.obstacles import distance_to
+
+_FACING = 1e-6
+"""Cosine between the body's normal and the direction of contact up to which a node may count as facing away."""
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """The rows of a contact table, measured again.
+
+    Parameters
+    ----------
+    nodes : (n_contact,) int array
+        Rows of ``solution.boundary.displacement``.
+    offset : (n_contact,) array [m]
+        Distance of the points of the table from those rows' points.
+    frame : (n_contact, 2, 2) array [-]
+        Rows are the direction d of contact and its quarter turn t.
+    distance : (n_contact,) array [m]
+        To the obstacle; infinite where the body faces away from it.
+    is_grazing : (n_contact,) bool array
+        Nodes of which round-off decides whether they face away.
+    is_supported : (n_contact,) bool array
+        Nodes that belong to a support as well: part of their force is a reaction, which no friction law governs.
+    displacement, traction : (n_contact, 2) arrays [m], [Pa]
+        From the boundary field; from sigma_n and sigma_t of the table. In x and y.
+    """
+
+    nodes: IntArray
+    offset: FloatArray
+    frame: FloatArray
+    distance: FloatArray
+    is_grazing: BoolArray
+    is_supported: BoolArray
+    displacement: FloatArray
+    traction: FloatArray
+
+    def components(self, vectors: FloatArray) -> FloatArray:
+        """Return the (n_contact, 2) components along d and t of vectors in x and y."""
+        return np.asarray(np.einsum("nkc,nc->nk", self.frame, vectors))
+
+
+def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
+    """Find the contact nodes of a solution on its boundary and measure their obstacles."""
+    table, fields = solution.contact, solution.boundary
+    points = np.column_stack([table.x, table.y])
+    if not table.n_contact:
+        nothing = np.zeros((0, 2))
+        none = np.zeros(0, bool)
+        return Nodes(np.zeros(0, np.intp), np.zeros(0), np.zeros((0, 2, 2)), np.zeros(0), none, none, nothing, nothing)
+    offset, nodes = cKDTree(fields.points).query(points)
+    normals = _mean_normals(solution, boundary)[nodes]
+    distance, direction = np.full(table.n_contact, np.inf), normals.copy()
+    for part in solution.scene.contact_parts:
+        own = np.array([name == part.name for name in table.part])
+        if isinstance(part.condition, Contact) and own.any():
+            distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
+    facing = np.sum(direction * normals, axis=1)
+    frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
+    components = np.column_stack([table.sigma_n, table.sigma_t])
+    return Nodes(
+        nodes=np.asarray(nodes, np.intp),
+        offset=np.asarray(offset),
+        frame=frame,
+        distance=np.where(facing > _FACING, distance, np.inf),
+        is_grazing=np.abs(facing) <= _FACING,
+        is_supported=np.isin(nodes, _supported_nodes(solution, boundary)),
+        displacement=fields.displacement[nodes],
+        traction=np.einsum("nk,nkc->nc", components, frame),
+    )
+
+
+def _mean_normals(solution: Solution, boundary: Boundary) -> FloatArray:
+    """Return (n_nodes, 2) normals: mean by length of the contact elements that meet at a node, zero elsewhere."""
+    elements = np.concatenate([solution.mesh.part(part.name) for part in solution.scene.contact_parts])
+    total = np.zeros_like(solution.boundary.points)
+    weighted = boundary.node_normals[elements] * boundary.lengths[elements][:, None, None]
+    np.add.at(total, boundary.nodes[elements], weighted)
+    size = np.hypot(total[:, 0], total[:, 1])
+    return np.asarray(total / np.where(size > 0.0, size, 1.0)[:, None])
+
+
+def _supported_nodes(solution: Solution, boundary: Boundary) -> IntArray:
+    """Return the nodes on supports and on symmetry lines, which hold a body like rollers."""
+    mesh = solution.mesh
+    found = [np.zeros(0, np.intp)]
+    for part in solution.scene.parts:
+        if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement):
+            found.append(boundary.nodes[mesh.part(part.name)].ravel())
+    if mesh.symmetry is not None and boundary.nodes.shape[1] > 1:  # midpoints of elements lie on no line
+        found.append(np.flatnonzero(mesh.on_symmetry_lines.any(axis=1)))
+    return np.unique(np.concatenate(found))
