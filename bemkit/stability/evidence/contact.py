@@ -77,7 +77,7 @@ def obstacle_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float
     if np.any((np.isfinite(gap) != np.isfinite(nodes.distance)) & ~nodes.is_grazing):
         return float("inf")
     known = np.isfinite(gap) & np.isfinite(nodes.distance)
-    return _beyond(np.abs(gap - nodes.distance)[known], scales.coordinates, scales.length)
+    return _beyond(np.abs(gap[known] - nodes.distance[known]), scales.coordinates, scales.length)
 
 
 def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
@@ -88,7 +88,7 @@ def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
     known = np.isfinite(table.gap)
     differences = (
         np.abs(rows - motion),
-        np.abs(table.clearance - (table.gap - table.u_n))[known],
+        np.abs(table.clearance[known] - (table.gap - table.u_n)[known]),
         nodes.offset,
     )
     round_off = scales.coordinates + 1e-12 * float(np.abs(motion).max(initial=0.0))
