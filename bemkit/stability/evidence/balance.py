@@ -77,15 +77,15 @@ def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
     return np.asarray(directions[singular <= 1e-12 * max(singular.max(), 1e-30)])
 
 
-def negative_energy(solution: Solution, boundary: Boundary, traction: FloatArray, scales: Scales) -> float:
+def negative_energy(
+    solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray, scales: Scales
+) -> float:
     """Return by how much the elastic energy is negative, over the work of the sizes of tractions and strains.
 
     To these belong the tractions of which nothing but round-off is known, on the displacement of the whole body.
     """
-    strained = boundary.interpolated(strained_displacement(solution))
-    largest_motion = float(np.abs(solution.boundary.displacement).max())
-    size = _work_of_sizes(boundary, traction, strained)
-    size += trusted_stress(solution) * largest_motion * float(boundary.lengths.sum())
+    size = _work_of_sizes(solution, boundary, nodes, traction, strained_displacement(solution))
+    size += _trusted_work(solution, boundary)
     size += 1e-6 * scales.stress * scales.length * solution.mesh.diameter
     return max(-solution.energy, 0.0) / size if np.isfinite(solution.energy) else float("nan")
 
@@ -98,11 +98,12 @@ def energy_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, tracti
     """
     if any(np.any(values != 0.0) for _, _, values in held_directions(solution, boundary)):
         return 0.0
-    displacement = boundary.interpolated(solution.boundary.displacement)
+    displacement = solution.boundary.displacement
     contact = solution.contact.weight[:, None] * nodes.traction
     loads = _loads(solution, boundary, traction)
-    work = 0.5 * (float(np.sum(contact * nodes.displacement)) + float(np.sum(loads * displacement)))
-    size = 0.5 * float(np.sum(np.abs(contact * nodes.displacement))) + _work_of_sizes(boundary, traction, displacement)
+    work = 0.5 * float(np.sum(contact * nodes.displacement))
+    work += 0.5 * float(np.sum(loads * boundary.interpolated(displacement)))
+    size = _work_of_sizes(solution, boundary, nodes, traction, displacement) + _trusted_work(solution, boundary)
     return abs(solution.energy - work) / size if size > 0.0 else 0.0
 
 
@@ -114,6 +115,17 @@ def strained_displacement(solution: Solution) -> FloatArray:
     return np.asarray(fields.displacement - (motions @ rigid).reshape(-1, 2))
 
 
-def _work_of_sizes(boundary: Boundary, traction: FloatArray, displacement: FloatArray) -> float:
-    sizes = np.hypot(traction[..., 0], traction[..., 1]) * np.hypot(displacement[..., 0], displacement[..., 1])
-    return 0.5 * float(np.sum(sizes * boundary.shares))
+def _trusted_work(solution: Solution, boundary: Boundary) -> float:
+    """Return the work [J/m] of tractions of which nothing but round-off is known, on the motion of the whole body."""
+    motion = float(np.abs(solution.boundary.displacement).max())
+    return trusted_stress(solution) * motion * float(boundary.lengths.sum())
+
+
+def _work_of_sizes(
+    solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray, displacement: FloatArray
+) -> float:
+    """Return half the work [J/m] that tractions did if each had the direction of its displacement (n_nodes, 2)."""
+    motion = boundary.interpolated(displacement)
+    sizes = np.hypot(traction[..., 0], traction[..., 1]) * np.hypot(motion[..., 0], motion[..., 1])
+    contact = np.hypot(*nodes.traction.T) * np.hypot(*displacement[nodes.nodes].T)
+    return 0.5 * float(np.sum(sizes * boundary.shares) + contact @ solution.contact.weight)

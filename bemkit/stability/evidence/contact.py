@@ -96,14 +96,20 @@ def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
 
 
 def traction_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, scales: Scales) -> float:
-    """Return the largest difference [-] of mean tractions of contact elements from those that nodes interpolate."""
-    nodal = np.zeros_like(solution.boundary.points)
-    nodal[nodes.nodes] = nodes.traction
-    elements = [solution.mesh.part(part.name) for part in solution.scene.contact_parts]
-    own = np.concatenate(elements) if elements else np.zeros(0, np.intp)
-    values, shares = boundary.interpolated(nodal)[own], boundary.shares[own]
-    mean = np.einsum("eqc,eq->ec", values, shares) / shares.sum(axis=1)[:, None]
-    return largest(np.abs(mean - solution.boundary.traction[own]) / scales.stress)
+    """Return the largest difference [-] of mean tractions of contact elements from those that nodes interpolate.
+
+    Elements at a corner that share a node with another contact part are left out: the node belongs to one of them.
+    """
+    nodal, owner = np.zeros_like(solution.boundary.points), np.full(len(solution.boundary.points), "", dtype=object)
+    nodal[nodes.nodes], owner[nodes.nodes] = nodes.traction, solution.contact.part
+    worst = [0.0]
+    for part in solution.scene.contact_parts:
+        elements = solution.mesh.part(part.name)
+        own = elements[np.isin(owner[boundary.nodes[elements]].astype(str), ["", part.name]).all(axis=1)]
+        mean = np.einsum("eqc,eq->ec", boundary.interpolated(nodal)[own], boundary.shares[own])
+        mean /= boundary.lengths[own][:, None]
+        worst.append(largest(np.abs(mean - solution.boundary.traction[own]) / scales.stress))
+    return max(worst)
 
 
 def resultant_mismatch(solution: Solution) -> float:

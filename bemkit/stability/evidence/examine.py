@@ -123,9 +123,7 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
     scales, boundary = scales_of(solution), boundary_of(solution)
     nodes = contact_nodes_of(solution, boundary)
     measured = measured_contact(solution, before, nodes, scales)
-    nodal = np.zeros_like(solution.boundary.points)
-    nodal[nodes.nodes] = nodes.traction
-    traction = tractions_of(solution, boundary, nodal)
+    traction = tractions_of(solution, boundary)
     has_history = before is None and len(solution.scene.load_factors) > 1
     held = np.minimum(measured.held, np.abs(measured.clearance))
     excess = (np.abs(measured.shear) - measured.bound)[measured.obeys_friction]
@@ -144,9 +142,9 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
         slip_opposition=0.0 if has_history else slip_opposition(measured),
         status=0.0 if has_history else status_mismatch(solution, measured),
         equilibrium=imbalance(solution, boundary, nodes, traction),
-        negative_energy=negative_energy(solution, boundary, traction, scales),
+        negative_energy=negative_energy(solution, boundary, nodes, traction, scales),
         energy=energy_mismatch(solution, boundary, nodes, traction),
-        reciprocity=reciprocity_mismatch(solution, boundary, traction, scales.stress),
+        reciprocity=reciprocity_mismatch(solution, boundary, nodes, traction, scales.stress),
     )
 
 

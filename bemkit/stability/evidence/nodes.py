@@ -25,6 +25,7 @@ class Nodes:
     ----------
     nodes : (n_contact,) int array
         Rows of ``solution.boundary.displacement``.
+    points : (n_contact, 2) array [m]
     offset : (n_contact,) array [m]
         Distance of the points of the table from those rows' points.
     frame : (n_contact, 2, 2) array [-]
@@ -40,6 +41,7 @@ class Nodes:
     """
 
     nodes: IntArray
+    points: FloatArray
     offset: FloatArray
     frame: FloatArray
     distance: FloatArray
@@ -58,21 +60,23 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     table, fields = solution.contact, solution.boundary
     points = np.column_stack([table.x, table.y])
     if not table.n_contact:
-        nothing = np.zeros((0, 2))
-        none = np.zeros(0, bool)
-        return Nodes(np.zeros(0, np.intp), np.zeros(0), np.zeros((0, 2, 2)), np.zeros(0), none, none, nothing, nothing)
+        nothing, none = np.zeros((0, 2)), np.zeros(0, bool)
+        frame = np.zeros((0, 2, 2))
+        return Nodes(np.zeros(0, np.intp), nothing, none * 0.0, frame, none * 0.0, none, none, nothing, nothing)
     offset, nodes = cKDTree(fields.points).query(points)
-    normals = _mean_normals(solution, boundary)[nodes]
-    distance, direction = np.full(table.n_contact, np.inf), normals.copy()
+    normals, direction = np.zeros((2, table.n_contact, 2))
+    distance = np.full(table.n_contact, np.inf)
     for part in solution.scene.contact_parts:
         own = np.array([name == part.name for name in table.part])
         if isinstance(part.condition, Contact) and own.any():
+            normals[own] = _mean_normals(solution, boundary, part.name)[nodes[own]]
             distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
     facing = np.sum(direction * normals, axis=1)
     frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
     components = np.column_stack([table.sigma_n, table.sigma_t])
     return Nodes(
         nodes=np.asarray(nodes, np.intp),
+        points=points,
         offset=np.asarray(offset),
         frame=frame,
         distance=np.where(facing > _FACING, distance, np.inf),
@@ -83,9 +87,9 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     )
 
 
-def _mean_normals(solution: Solution, boundary: Boundary) -> FloatArray:
-    """Return (n_nodes, 2) normals: mean by length of the contact elements that meet at a node, zero elsewhere."""
-    elements = np.concatenate([solution.mesh.part(part.name) for part in solution.scene.contact_parts])
+def _mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArray:
+    """Return (n_nodes, 2) normals: mean by length of a part's elements that meet at a node, zero elsewhere."""
+    elements = solution.mesh.part(part)
     total = np.zeros_like(solution.boundary.points)
     weighted = boundary.node_normals[elements] * boundary.lengths[elements][:, None, None]
     np.add.at(total, boundary.nodes[elements], weighted)

@@ -16,40 +16,46 @@ from bemkit.solution import Solution
 from bemkit.stability.evidence.balance import strained_displacement
 from bemkit.stability.evidence.boundary import Boundary
 from bemkit.stability.evidence.kernels import State, centre_of_dilatation, point_force, uniform_stress
+from bemkit.stability.evidence.nodes import Nodes
 
 _N_OUTSIDE = 6
 _AWAY = 0.8
 """Distance of sources outside from the centre, in diameters: the body ends at half of one."""
 
 
-def reciprocity_mismatch(solution: Solution, boundary: Boundary, traction: FloatArray, stress: float) -> float:
+def reciprocity_mismatch(
+    solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray, stress: float
+) -> float:
     """Return the largest mismatch of ``int t . u*`` and ``int t* . u`` over the work of their sizes.
 
     Parameters
     ----------
+    nodes : Nodes
+        Their contact tractions act as forces on the nodes.
     traction : (n_elements, n_places, 2) array [Pa]
-        At the quadrature points.
+        All others, at the quadrature points.
     stress : float [Pa]
         What tractions are measured by: a body with next to none has only moved.
     """
     displacement = boundary.interpolated(strained_displacement(solution))
-    whole = [_with_images(solution, field, is_point) for field, is_point in (
-        (boundary.points, True), (boundary.normals, False), (displacement, False), (traction, False)
-    )]  # fmt: skip
-    points, normals, displacement, traction = whole
+    points, force_points = (_with_images(solution, each, is_point=True) for each in (boundary.points, nodes.points))
+    normals, displacement = (_with_images(solution, each) for each in (boundary.normals, displacement))
+    loads = _with_images(solution, traction * boundary.shares[:, :, None])
+    forces = _with_images(solution, nodes.traction * solution.contact.weight[:, None])
     shares = np.concatenate([boundary.shares] * (len(points) // len(boundary.points)))
     worst = 0.0
     for state in _states(solution):
-        other_displacement, other_traction = state(points, normals)
-        work = np.sum(traction * other_displacement, axis=-1) * shares
-        other_work = np.sum(other_traction * displacement, axis=-1) * shares
-        least = 1e-6 * stress * float(np.sum(np.hypot(*np.moveaxis(other_displacement, -1, 0)) * shares))
-        size = max(float(np.abs(work).sum()), float(np.abs(other_work).sum()), least)
-        worst = max(worst, abs(float((work - other_work).sum())) / size) if size > 0.0 else worst
+        test_displacement, test_traction = state(points, normals)
+        at_forces, _ = state(force_points, force_points)
+        work = np.concatenate([np.sum(loads * test_displacement, axis=-1).ravel(), np.sum(forces * at_forces, axis=-1)])
+        test_work = np.sum(test_traction * displacement, axis=-1) * shares
+        least = 1e-6 * stress * float(np.sum(np.hypot(*np.moveaxis(test_displacement, -1, 0)) * shares))
+        size = max(float(np.abs(work).sum()), float(np.abs(test_work).sum()), least)
+        worst = max(worst, abs(float(work.sum() - test_work.sum())) / size) if size > 0.0 else worst
     return worst
 
 
-def _with_images(solution: Solution, field: FloatArray, is_point: bool) -> FloatArray:
+def _with_images(solution: Solution, field: FloatArray, *, is_point: bool = False) -> FloatArray:
     """Return a field on the whole body, images included: points are reflected, vectors change signs."""
     symmetry = solution.mesh.symmetry
     if symmetry is None:

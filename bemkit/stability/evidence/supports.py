@@ -56,18 +56,13 @@ def support_mismatch(solution: Solution, boundary: Boundary, scales: Scales) -> 
     return float(np.max(worst))
 
 
-def tractions_of(solution: Solution, boundary: Boundary, contact: FloatArray) -> FloatArray:
-    """Return the tractions at the quadrature points.
-
-    Parameters
-    ----------
-    contact : (n_nodes, 2) array [Pa]
-        Contact tractions at the nodes.
+def tractions_of(solution: Solution, boundary: Boundary) -> FloatArray:
+    """Return the tractions at the quadrature points, but for those of contact, which are known at nodes.
 
     Returns
     -------
     (n_elements, n_places, 2) array [Pa]
-        Loads as they are given, contact tractions interpolated, reactions of supports as means of elements.
+        Loads as they are given, reactions of supports as means of elements.
     """
     factor = solution.scene.load_factors[-1]
     traction = np.zeros_like(boundary.points)
@@ -77,18 +72,15 @@ def tractions_of(solution: Solution, boundary: Boundary, contact: FloatArray) ->
         if isinstance(part.condition, Traction | Pressure):
             load = factor * part.condition.at(points, normals)
             traction[elements] = load.reshape(traction[elements].shape)
-        elif isinstance(part.condition, Contact):
-            traction[elements] = boundary.interpolated(contact)[elements]
-        else:
+        elif not isinstance(part.condition, Contact):
             traction[elements] = solution.boundary.traction[elements][:, None]
     return traction
 
 
 def load_mismatch(solution: Solution, boundary: Boundary, traction: FloatArray, scales: Scales) -> float:
     """Return the largest difference [-] of mean tractions from the loads, on loaded and on free elements."""
-    is_given = np.ones(solution.mesh.n_elements, bool)
-    for part in solution.scene.parts:
-        if not isinstance(part.condition, Traction | Pressure):
-            is_given[solution.mesh.part(part.name)] = False
+    is_contact = np.zeros(solution.mesh.n_elements, bool)
+    for part in solution.scene.contact_parts:
+        is_contact[solution.mesh.part(part.name)] = True
     mean = np.einsum("eqc,eq->ec", traction, boundary.shares) / boundary.lengths[:, None]
-    return largest(np.abs(mean - solution.boundary.traction)[is_given] / scales.stress)
+    return largest(np.abs(mean - solution.boundary.traction)[~is_contact] / scales.stress)
