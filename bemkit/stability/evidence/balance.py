@@ -41,7 +41,7 @@ def imbalance(solution: Solution, boundary: Boundary, nodes: Nodes, traction: Fl
         At the quadrature points; contact and supports are left to nodal forces.
     """
     mesh, table = solution.mesh, solution.contact
-    contact = table.weight[:, None] * nodes.traction
+    contact = table.weight[:, None] * nodes.acting
     motions = motions_at(solution, solution.boundary.points)
     work = np.einsum("nc,ncm->m", contact, motions[nodes.nodes])
     # what the elements make of a rotation: on curved ones it is not one exactly
@@ -99,7 +99,7 @@ def energy_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, tracti
     if any(np.any(values != 0.0) for _, _, values in held_directions(solution, boundary)):
         return 0.0
     displacement = solution.boundary.displacement
-    contact = solution.contact.weight[:, None] * nodes.traction
+    contact = solution.contact.weight[:, None] * nodes.acting
     loads = _loads(solution, boundary, traction)
     work = 0.5 * float(np.sum(contact * nodes.displacement))
     work += 0.5 * float(np.sum(loads * boundary.interpolated(displacement)))
@@ -110,7 +110,9 @@ def energy_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, tracti
 def strained_displacement(solution: Solution) -> FloatArray:
     """Return the nodal displacements (n_nodes, 2) [m] without their rigid part."""
     fields = solution.boundary
-    motions = motions_at(solution, fields.points)[:, :, possible_motions_of(solution)].reshape(2 * len(fields.points), -1)
+    motions = motions_at(solution, fields.points)[:, :, possible_motions_of(solution)].reshape(
+        2 * len(fields.points), -1
+    )
     rigid = np.linalg.lstsq(motions, fields.displacement.ravel(), rcond=None)[0]
     return np.asarray(fields.displacement - (motions @ rigid).reshape(-1, 2))
 
@@ -127,5 +129,5 @@ def _work_of_sizes(
     """Return half the work [J/m] that tractions did if each had the direction of its displacement (n_nodes, 2)."""
     motion = boundary.interpolated(displacement)
     sizes = np.hypot(traction[..., 0], traction[..., 1]) * np.hypot(motion[..., 0], motion[..., 1])
-    contact = np.hypot(*nodes.traction.T) * np.hypot(*displacement[nodes.nodes].T)
+    contact = np.hypot(*nodes.acting.T) * np.hypot(*displacement[nodes.nodes].T)
     return 0.5 * float(np.sum(sizes * boundary.shares) + contact @ solution.contact.weight)

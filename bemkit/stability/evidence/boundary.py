@@ -12,6 +12,8 @@ from bemkit.solution import Solution
 
 _N_POINTS = 8
 """Gauss points of an element: exact for products of loads and displacements of degree 15."""
+_N_FITTED = 24
+"""Points whose polynomial is differentiated: on an arc of 90 degrees 8 of them leave 1e-6, 24 of them round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +65,14 @@ def boundary_of(solution: Solution) -> Boundary:
     else:
         node_places, nodes = np.array([-1.0, 1.0]), ends
     elements = np.arange(mesh.n_elements)
-    points = mesh.points(elements, places)
-    slopes, node_slopes = (_slopes(points - mesh.centre, places, where) for where in (places, node_places))
+    fitted = np.polynomial.legendre.leggauss(_N_FITTED)[0]
+    curve = mesh.points(elements, fitted) - mesh.centre
+    slopes, node_slopes = (_slopes(curve, fitted, where) for where in (places, node_places))
     # on straight elements half the chord is exact, where differences of points lose digits
     half_chord = 0.5 * (mesh.end - mesh.start)[mesh.is_straight][:, None]
     slopes[mesh.is_straight] = node_slopes[mesh.is_straight] = half_chord
     return Boundary(
-        points=points,
+        points=mesh.points(elements, places),
         normals=turned_right(slopes),
         shares=np.hypot(slopes[..., 0], slopes[..., 1]) * weights,
         nodes=nodes,

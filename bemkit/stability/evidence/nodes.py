@@ -38,6 +38,8 @@ class Nodes:
         Nodes that belong to a support as well: part of their force is a reaction, which no friction law governs.
     displacement, traction : (n_contact, 2) arrays [m], [Pa]
         From the boundary field; from sigma_n and sigma_t of the table. In x and y.
+    acting : (n_contact, 2) array [Pa]
+        The traction that acts on the body as contact. On supports what acts along t is the support's.
     """
 
     nodes: IntArray
@@ -49,6 +51,7 @@ class Nodes:
     is_supported: BoolArray
     displacement: FloatArray
     traction: FloatArray
+    acting: FloatArray
 
     def components(self, vectors: FloatArray) -> FloatArray:
         """Return the (n_contact, 2) components along d and t of vectors in x and y."""
@@ -62,7 +65,7 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     if not table.n_contact:
         nothing, none = np.zeros((0, 2)), np.zeros(0, bool)
         frame = np.zeros((0, 2, 2))
-        return Nodes(np.zeros(0, np.intp), nothing, none * 0.0, frame, none * 0.0, none, none, nothing, nothing)
+        return Nodes(np.zeros(0, np.intp), nothing, none * 0.0, frame, none * 0.0, none, none, *(nothing,) * 3)
     offset, nodes = cKDTree(fields.points).query(points)
     normals, direction = np.zeros((2, table.n_contact, 2))
     distance = np.full(table.n_contact, np.inf)
@@ -73,7 +76,9 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
             distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
     facing = np.sum(direction * normals, axis=1)
     frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
+    is_supported = np.isin(nodes, _supported_nodes(solution, boundary))
     components = np.column_stack([table.sigma_n, table.sigma_t])
+    acting = np.column_stack([table.sigma_n, np.where(is_supported, 0.0, table.sigma_t)])
     return Nodes(
         nodes=np.asarray(nodes, np.intp),
         points=points,
@@ -81,9 +86,10 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
         frame=frame,
         distance=np.where(facing > _FACING, distance, np.inf),
         is_grazing=np.abs(facing) <= _FACING,
-        is_supported=np.isin(nodes, _supported_nodes(solution, boundary)),
+        is_supported=is_supported,
         displacement=fields.displacement[nodes],
         traction=np.einsum("nk,nkc->nc", components, frame),
+        acting=np.einsum("nk,nkc->nc", acting, frame),
     )
 
 

@@ -41,7 +41,7 @@ def reciprocity_mismatch(
     points, force_points = (_with_images(solution, each, is_point=True) for each in (boundary.points, nodes.points))
     normals, displacement = (_with_images(solution, each) for each in (boundary.normals, displacement))
     loads = _with_images(solution, traction * boundary.shares[:, :, None])
-    forces = _with_images(solution, nodes.traction * solution.contact.weight[:, None])
+    forces = _with_images(solution, nodes.acting * solution.contact.weight[:, None])
     shares = np.concatenate([boundary.shares] * (len(points) // len(boundary.points)))
     worst = 0.0
     for state in _states(solution):

@@ -11,8 +11,8 @@ from bemkit.expression import Expression
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene import Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.stability.random_scenes.draw import between, chance, decades, one_of
 from bemkit.stability.random_scenes.bodies import Body
+from bemkit.stability.random_scenes.draw import between, chance, decades, one_of
 from bemkit.stability.random_scenes.touching import random_law
 
 

@@ -169,4 +169,3 @@ def _history(random: np.random.Generator, scene: Scene) -> tuple[Scene, ...]:
         factor = one_of(random, (0.5, 1.0, 1.5, 0.0, -0.5))
         parts.append(with_scaled_loads(scene, factor).parts[k])
     return scene, replace(scene, parts=tuple(parts))
-
