@@ -27,7 +27,9 @@ from bemkit.stability.evidence.supports import load_mismatch, support_mismatch, 
 
 COARSE_LIMIT = 0.1
 """Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
-that of fields which do not belong to the body at all."""
+that of fields which do not belong to the body at all. Elements longer than a tenth of the body have more of it."""
+
+_INEXACT = ("reciprocity", "coarseness")
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class Evidence:
     reciprocity : float
         Betti's theorem against states of uniform stress, point forces and centres of dilatation outside of the body;
         holds up to the discretisation error.
+    coarseness : float
+        Length of the longest element over the diameter of the body.
     """
 
     numbers: float
@@ -76,11 +80,12 @@ class Evidence:
     negative_energy: float
     energy: float
     reciprocity: float
+    coarseness: float
 
     @property
     def exact(self) -> dict[str, float]:
         """The entries that must vanish to round-off on every mesh, by name."""
-        return {name: value for name, value in asdict(self).items() if name != "reciprocity"}
+        return {name: value for name, value in asdict(self).items() if name not in _INEXACT}
 
     @property
     def worst(self) -> float:
@@ -101,7 +106,7 @@ class Evidence:
     @property
     def is_coarse(self) -> bool:
         """Whether tractions and displacements belong to one elastic body only roughly."""
-        return not self.reciprocity <= COARSE_LIMIT
+        return not self.reciprocity <= max(COARSE_LIMIT, self.coarseness)
 
 
 def examine(solution: Solution, before: Solution | None = None) -> Evidence:
@@ -119,7 +124,7 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
     Evidence
     """
     if not _is_finite(solution):
-        return Evidence(float("inf"), *(float("nan"),) * 13, float("nan"))
+        return Evidence(float("inf"), *(float("nan"),) * 15)
     scales, boundary = scales_of(solution), boundary_of(solution)
     nodes = contact_nodes_of(solution, boundary)
     measured = measured_contact(solution, before, nodes, scales)
@@ -145,6 +150,7 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
         negative_energy=negative_energy(solution, boundary, nodes, traction, scales),
         energy=energy_mismatch(solution, boundary, nodes, traction),
         reciprocity=reciprocity_mismatch(solution, boundary, nodes, traction, scales.stress),
+        coarseness=float(boundary.lengths.max()) / solution.mesh.diameter,
     )
 
 

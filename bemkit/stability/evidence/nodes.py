@@ -66,7 +66,7 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
         nothing, none = np.zeros((0, 2)), np.zeros(0, bool)
         frame = np.zeros((0, 2, 2))
         return Nodes(np.zeros(0, np.intp), nothing, none * 0.0, frame, none * 0.0, none, none, *(nothing,) * 3)
-    offset, nodes = cKDTree(fields.points).query(points)
+    offset, nodes = (np.asarray(each) for each in cKDTree(fields.points).query(points))
     normals, direction = np.zeros((2, table.n_contact, 2))
     distance = np.full(table.n_contact, np.inf)
     for part in solution.scene.contact_parts:
@@ -80,9 +80,9 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     components = np.column_stack([table.sigma_n, table.sigma_t])
     acting = np.column_stack([table.sigma_n, np.where(is_supported, 0.0, table.sigma_t)])
     return Nodes(
-        nodes=np.asarray(nodes, np.intp),
+        nodes=nodes,
         points=points,
-        offset=np.asarray(offset),
+        offset=offset,
         frame=frame,
         distance=np.where(facing > _FACING, distance, np.inf),
         is_grazing=np.abs(facing) <= _FACING,

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
+from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.expression import Expression
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene import Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.stability.random_scenes.bodies import Body
 from bemkit.stability.random_scenes.draw import between, chance, decades, one_of
 from bemkit.stability.random_scenes.touching import random_law
@@ -43,14 +43,17 @@ def _block(
         shape = PlateWithHole(width, height, 0.5 * min(width, height) * between(random, 0.2, 0.8), corner)
     gap = one_of(random, (0.0, 0.0, size * decades(random, -6.0, -2.0), -size * decades(random, -6.0, -3.0)))
     curve = decades(random, -3.0, 0.0) / size
-    obstacle = one_of(
-        random, (HalfPlane((0.0, -0.5 * height - gap)), Gap(gap), Gap(Expression(f"{gap!r} + {curve!r} * x**2")))
+    obstacles: tuple[Obstacle, ...] = (
+        HalfPlane((0.0, -0.5 * height - gap)),
+        Gap(gap),
+        Gap(Expression(f"{gap!r} + {curve!r} * x**2")),
     )
-    floor = Part("contact", Contact(obstacle), sides=("bottom",))
-    sides = one_of(random, (None, Roller(), Pressure(0.3 * stress)))
-    walls = () if sides is None else (Part("walls", sides, sides=("left", "right")),)
-    top = one_of(random, (Traction(y=-stress), Pressure(stress), PrescribedDisplacement(y=-motion)))
-    return shape, (floor, *walls, Part("top", top, sides=("top",))), Symmetry(x=0.0)
+    floor = Part("contact", Contact(one_of(random, obstacles)), sides=("bottom",))
+    conditions: tuple[Condition | None, ...] = (None, Roller(), Pressure(0.3 * stress))
+    wall = one_of(random, conditions)
+    walls = () if wall is None else (Part("walls", wall, sides=("left", "right")),)
+    actions: tuple[Condition, ...] = (Traction(y=-stress), Pressure(stress), PrescribedDisplacement(y=-motion))
+    return shape, (floor, *walls, Part("top", one_of(random, actions), sides=("top",))), Symmetry(x=0.0)
 
 
 def _round(
@@ -64,10 +67,13 @@ def _round(
         shape, name = Ring(radius * between(random, 0.2, 0.9), radius), "outer"
     gap = one_of(random, (0.0, 0.0, size * decades(random, -6.0, -2.0)))
     large = radius * (1.0 + decades(random, -3.0, 0.0))
-    obstacle = one_of(random, (HalfPlane((0.0, -radius - gap)), Cavity((0.0, large - radius - gap), large)))
-    floor = Part("contact", Contact(obstacle), sides=(f"{name}-3", f"{name}-4"))
-    load = one_of(random, (Traction(y=-stress), PrescribedDisplacement(y=-motion)))
-    return shape, (floor, Part("top", load, sides=(f"{name}-1", f"{name}-2"))), Symmetry(x=0.0)
+    obstacles: tuple[Obstacle, ...] = (
+        HalfPlane((0.0, -radius - gap)),
+        Cavity((0.0, large - radius - gap), large),
+    )
+    floor = Part("contact", Contact(one_of(random, obstacles)), sides=(f"{name}-3", f"{name}-4"))
+    actions: tuple[Condition, ...] = (Traction(y=-stress), PrescribedDisplacement(y=-motion))
+    return shape, (floor, Part("top", one_of(random, actions), sides=(f"{name}-1", f"{name}-2"))), Symmetry(x=0.0)
 
 
 def _shrunk(
@@ -76,7 +82,7 @@ def _shrunk(
     """Draw a ring shrunk on a shaft, with pressure from outside."""
     shape = Ring(0.5 * size * between(random, 0.2, 0.9), 0.5 * size)
     inner = tuple(f"inner-{k}" for k in range(1, 5))
-    obstacle = one_of(random, (Gap(-motion), Circle((0.0, 0.0), shape.inner_radius + motion)))
-    shaft = Part("contact", Contact(obstacle), sides=inner)
+    obstacles: tuple[Obstacle, ...] = (Gap(-motion), Circle((0.0, 0.0), shape.inner_radius + motion))
+    shaft = Part("contact", Contact(one_of(random, obstacles)), sides=inner)
     outer = Part("outer", Pressure(stress), sides=tuple(f"outer-{k}" for k in range(1, 5)))
     return shape, (shaft, outer) if chance(random, 0.5) else (shaft,), Symmetry(x=0.0, y=0.0)
