@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("scene", default="paper-1")
+@click.argument("scene", required=False)
 @click.option("--axis", "names", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
 @click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the rows as CSV; - is standard output.")
@@ -25,9 +25,14 @@ if TYPE_CHECKING:
 @click.option("--plot", "folder", metavar="DIR", help="Draw one figure for each axis into a folder.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
+@click.option("--random", "count", type=click.IntRange(1), metavar="N", help="Solve N random scenes instead.")
+@click.option("--seed", type=click.IntRange(0), metavar="N", help="Of the random scenes (0).")
+@click.option("--first", type=click.IntRange(0), metavar="N", help="Number of the first random scene (0).")
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes for random scenes (all processors).")
+@click.option("--save", "failures", metavar="DIR", help="Keep random scenes that fail as TOML in a folder.")
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
 def stability(
-    scene: str,
+    scene: str | None,
     names: tuple[str, ...],
     output: str | None,
     csv_file: str | None,
@@ -35,12 +40,27 @@ def stability(
     folder: str | None,
     elements: int | None,
     discretisation: str | None,
+    count: int | None,
+    seed: int | None,
+    first: int | None,
+    jobs: int | None,
+    failures: str | None,
     quiet: bool,
 ) -> int:
     """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
 
-    The exit code is 0 if every row is right, coarse, ambiguous or named, 1 if one is wrong.
+    With --random many scenes of every kind are judged instead. The exit code is 1 if an answer is wrong or an error
+    has no name.
     """
+    sweeps = {
+        "SCENE": scene, "--axis": names, "--output": output, "--csv": csv_file, "--markdown": markdown,
+        "--plot": folder, "--elements": elements, "--discretisation": discretisation,
+    }  # fmt: skip
+    trials = {"--seed": seed, "--first": first, "--jobs": jobs, "--save": failures}
+    if count is not None:
+        _refuse(sweeps, "goes with a sweep of one scene: leave it out, or --random")
+        return _try_random(count, seed or 0, first or 0, jobs, failures, quiet=quiet)
+    _refuse(trials, "goes with random scenes: add --random, such as --random 200")
     from bemkit.scenefile import load_scene, with_overrides
     from bemkit.stability.axes import all_axes
     from bemkit.stability.cases import find_axes
@@ -50,7 +70,7 @@ def stability(
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
     with bad_input():
         _check_outputs(output, csv_file, markdown)
-        chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation)
+        chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
         axes = find_axes(all_axes(), names)
         rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
         _write(axes, rows, csv_file, markdown, folder)
@@ -59,6 +79,26 @@ def stability(
 
         print_verdicts(rows)
     return int(any(row.verdict == "wrong" for row in rows))
+
+
+def _refuse(options: dict[str, object], remedy: str) -> None:
+    """Refuse the first option that is given."""
+    for name, value in options.items():
+        if value not in (None, ()):
+            raise click.UsageError(f"{name} {remedy}")
+
+
+def _try_random(count: int, seed: int, first: int, jobs: int | None, folder: str | None, *, quiet: bool) -> int:
+    from os import cpu_count
+
+    from bemkit.stability.trial_session import TrialSession, print_trials
+
+    is_live = not quiet and sys.stderr.isatty()
+    with bad_input():
+        trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
+    if not quiet:
+        print_trials(trials)
+    return int(any(trial.is_failure for trial in trials))
 
 
 def _computed(
