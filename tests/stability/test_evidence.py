@@ -32,31 +32,142 @@ def tampered(solution: bk.Solution, **columns: np.ndarray) -> Evidence:
     return examine(dataclasses.replace(solution, contact=dataclasses.replace(solution.contact, **columns)))
 
 
+def with_displacement(solution: bk.Solution, row: int, shift: np.ndarray) -> Evidence:
+    displacement = solution.boundary.displacement.copy()
+    displacement[row] += shift
+    return examine(
+        dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, displacement=displacement))
+    )
+
+
+def with_traction(solution: bk.Solution, element: int, factor: float) -> Evidence:
+    traction = solution.boundary.traction.copy()
+    traction[element] *= factor
+    return examine(dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, traction=traction)))
+
+
+def changed(solution: bk.Solution, name: str, node: int, factor: float) -> np.ndarray:
+    column = getattr(solution.contact, name).copy()
+    column[node] *= factor
+    return column
+
+
+def slipping_node(solution: bk.Solution) -> int:
+    table = solution.contact
+    return int(np.argmax(np.where(table.status > 1, np.abs(table.u_t), 0.0)))
+
+
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
-def test_each_violation_is_seen_under_its_name(discretisation: bk.LinearGalerkin) -> None:
+def test_each_violation_of_contact_is_seen_under_its_name(discretisation: bk.LinearGalerkin) -> None:
     solution = solved(1, discretisation)
     table = solution.contact
-    pressed, slipping = int(np.argmin(table.sigma_n)), int(np.argmax(np.where(table.status > 1, np.abs(table.u_t), 0)))
-    is_open = int(np.argmax(table.clearance))
-
-    def changed(name: str, node: int, factor: float) -> np.ndarray:
-        column = getattr(table, name).copy()
-        column[node] *= factor
-        return column
-
+    pressed, slipping, is_open = int(np.argmin(table.sigma_n)), slipping_node(solution), int(np.argmax(table.clearance))
     length = float(np.abs(table.u_n).max())
-    assert tampered(solution, clearance=table.clearance - 1e-3 * length).penetration > 1e-6
+    row = int(np.argmin(np.hypot(*(solution.boundary.points - [table.x[pressed], table.y[pressed]]).T)))
+    assert with_displacement(solution, row, np.array([0.0, -1e-3 * length])).penetration > 1e-6
+    assert with_displacement(solution, row, np.array([0.0, 1e-3 * length])).complementarity > 1e-6
     tension = table.sigma_n.copy()
     tension[is_open] = 1e-3
     seen = tampered(solution, sigma_n=tension)
-    assert min(seen.tension, seen.complementarity) > 1e-4
-    assert tampered(solution, sigma_t=changed("sigma_t", slipping, 1.01)).cone_excess > 1e-4
-    assert tampered(solution, sigma_t=changed("sigma_t", slipping, 0.99)).slip_opposition > 1e-4
-    assert tampered(solution, u_t=changed("u_t", slipping, -1.0)).slip_opposition > 1e-4
-    assert tampered(solution, sigma_n=changed("sigma_n", pressed, 1.01)).equilibrium > 1e-5
+    assert min(seen.tension, seen.complementarity, seen.status) > 1e-4
+    assert tampered(solution, sigma_t=changed(solution, "sigma_t", slipping, 1.01)).cone_excess > 1e-4
+    assert tampered(solution, sigma_t=changed(solution, "sigma_t", slipping, 0.99)).slip_opposition > 1e-4
+    assert tampered(solution, sigma_t=changed(solution, "sigma_t", slipping, -1.0)).slip_opposition > 1e-4
+    assert tampered(solution, sigma_n=changed(solution, "sigma_n", pressed, 1.01)).equilibrium > 1e-5
     assert tampered(solution, gap=table.gap + 1e-3 * length).obstacle > 1e-6
-    assert np.isnan(tampered(solution, u_t=changed("u_t", slipping, np.nan)).worst)
-    assert not tampered(solution, u_t=changed("u_t", slipping, np.nan)).is_good
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
+def test_a_table_that_is_not_that_of_the_boundary_is_seen(discretisation: bk.LinearGalerkin) -> None:
+    solution = solved(1, discretisation)
+    table, slipping = solution.contact, slipping_node(solution)
+    assert tampered(solution, u_t=changed(solution, "u_t", slipping, 1.01)).table > 1e-6
+    assert tampered(solution, clearance=table.clearance - 1e-3 * np.abs(table.u_n).max()).table > 1e-6
+    assert tampered(solution, x=table.x + 1e-6).table > 1e-6
+    assert tampered(solution, sigma_t=changed(solution, "sigma_t", slipping, 1.01)).tractions > 1e-5
+    assert examine(dataclasses.replace(solution, force_normal=1.01 * solution.force_normal)).table > 1e-6
+    assert examine(dataclasses.replace(solution, force_tangential=0.0)).table > 1e-6
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
+def test_a_turned_direction_of_contact_is_seen(discretisation: bk.LinearGalerkin) -> None:
+    """As if contact acted along a direction that is 5 degrees off, everything else consistent."""
+    solution = solved(1, discretisation)
+    table, (cosine, sine) = solution.contact, (np.cos(np.radians(5.0)), np.sin(np.radians(5.0)))
+    turned = {
+        "u_n": cosine * table.u_n + sine * table.u_t,
+        "u_t": cosine * table.u_t - sine * table.u_n,
+        "sigma_n": cosine * table.sigma_n + sine * table.sigma_t,
+        "sigma_t": cosine * table.sigma_t - sine * table.sigma_n,
+    }
+    seen = tampered(solution, **turned, clearance=table.gap - turned["u_n"])
+    assert min(seen.table, seen.tractions, seen.equilibrium) > 1e-4
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
+def test_a_wrong_status_is_seen(discretisation: bk.LinearGalerkin) -> None:
+    solution = solved(1, discretisation)
+    table, slipping = solution.contact, slipping_node(solution)
+    pressed, is_open = int(np.argmin(table.sigma_n)), int(np.argmax(table.clearance))
+    assert sorted(set(table.status.tolist())) == [0, 1, 2]  # forward slip only, so that each claim below is wrong
+    for node, claim in ((slipping, 0), (slipping, 1), (slipping, 3), (is_open, 1), (is_open, 2), (pressed, 0)):
+        status = table.status.copy()
+        status[node] = claim
+        seen = tampered(solution, status=status)
+        assert seen.faults == ("status",), (node, claim)
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.QuadraticGalerkin()])
+def test_wrong_supports_loads_and_energies_are_seen(discretisation: bk.LinearGalerkin) -> None:
+    moved = bk.Part("top", bk.PrescribedDisplacement(x=0.002, y=-0.01), sides=("top",))
+    solution = bk.run(
+        block(FLOOR, moved, bk.Part("wind", bk.Pressure(1e-4), sides=("left",)), discretisation=discretisation)
+    )
+    assert examine(solution).worst <= 1e-12
+    top = int(np.argmax(solution.boundary.points[:, 1] - 0.01 * np.abs(solution.boundary.points[:, 0] - 0.5)))
+    assert with_displacement(solution, top, np.array([0.0, 1e-6])).faults[0] == "supports"
+    assert with_displacement(solution, top, np.array([1e-6, 0.0])).faults[0] == "supports"
+    for side in ("wind", "right"):  # loaded, and free of traction
+        elements = solution.mesh.part(side) if side == "wind" else np.flatnonzero(solution.mesh.centres[:, 0] > 0.9999)
+        traction = solution.boundary.traction.copy()
+        traction[elements[0], 0] += 1e-5
+        boundary = dataclasses.replace(solution.boundary, traction=traction)
+        assert examine(dataclasses.replace(solution, boundary=boundary)).faults == ("tractions",)
+    negative = examine(dataclasses.replace(solution, energy=-solution.energy))
+    assert negative.faults == ("negative_energy",)
+
+
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.QuadraticGalerkin()])
+def test_energy_is_the_work_of_the_loads(discretisation: bk.LinearGalerkin) -> None:
+    solution = bk.run(small_paper_scene(1, discretisation=discretisation))
+    assert examine(solution).energy <= 1e-12
+    assert examine(dataclasses.replace(solution, energy=1.001 * solution.energy)).faults == ("energy",)
+    assert examine(dataclasses.replace(solution, energy=-solution.energy)).faults == ("energy", "negative_energy")
+
+
+def test_numbers_that_are_none_are_seen() -> None:
+    solution = solved(1, LINEAR)
+    for name in ("u_t", "sigma_n", "gap"):
+        seen = tampered(solution, **{name: changed(solution, name, 3, np.nan)})
+        assert seen.faults[0] == "numbers"
+        assert not seen.is_good
+    assert not examine(dataclasses.replace(solution, energy=np.inf)).is_good
+
+
+def test_slip_counts_from_the_step_before() -> None:
+    scene = dataclasses.replace(small_paper_scene(1), load_factors=(1.0, 0.5))
+    first, second = bk.run_history([scene])
+    assert examine(first).is_good
+    assert examine(second, first).is_good
+    assert "status" in examine(second).faults  # nodes that stuck all the while have moved with the first step
+
+
+def test_a_node_that_carries_load_above_the_floor_is_seen() -> None:
+    """One node 1 mm above the floor with 100 Pa on it, all else in equilibrium: nothing touches."""
+    solution = solved(1, LINEAR)
+    table = solution.contact
+    lifted = tampered(solution, gap=table.gap + 1e-3, clearance=table.clearance + 1e-3)
+    assert {"complementarity", "status", "obstacle"} <= set(lifted.faults)
 
 
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
