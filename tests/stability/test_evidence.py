@@ -213,5 +213,6 @@ def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on
 
     assert tension(1e-12) > 1e-6
     assert tension(1e-14) <= 1e-6  # some eps, divided by the share of an element in the body
-    inward = table.clearance - 1e-6 * float(np.abs(table.u_n).max())
-    assert tampered(solution, clearance=inward).penetration > 1e-6
+    displacement = solution.boundary.displacement - np.array([0.0, 1e-6 * float(np.abs(table.u_n).max())])
+    inward = dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, displacement=displacement))
+    assert examine(inward).penetration > 1e-6

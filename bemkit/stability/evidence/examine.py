@@ -99,7 +99,7 @@ class Evidence:
     def faults(self) -> tuple[str, ...]:
         """Names of the entries that must vanish and do not, the largest first."""
         wrong = {name: value for name, value in self.exact.items() if not value <= CONTACT_LIMIT}
-        return tuple(sorted(wrong, key=lambda name: -np.nan_to_num(wrong[name], nan=np.inf)))
+        return tuple(sorted(wrong, key=lambda name: -np.nan_to_num(wrong[name], nan=np.inf, posinf=np.inf)))
 
     @property
     def is_good(self) -> bool:
