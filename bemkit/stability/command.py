@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,7 +82,7 @@ def stability(
     return int(any(row.verdict == "wrong" for row in rows))
 
 
-def _refuse(options: dict[str, object], remedy: str) -> None:
+def _refuse(options: Mapping[str, object], remedy: str) -> None:
     """Refuse the first option that is given."""
     for name, value in options.items():
         if value not in (None, ()):

@@ -115,7 +115,8 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
 def describe(evidence: Evidence) -> str:
     """Return the entries of the check that are too large, with their values."""
     entries = [f"{name} {evidence.exact[name]:.1e}" for name in evidence.faults]
-    return "; ".join([*entries, f"reciprocity {evidence.reciprocity:.1e}"])
+    doubts = [f"{name} {getattr(evidence, name):.1e}" for name in ("reciprocity", "hidden_overlap")]
+    return "; ".join([*entries, *doubts])
 
 
 def try_cases(seed: int, indices: Iterable[int], *, processes: int = 1) -> Iterator[Trial]:

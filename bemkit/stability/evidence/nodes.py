@@ -93,6 +93,25 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     )
 
 
+def hidden_overlap(solution: Solution, boundary: Boundary, nodes: Nodes) -> float:
+    """Return how deep contact parts are in their obstacles at nodes that are not in the table, over the displacement.
+
+    There supports hold the direction of contact, so that nothing but a warning can be asked for.
+    """
+    points, displacement = solution.boundary.points, solution.boundary.displacement
+    motion = float(np.abs(displacement).max())
+    deepest = 0.0
+    for part in solution.scene.contact_parts:
+        rows = np.setdiff1d(boundary.nodes[solution.mesh.part(part.name)], nodes.nodes)
+        normals = _mean_normals(solution, boundary, part.name)[rows]
+        if isinstance(part.condition, Contact) and rows.size:
+            distance, direction = distance_to(part.condition.obstacle, points[rows], normals)
+            overlap = np.sum(displacement[rows] * direction, axis=1) - distance
+            is_facing = np.sum(direction * normals, axis=1) > _FACING
+            deepest = max(deepest, float(np.max(overlap[is_facing], initial=0.0)))
+    return deepest / motion if motion > 0.0 else deepest
+
+
 def _mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArray:
     """Return (n_nodes, 2) normals: mean by length of a part's elements that meet at a node, zero elsewhere."""
     elements = solution.mesh.part(part)

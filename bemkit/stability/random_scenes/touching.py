@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
+from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle, PolygonalObstacle
 from bemkit.expression import Expression
 from bemkit.scene import Contact, Part
 from bemkit.stability.random_scenes.bodies import Body, SideSample
@@ -16,6 +17,8 @@ from bemkit.stability.random_scenes.draw import between, chance, decades, direct
 
 _LEAST_FACING = 0.2
 """Cosine between a side's normal and the way to the obstacle from which on the side may be a contact part."""
+_STRAIGHT = {"plane": 4.0, "tilted": 1.5, "polygon": 1.5, "gap": 2.0, "directed": 0.5}
+_OBSTACLES = MappingProxyType({**_STRAIGHT, "circle": 2.0, "cavity": 1.0, "bump": 1.0})
 
 
 def random_contact(
@@ -55,7 +58,11 @@ def _obstacle(random: np.random.Generator, body: Body, down: FloatArray, sides: 
     points = np.concatenate([side.points for side in sides])
     lowest = points[int(np.argmax((points - body.centre) @ down))]
     distance = _distance(random, body.size)
-    match one_by_weight(random, {"plane": 4.0, "tilted": 1.5, "circle": 2.0, "cavity": 1.0, "gap": 2.0, "bump": 1.0}):
+    match one_by_weight(random, _OBSTACLES):
+        case "polygon":
+            return _polygon(random, body, down, lowest + distance * down)
+        case "directed":
+            return Gap(distance, direction=_pair(down))
         case "plane":
             return _plane(lowest, down, distance)
         case "tilted":
@@ -75,6 +82,16 @@ def _obstacle(random: np.random.Generator, body: Body, down: FloatArray, sides: 
             curve = decades(random, -4.0, 0.0) / body.size
             return Gap(Expression(f"{distance!r} + {curve!r} * ((x - {x!r})**2 + (y - {y!r})**2)"))
     return Gap(distance)
+
+
+def _polygon(random: np.random.Generator, body: Body, down: FloatArray, top: FloatArray) -> PolygonalObstacle:
+    """Draw a block whose upper side touches a point, or a wedge whose tip does."""
+    across = np.array([-down[1], down[0]])
+    width, depth = body.size * between(random, 0.2, 1.5), body.size * between(random, 0.2, 2.0)
+    corners: tuple[tuple[float, float], ...] = ((1.0, -0.5), (1.0, 0.5), (0.0, 0.5), (0.0, -0.5))
+    if chance(random, 0.4):
+        corners = ((1.0, -0.5), (1.0, 0.5), (0.0, 0.0))
+    return PolygonalObstacle(tuple(_pair(top + d * depth * down + s * width * across) for d, s in corners))
 
 
 def _plane(lowest: FloatArray, down: FloatArray, distance: float) -> HalfPlane:
