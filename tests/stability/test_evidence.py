@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.stability.evidence import Evidence, examine
+from bemkit.stability.evidence.obstacles import distance_to
 from tests.stability.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 
 
@@ -216,3 +217,29 @@ def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on
     displacement = solution.boundary.displacement - np.array([0.0, 1e-6 * float(np.abs(table.u_n).max())])
     inward = dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, displacement=displacement))
     assert examine(inward).penetration > 1e-6
+
+
+def test_polygonal_obstacles_and_given_directions_are_measured_anew() -> None:
+    points = np.array([[0.3, 1.5], [-1.0, 1.4], [2.0, 0.2], [0.5, 0.9], [0.0, 1.0], [0.4, 1.0]])
+    normals = np.tile([0.0, -1.0], (len(points), 1))
+    for vertices in ([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 1], [1, 0], [0, 0]]):
+        square = bk.PolygonalObstacle(tuple((float(x), float(y)) for x, y in vertices))
+        distance, direction = distance_to(square, points, normals)
+        assert distance == pytest.approx([0.5, np.hypot(1.0, 0.4), 1.0, -0.1, 0.0, 0.0], abs=1e-15)
+        corner = np.array([1.0, -0.4]) / np.hypot(1.0, 0.4)
+        # at the corner itself either side will do
+        assert direction[[0, 1, 2, 3, 5]] == pytest.approx(
+            np.array([[0.0, -1.0], corner, [-1.0, 0.0], [0.0, -1.0], [0.0, -1.0]]), abs=1e-15
+        )
+    given = bk.Gap(0.1, direction=(bk.Expression("3 + 0 * x"), -4.0))
+    distance, direction = distance_to(given, points, normals)
+    assert distance == pytest.approx(np.full(len(points), 0.1))
+    assert direction == pytest.approx(np.tile([0.6, -0.8], (len(points), 1)))
+
+
+def test_nodes_that_supports_push_into_an_obstacle_need_a_warning() -> None:
+    pushed = bk.Part("wall", bk.PrescribedDisplacement(y=-0.01), sides=("right",))
+    evidence = examine(bk.run(block(FLOOR, pushed)))
+    assert evidence.is_good
+    assert evidence.hidden_overlap == pytest.approx(1.0)  # the corner moves as far as anything
+    assert evidence.needs_warning == "hidden_overlap"
