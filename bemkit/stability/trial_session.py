@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.files import OutputFileError
 from bemkit.outputs import write_text
 from bemkit.stability.random_scenes import random_case
 from bemkit.stability.trials import Outcome, Trial, try_cases
@@ -55,11 +56,11 @@ class TrialSession:
 
         Raises
         ------
-        OSError
+        OutputFileError
             If the folder cannot be made or written.
         """
         if self.folder is not None:
-            Path(self.folder).mkdir(parents=True, exist_ok=True)
+            _make_folder(Path(self.folder))
         indices = range(self.first, self.first + self.count)
         trials = []
         with self._progress() as progress:
@@ -76,6 +77,13 @@ class TrialSession:
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
         with Progress(*columns, console=Console(stderr=True), transient=True, disable=not self.is_live) as progress:
             yield progress
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputFileError(f"{folder}: cannot be made ({error.strerror}): give the name of a folder") from error
 
 
 def save_trial(trial: Trial, folder: Path) -> None:

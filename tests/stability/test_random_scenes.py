@@ -50,13 +50,13 @@ def test_a_scene_is_a_function_of_its_numbers() -> None:
 
 
 def test_scenes_are_the_same_after_a_scene_file() -> None:
-    for index in range(60):
+    for index in range(30):
         case = random_case(7, index)
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
 
 
 def test_every_kind_is_drawn() -> None:
-    scenes = [scene for index in range(300) for scene in random_case(3, index).scenes]
+    scenes = [scene for index in range(150) for scene in random_case(3, index).scenes]
     drawn = Counter(type(value).__name__ for scene in scenes for value in kinds_in(scene))
     wanted = (
         *("Rectangle", "Polygon", "Disk", "Sector", "Ring", "PlateWithHole", "ExteriorOf"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class Body:
     centre: FloatArray
     hole: tuple[float, float, float] | None = None
 
-    @property
+    @cached_property
     def sides(self) -> tuple[SideSample, ...]:
         """Samples of all sides."""
         result = []
