@@ -70,8 +70,6 @@ def try_case(seed: int, index: int) -> Trial:
         except BemkitError as error:
             return Trial(seed, index, Outcome.NAMED, type(error).__name__, str(error))
         except Exception as error:
-            if type(error).__module__.startswith("bemkit."):
-                return Trial(seed, index, Outcome.NAMED, "UNBASED " + type(error).__name__, str(error))
             return Trial(seed, index, Outcome.TRACEBACK, type(error).__name__, traceback.format_exc())
 
 

@@ -108,8 +108,8 @@ def test_random_scenes_are_counted() -> None:
 
 
 def test_random_scenes_are_the_same_in_processes() -> None:
-    alone = list(try_cases(7, range(40, 48)))
-    assert list(try_cases(7, range(40, 48), processes=2)) == alone
+    alone = list(try_cases(7, range(40, 44)))
+    assert list(try_cases(7, range(40, 44), processes=2)) == alone
 
 
 def test_random_scenes_that_fail_are_saved_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
