@@ -77,7 +77,7 @@ def obstacle_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float
     if np.any((np.isfinite(gap) != np.isfinite(nodes.distance)) & ~nodes.is_grazing):
         return float("inf")
     known = np.isfinite(gap) & np.isfinite(nodes.distance)
-    return _beyond(np.abs(gap[known] - nodes.distance[known]), scales.coordinates, scales.length)
+    return beyond(np.abs(gap[known] - nodes.distance[known]), scales.coordinates, scales.length)
 
 
 def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
@@ -91,8 +91,8 @@ def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
         np.abs(table.clearance[known] - (table.gap - table.u_n)[known]),
         nodes.offset,
     )
-    round_off = scales.coordinates + 1e-12 * float(np.abs(motion).max(initial=0.0))
-    return max(_beyond(difference, round_off, scales.length) for difference in differences)
+    round_off = scales.coordinates + scales.turned
+    return max(beyond(difference, round_off, scales.length) for difference in differences)
 
 
 def traction_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, scales: Scales) -> float:
@@ -149,5 +149,6 @@ def largest(values: FloatArray) -> float:
     return float(np.max(np.maximum(values, 0.0), initial=0.0))
 
 
-def _beyond(differences: FloatArray, allowed: float, unit: float) -> float:
+def beyond(differences: FloatArray, allowed: float, unit: float) -> float:
+    """Return the largest difference beyond what is allowed, in units; nan if there is one."""
     return max(largest(differences) - allowed, 0.0) / unit if not np.isnan(differences).any() else float("nan")

@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.scene import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.solution import Solution
 from bemkit.stability.evidence.boundary import Boundary
-from bemkit.stability.evidence.contact import largest
+from bemkit.stability.evidence.contact import beyond, largest
 from bemkit.stability.evidence.scales import Scales
 
 
@@ -49,7 +49,7 @@ def support_mismatch(solution: Solution, boundary: Boundary, scales: Scales) -> 
     worst = [0.0]
     for elements, directions, values in held_directions(solution, boundary):
         motion = np.einsum("enc,enc->en", displacement[boundary.nodes[elements]], directions)
-        worst.append(largest(np.abs(motion - values)) / scales.length)
+        worst.append(beyond(np.abs(motion - values), scales.turned, scales.length))
     if mesh.symmetry is not None and boundary.nodes.shape[1] > 1:
         across = displacement[: mesh.n_nodes][mesh.on_symmetry_lines]
         worst.append(largest(np.abs(across)) / scales.length)
