@@ -25,6 +25,7 @@ from bemkit.operators.threads import blas_threads_for
 from bemkit.plan import Plan, Stage, check_memory, make_plan
 from bemkit.scene import NoContactError, Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
+from bemkit.solution_warnings import find_warnings
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
 from bemkit.solvers.probe import probe
 from bemkit.warm_start import state_on
@@ -203,7 +204,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
     clock = clock.closed(Stage.RECOVER)
-    return Solution(
+    solution = Solution(
         scene=model.scene,
         mesh=model.mesh,
         status=result.status,
@@ -223,6 +224,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
         work=model.work,
         message=result.message,
     )
+    return replace(solution, warnings=find_warnings(solution))
 
 
 def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
@@ -244,6 +246,7 @@ def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
         timings={name: sum(step.timings[name] for step in steps) for name in last.timings},
         memory={name: max(step.memory.get(name, 0) for step in steps) for name in steps[0].memory},
         message=f"load step {len(steps)} of {len(scene.load_factors)}: {last.message}",
+        warnings=tuple(dict.fromkeys(warning for step in reversed(steps) for warning in step.warnings)),
     )
 
 

@@ -308,6 +308,8 @@ class Solution:
         What was computed; equal to ``plan.work`` if all load steps converged.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
+    warnings : tuple of str
+        What is doubtful about the result, one sentence each; see `bemkit.solution_warnings`.
     """
 
     scene: Scene
@@ -328,6 +330,7 @@ class Solution:
     work: Work
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
     def is_converged(self) -> bool:
@@ -358,17 +361,17 @@ class Solution:
         Returns
         -------
         dict
-            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
-            ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
-            ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``,
-            ``timings`` [s], ``plan``, ``work``,
-            ``memory`` [bytes].
+            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``warnings`` (sentences),
+            ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
+            ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
         """
         return {
             "title": self.scene.title,
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,
+            "warnings": list(self.warnings),
             "n_elements": self.mesh.n_elements,
             "n_contact": self.contact.n_contact,
             "linear_solves": self.linear_solves,
