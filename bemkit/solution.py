@@ -16,9 +16,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
-from bemkit.estimate import element_errors
+from bemkit.estimate import element_errors, traction_errors
 from bemkit.geometry.folding import unfolded
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.space import ConstantSpace
 from bemkit.operators.work import Work
 from bemkit.plan import Plan
 from bemkit.scene import ConstantCollocation, Scene
@@ -339,21 +340,30 @@ class Solution:
 
     @cached_property
     def element_errors(self) -> FloatArray | None:
-        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
+        """(n_elements,) array [J/m]: estimated squared errors, see `bemkit.estimate`; None for collocation."""
         if isinstance(self.scene.discretisation, ConstantCollocation):
             return None
-        make_space = self.scene.discretisation.displacement_space
-        whole = make_space(self.mesh.whole)
-        displacement = unfolded(make_space(self.mesh), whole, self.boundary.displacement)
-        errors = element_errors(whole, displacement, self.scene.material.plane_modulus)
+        make_space, modulus = self.scene.discretisation.displacement_space, self.scene.material.plane_modulus
+        half, whole = make_space(self.mesh), make_space(self.mesh.whole)
+        displacement = unfolded(half, whole, self.boundary.displacement)
+        traction = unfolded(ConstantSpace(self.mesh), ConstantSpace(self.mesh.whole), self.boundary.traction)
+        errors = element_errors(whole, displacement, modulus)
+        errors += traction_errors(self.mesh.whole, traction, half.degree - 1, modulus)
         return errors[: self.mesh.n_elements]
 
     @cached_property
     def estimated_error(self) -> float | None:
-        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)); None for collocation."""
+        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
+
+        None for collocation, and where the energy is not positive, so that an error is measured against nothing; zero
+        of a body at rest.
+        """
         if self.element_errors is None:
             return None
-        return float(np.sqrt(self.element_errors.sum() / (2.0 * self.energy))) if self.energy > 0.0 else 0.0
+        error = float(self.element_errors.sum())
+        if error == 0.0:
+            return 0.0
+        return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
 
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
