@@ -12,11 +12,14 @@ difference, where t_h is the exact traction of u_h.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.folding import unfolded
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import BoundarySpace, break_nodes, dof_points
+from bemkit.geometry.space import BoundarySpace, ConstantSpace, break_nodes, dof_points
 from bemkit.operators.rigid import without_motion
 
 STRAIN_CALIBRATION = 1.0 / 64.0
@@ -28,6 +31,39 @@ wave number k, of saw teeth h^3 |step|^2 / 115 for each element and of parabolas
 leave somewhat more."""
 STEEPEST = 6.0
 """Largest ratio of successive steps towards a corner: that of tractions like d**-0.5 on equal elements."""
+
+
+def squared_errors(
+    mesh: BoundaryMesh,
+    make_space: Callable[[BoundaryMesh], BoundarySpace],
+    displacement: FloatArray,
+    traction: FloatArray,
+    plane_modulus: float,
+) -> FloatArray:
+    """Estimate the squared error of each element in the energy norm.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    make_space : callable
+        Gives the space of the displacements on a mesh, continuous and of degree 1 or 2; tractions have a degree less.
+    displacement : (n_scalar, 2) array [m]
+    traction : (n_elements, 2) array [Pa]
+        Means of the elements.
+    plane_modulus : float [Pa]
+        E'.
+
+    Returns
+    -------
+    (n_elements,) array [J/m]
+        With those of the images that a symmetry adds they add up to the estimate of a(u - u_h, u - u_h).
+    """
+    half, whole = make_space(mesh), make_space(mesh.whole)
+    moved = unfolded(half, whole, displacement)
+    loaded = unfolded(ConstantSpace(mesh), ConstantSpace(mesh.whole), traction)
+    errors = element_errors(whole, moved, plane_modulus)
+    errors += traction_errors(mesh.whole, loaded, whole.degree - 1, plane_modulus)
+    return errors[: mesh.n_elements]
 
 
 def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus: float) -> FloatArray:
@@ -92,6 +128,29 @@ def traction_errors(mesh: BoundaryMesh, traction: FloatArray, degree: int, plane
         bends = _bends(mesh, traction)
         inside, last = (mesh.lengths * np.nan_to_num(bends)) ** 2, _into_the_last(mesh, bends, of_nodes=False)
     return np.asarray(TRACTION_CALIBRATION[degree] / plane_modulus * (inside + (mesh.lengths * last) ** 2))
+
+
+def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
+    """Tell which elements have too few neighbours on their piece of the boundary to estimate the error of tractions.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    degree : int
+        Of the tractions on an element: 0 or 1.
+
+    Returns
+    -------
+    (n_elements,) bool array
+        Between corners and ends of parts there must be two elements for a step, three for a bend.
+    """
+    whole = mesh.whole
+    if degree == 0:
+        is_blind = np.asarray(break_nodes(whole)[whole.elements].all(axis=1))
+    else:
+        ones = 1.0 + _bends(whole, np.zeros((whole.n_elements, 2)))
+        is_blind = np.isnan(ones) & (_into_the_last(whole, ones, of_nodes=False) == 0.0)
+    return is_blind[: mesh.n_elements]
 
 
 def _node_lengths(mesh: BoundaryMesh) -> FloatArray:

@@ -114,9 +114,8 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
     worst_name = f" ({worst_name.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
     timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
-    status = Text(
-        solution.status.name.lower().replace("_", " "), style="bold green" if solution.is_converged else "bold red"
-    )
+    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
+    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
     discretisation = DISCRETISATIONS.kind_of(solution.scene.discretisation)

@@ -16,10 +16,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
-from bemkit.estimate import element_errors, traction_errors
-from bemkit.geometry.folding import unfolded
+from bemkit.estimate import squared_errors
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import ConstantSpace
 from bemkit.operators.work import Work
 from bemkit.plan import Plan
 from bemkit.scene import ConstantCollocation, Scene
@@ -209,7 +207,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip
-    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and _are_neighbours(contact, i)]
+    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and are_neighbours(contact, i)]
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
     found = []
     for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
@@ -233,7 +231,7 @@ def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -
     return kept
 
 
-def _are_neighbours(contact: ContactTable, i: int) -> bool:
+def are_neighbours(contact: ContactTable, i: int) -> bool:
     """Tell whether the nodes i and i + 1 follow each other on one piece of one part."""
     distance = np.hypot(contact.x[i + 1] - contact.x[i], contact.y[i + 1] - contact.y[i])
     # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
@@ -335,21 +333,21 @@ class Solution:
 
     @property
     def is_converged(self) -> bool:
-        """Whether the solver vouches for the result."""
+        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
         return self.status is Status.CONVERGED
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether contact, friction and equilibrium hold on the mesh, be it fine enough for the accuracy or not."""
+        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @cached_property
     def element_errors(self) -> FloatArray | None:
-        """(n_elements,) array [J/m]: estimated squared errors, see `bemkit.estimate`; None for collocation."""
+        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
         if isinstance(self.scene.discretisation, ConstantCollocation):
             return None
         make_space, modulus = self.scene.discretisation.displacement_space, self.scene.material.plane_modulus
-        half, whole = make_space(self.mesh), make_space(self.mesh.whole)
-        displacement = unfolded(half, whole, self.boundary.displacement)
-        traction = unfolded(ConstantSpace(self.mesh), ConstantSpace(self.mesh.whole), self.boundary.traction)
-        errors = element_errors(whole, displacement, modulus)
-        errors += traction_errors(self.mesh.whole, traction, half.degree - 1, modulus)
-        return errors[: self.mesh.n_elements]
+        return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
 
     @cached_property
     def estimated_error(self) -> float | None:
@@ -371,7 +369,7 @@ class Solution:
         Returns
         -------
         dict
-            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``warnings`` (sentences),
+            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``certified``, ``warnings``,
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
             ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
@@ -381,6 +379,7 @@ class Solution:
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,
+            "certified": self.is_certified,
             "warnings": list(self.warnings),
             "n_elements": self.mesh.n_elements,
             "n_contact": self.contact.n_contact,
