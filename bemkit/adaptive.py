@@ -34,8 +34,8 @@ TRANSITION = 3.0
 """Length of the element in which the status changes, in units of the accuracy times the length of the part."""
 MOST_FOR_TRANSITIONS = 2
 """Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
-SAFETY = 0.65
-"""The next mesh is planned for this part of the wished error: coarse meshes do not show yet all there is at corners."""
+SAFETY = 0.8
+"""The next mesh is planned for this part of the wished error."""
 
 
 def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None = None) -> tuple[Solution, ...]:

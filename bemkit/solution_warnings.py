@@ -48,8 +48,9 @@ def _error(solution: Solution) -> Iterator[str]:
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
         if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
+            count = "1 element" if elements.size == 1 else f"{elements.size} elements"
             yield (
-                f"Part {part.name!r} has {elements.size} elements, too few to estimate the error of its reactions: "
+                f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
                 "use more elements there."
             )
 
@@ -80,9 +81,9 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
 
 
 def _narrow(part: str, kind: str, zones: Sequence[FloatArray]) -> str:
-    n_nodes, middle = zones[0].size, float(zones[0].mean())
-    nodes = f"{n_nodes} {'node' if n_nodes == 1 else 'nodes'}"
-    more = f", and {len(zones) - 1} more zones like it" if len(zones) > 1 else ""
+    nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
+    n_more, middle = len(zones) - 1, float(zones[0].mean())
+    more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
     return (
         f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: use more elements there, or give "
         "an accuracy."
