@@ -23,7 +23,8 @@ from bemkit.plan import make_plan, this_machine
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
-from bemkit.solvers.base import StepRecord
+from bemkit.solvers.base import Status, StepRecord
+from bemkit.totals import with_totals
 
 LARGEST_GROWTH = 2.5
 """Factor between the numbers of elements of two meshes: the places where the status changes must keep up."""
@@ -50,9 +51,11 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     Returns
     -------
     tuple of Solution
-        One for each mesh; the best one comes last. Its timings are those of all meshes together. If the accuracy is out
-        of reach within the elements or the time allowed, its message says so, and `Solution.estimated_error` what was
-        reached.
+        One for each mesh; the best one comes last. Its timings, linear solves, steps and history are those of all
+        meshes together. If the accuracy is out of reach within the elements or the time allowed, or because the solve
+        on a finer mesh fails, its status is ACCURACY_NOT_REACHED, its message gives the reason, and
+        `Solution.estimated_error` says what was reached. If no mesh at all could be solved, its status is that of the
+        last one.
 
     Raises
     ------
@@ -176,12 +179,16 @@ def _cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
 
 
 def _ending(solutions: list[Solution], obstacle: str = "") -> tuple[Solution, ...]:
-    """Put the best solution last, with the times of all and the reason why its accuracy is not what was wished."""
+    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was wished."""
     best = min((solution for solution in solutions if solution.is_converged), key=_error, default=solutions[-1])
-    message = f"{len(solutions)} meshes, the last with {best.mesh.n_elements} elements. {best.message}"
+    message, status = (
+        f"{len(solutions)} meshes, the last with {best.mesh.n_elements} elements. {best.message}",
+        best.status,
+    )
     if obstacle:
         wished = best.scene.mesh.accuracy
         message = f"The accuracy {wished:g} was not reached: {obstacle}; estimated error {_error(best):.1e}. {message}"
-    timings = {name: sum(solution.timings[name] for solution in solutions) for name in best.timings}
+        status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
+    names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
     others = [solution for solution in solutions if solution is not best]
-    return (*others, replace(best, timings=timings, message=message))
+    return (*others, replace(with_totals(best, solutions, names), status=status, message=message))

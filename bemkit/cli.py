@@ -1,6 +1,7 @@
 """The command line: ``bemkit run | show | scenes | plan | study | stability``.
 
-Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 130 interrupted.
+Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
+interrupted.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from bemkit.scene import Scene
     from bemkit.solution import Solution
 
-NOT_CONVERGED, BAD_INPUT, INTERRUPTED, PIPE_CLOSED = 1, 2, 130, 141
+NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -126,7 +127,9 @@ def run(
         from bemkit.explain import print_explanation
 
         print_explanation(solution, output_seconds, to_stderr=wanted.uses_stdout)
-    return 0 if solution.is_converged else NOT_CONVERGED
+    if solution.is_converged:
+        return 0
+    return INACCURATE if solution.is_certified else NOT_CONVERGED
 
 
 @commands.command()

@@ -37,6 +37,11 @@ def write_text(group: h5py.Group, name: str, text: str) -> None:
     group.create_dataset(name, data=np.array(text.encode("utf-8"), dtype=_text_type([text])))
 
 
+def write_texts(group: h5py.Group, name: str, texts: Sequence[str]) -> None:
+    """Write texts of any length as a dataset."""
+    write_table(group, {name: list(texts)})
+
+
 def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
     """Write columns of numbers (arrays) and texts (lists of str), one dataset each."""
     for name, column in columns.items():
@@ -191,6 +196,12 @@ class Reader:
         if stored.shape != () or stored.dtype.itemsize > max_length:
             raise self.error(f"{path} is not a text of at most {max_length} bytes")
         return self._decoded(path, stored.item())
+
+    def texts(self, path: str) -> tuple[str, ...]:
+        """Return a list of texts; none if there is no such list."""
+        if not self.has(path):
+            return ()
+        return tuple(self._decoded(path, item) for item in self._array(path, "S").ravel().tolist())
 
     def table(
         self, group: str, *, texts: Sequence[str] = (), floats: Sequence[str] = (), integers: Sequence[str] = ()

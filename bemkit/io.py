@@ -12,6 +12,7 @@ stranger runs no code. The layout, version 1:
     /boundary        points, displacement, centres, traction
     /contact, /transitions, /history, /plan, /work    tables: one dataset per column, all of one length;
                      those of plan and work with numbers as attributes
+    /warnings, /plan/warnings    texts, one sentence each; a file without them has none
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.files import OutputFileError, check_target
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text
+from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
 from bemkit.planfile import read_plan, read_work, write_plan, write_work
 from bemkit.scene import Scene
 from bemkit.scenefile import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
@@ -105,6 +106,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_plan(file.create_group("plan"), solution.plan)
         write_work(file.create_group("work"), solution.work)
         write_attributes(file.create_group("memory"), solution.memory)
+        write_texts(file, "warnings", solution.warnings)
 
 
 def read_result(path: str | Path) -> Solution:
@@ -234,6 +236,7 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         work=read_work(reader),
         memory={name: int(value) for name, value in reader.attributes("memory").items()},
         message=str(summary["message"]),
+        warnings=reader.texts("warnings"),
     )
 
 

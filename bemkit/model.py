@@ -23,6 +23,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import supported
+from bemkit.operators.rigid import without_motion
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 from bemkit.operators.work import Work
 from bemkit.plan import Decisions, Formulation, Plan, make_plan
@@ -228,7 +229,10 @@ def physical_fields(
         if isinstance(part.condition, Traction | Pressure):
             traction[elements] = _mean_load(part.condition, mesh, elements)
     traction[is_loose] = 0.0
-    energy = 0.5 * float(np.sum(displacement * force)) * units.stress * units.displacement * units.length
+    points = dof_points(scene.discretisation.displacement_space(mesh.unit))
+    # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
+    strained = without_motion(mesh.unit, points, displacement)
+    energy = 0.5 * float(np.sum(strained * force)) * units.stress * units.displacement * units.length
     return displacement * units.displacement, traction, energy
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.hdf5 import Reader, write_attributes, write_table
+from bemkit.hdf5 import Reader, write_attributes, write_table, write_texts
 from bemkit.kinds import LINEAR_SOLVERS
 from bemkit.operators.linear import Automatic
 from bemkit.operators.work import Entries, Factorisation, FactorKind, Work
@@ -40,6 +40,7 @@ def write_plan(group: h5py.Group, plan: Plan) -> None:
     needed = np.array([item.is_needed for item in items], dtype=np.int64)
     size = np.array([item.cost.size for item in items], dtype=np.int64)
     write_table(group, {**texts, "is_needed": needed, **costs, "size": size})
+    write_texts(group, "warnings", plan.warnings)
 
 
 def read_plan(reader: Reader, scene: Scene) -> Plan:
@@ -58,7 +59,7 @@ def read_plan(reader: Reader, scene: Scene) -> Plan:
         cost = Cost(**{cost: float(columns[cost][k]) for cost in _COSTS}, size=int(columns["size"][k]))
         is_needed, stage = bool(columns["is_needed"][k]), Stage[columns["stage"][k]]
         items.append(PlanItem(name, is_needed, columns["reason"][k], stage, cost))
-    return Plan(decisions, sizes, tuple(items))
+    return Plan(decisions, sizes, tuple(items), reader.texts("plan/warnings"))
 
 
 def write_work(group: h5py.Group, work: Work) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -34,6 +35,7 @@ def print_summary(solution: Solution, console: Console | None = None) -> None:
         table.add_row(name, value)
     console.print(Text(solution.scene.title, style="bold"))
     console.print(table)
+    _print_warnings(solution.warnings, console)
 
 
 def print_plan(title: str, plan: Plan, machine: Machine) -> None:
@@ -56,6 +58,12 @@ def print_plan(title: str, plan: Plan, machine: Machine) -> None:
     console.print(table)
     total = sum(plan.seconds(machine).values())
     console.print(f"about {format_seconds(total)}, and {format_size(plan.memory)} of memory at the largest moment")
+    _print_warnings(plan.warnings, console)
+
+
+def _print_warnings(warnings: Sequence[str], console: Console) -> None:
+    for warning in warnings:
+        console.print(Text(f"warning: {warning}", style="yellow"))
 
 
 class ConvergenceTable:
@@ -106,9 +114,8 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
     worst_name = f" ({worst_name.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
     timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
-    status = Text(
-        solution.status.name.lower().replace("_", " "), style="bold green" if solution.is_converged else "bold red"
-    )
+    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
+    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
     discretisation = DISCRETISATIONS.kind_of(solution.scene.discretisation)

@@ -25,8 +25,10 @@ from bemkit.operators.threads import blas_threads_for
 from bemkit.plan import Plan, Stage, check_memory, make_plan
 from bemkit.scene import NoContactError, Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
+from bemkit.solution_warnings import find_warnings
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
 from bemkit.solvers.probe import probe
+from bemkit.totals import with_totals
 from bemkit.warm_start import state_on
 
 
@@ -203,7 +205,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
     clock = clock.closed(Stage.RECOVER)
-    return Solution(
+    solution = Solution(
         scene=model.scene,
         mesh=model.mesh,
         status=result.status,
@@ -223,27 +225,17 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
         work=model.work,
         message=result.message,
     )
+    return replace(solution, warnings=find_warnings(solution))
 
 
 def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:
     """Return the last step with the solves, records and times of all."""
-    records, offset, spent = [], 0, 0
-    for number, step in enumerate(steps, 1):
-        for record in step.history:
-            message = f"load step {number} of {len(scene.load_factors)}; {record.message}".rstrip("; ")
-            total = spent + record.linear_solves
-            records.append(replace(record, step=offset + record.step, linear_solves=total, message=message))
-        offset, spent = records[-1].step + 1, records[-1].linear_solves
-    last = steps[-1]
+    names = [f"load step {number} of {len(scene.load_factors)}" for number in range(1, len(steps) + 1)]
     return replace(
-        last,
+        with_totals(steps[-1], steps, names),
         scene=scene,
-        history=tuple(records),
-        linear_solves=spent,
-        outer_steps=sum(step.outer_steps for step in steps),
-        timings={name: sum(step.timings[name] for step in steps) for name in last.timings},
-        memory={name: max(step.memory.get(name, 0) for step in steps) for name in steps[0].memory},
-        message=f"load step {len(steps)} of {len(scene.load_factors)}: {last.message}",
+        message=f"{names[-1]}: {steps[-1].message}",
+        warnings=tuple(dict.fromkeys(warning for step in reversed(steps) for warning in step.warnings)),
     )
 
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
-from bemkit.estimate import element_errors
-from bemkit.geometry.folding import unfolded
+from bemkit.estimate import squared_errors
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.work import Work
 from bemkit.plan import Plan
@@ -208,7 +207,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip
-    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and _are_neighbours(contact, i)]
+    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and are_neighbours(contact, i)]
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
     found = []
     for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
@@ -232,7 +231,7 @@ def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -
     return kept
 
 
-def _are_neighbours(contact: ContactTable, i: int) -> bool:
+def are_neighbours(contact: ContactTable, i: int) -> bool:
     """Tell whether the nodes i and i + 1 follow each other on one piece of one part."""
     distance = np.hypot(contact.x[i + 1] - contact.x[i], contact.y[i + 1] - contact.y[i])
     # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
@@ -308,6 +307,8 @@ class Solution:
         What was computed; equal to ``plan.work`` if all load steps converged.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
+    warnings : tuple of str
+        What is doubtful about the result, one sentence each; see `bemkit.solution_warnings`.
     """
 
     scene: Scene
@@ -328,29 +329,39 @@ class Solution:
     work: Work
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     @property
     def is_converged(self) -> bool:
-        """Whether the solver vouches for the result."""
+        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
         return self.status is Status.CONVERGED
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether contact, friction and equilibrium hold on the mesh, be it fine enough for the accuracy or not."""
+        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @cached_property
     def element_errors(self) -> FloatArray | None:
         """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
         if isinstance(self.scene.discretisation, ConstantCollocation):
             return None
-        make_space = self.scene.discretisation.displacement_space
-        whole = make_space(self.mesh.whole)
-        displacement = unfolded(make_space(self.mesh), whole, self.boundary.displacement)
-        errors = element_errors(whole, displacement, self.scene.material.plane_modulus)
-        return errors[: self.mesh.n_elements]
+        make_space, modulus = self.scene.discretisation.displacement_space, self.scene.material.plane_modulus
+        return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
 
     @cached_property
     def estimated_error(self) -> float | None:
-        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)); None for collocation."""
+        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
+
+        None for collocation, and where the energy is not positive, so that an error is measured against nothing; zero
+        of a body at rest.
+        """
         if self.element_errors is None:
             return None
-        return float(np.sqrt(self.element_errors.sum() / (2.0 * self.energy))) if self.energy > 0.0 else 0.0
+        error = float(self.element_errors.sum())
+        if error == 0.0:
+            return 0.0
+        return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
 
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
@@ -358,17 +369,18 @@ class Solution:
         Returns
         -------
         dict
-            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``n_elements``,
-            ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and ``force_tangential`` [N/m],
-            ``energy`` [J/m], ``estimated_error`` (None without an estimate), ``transitions``, ``certificate``,
-            ``timings`` [s], ``plan``, ``work``,
-            ``memory`` [bytes].
+            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``certified``, ``warnings``,
+            ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
+            ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
         """
         return {
             "title": self.scene.title,
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,
+            "certified": self.is_certified,
+            "warnings": list(self.warnings),
             "n_elements": self.mesh.n_elements,
             "n_contact": self.contact.n_contact,
             "linear_solves": self.linear_solves,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 import os
@@ -22,8 +23,10 @@ import bemkit.runner
 from bemkit.cli import main
 from bemkit.io import read_result
 from bemkit.report import ConvergenceTable, format_size
-from bemkit.scenefile import scene_from_toml, scene_to_toml
+from bemkit.scene import MeshOptions, QuadraticGalerkin
+from bemkit.scenefile import load_scene, scene_from_toml, scene_to_toml
 from bemkit.shipped import shipped_files
+from bemkit.solvers.base import Status
 
 SMALL = ["--elements", "40"]
 
@@ -109,6 +112,21 @@ def test_a_run_that_does_not_converge_says_so_and_exits_with_1(capsys: pytest.Ca
     Path("hard.toml").write_text(text.replace(word, 'solver = { kind = "fixed-point", max_steps = 1 }'), "utf-8")
     assert call("run", "hard.toml", *SMALL) == 1
     assert "max steps" in capsys.readouterr().out
+
+
+def test_an_accuracy_out_of_reach_exits_with_3_and_keeps_what_was_reached(capsys: pytest.CaptureFixture[str]) -> None:
+    options = MeshOptions(accuracy=1e-9, most_elements=60)
+    Path("far.toml").write_text(
+        scene_to_toml(dataclasses.replace(load_scene("paper-1"), mesh=options, discretisation=QuadraticGalerkin()))
+    )
+    assert call("run", "far.toml", "-o", "far.h5", "--json", "far.json") == 3
+    shown = " ".join(capsys.readouterr().out.split())  # lines are folded
+    assert "accuracy not reached: The accuracy 1e-09 was not reached: more than 60 elements would" in shown
+    summary = json.loads(Path("far.json").read_text())
+    assert (summary["status"], summary["converged"], summary["certified"]) == ("accuracy_not_reached", False, True)
+    again = read_result("far.h5")
+    assert again.status is Status.ACCURACY_NOT_REACHED
+    assert again.linear_solves == summary["linear_solves"] == again.history[-1].linear_solves
 
 
 def test_scenes_and_plan(capsys: pytest.CaptureFixture[str]) -> None:

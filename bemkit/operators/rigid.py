@@ -58,3 +58,23 @@ def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
     possible = list(possible_motions(mesh))
     motions = rigid_motions(points, mesh.centre, mesh.diameter)[:, :, possible]
     return motions.reshape(2 * len(points), len(possible))
+
+
+def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatArray) -> FloatArray:
+    """Return a displacement less the rigid motion nearest to it, which strains nothing.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    points, displacement : (n, 2) arrays [m]
+
+    Returns
+    -------
+    (n, 2) array [m]
+        Of an exterior the displacement itself, since any motion of its boundary strains it; see `possible_motions`.
+    """
+    motions = resting_motions(mesh, points)
+    if not motions.shape[1]:
+        return displacement
+    nearest = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
+    return displacement - (motions @ nearest).reshape(-1, 2)

@@ -29,11 +29,14 @@ class Plan:
     sizes : Sizes
     items : tuple of PlanItem
         In the order in which they are used.
+    warnings : tuple of str
+        What will be doubtful about the result, one sentence each.
     """
 
     decisions: Decisions
     sizes: Sizes
     items: tuple[PlanItem, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def work(self) -> Work:
@@ -66,7 +69,8 @@ class Plan:
         """Return the plan as JSON can hold it, with times if a computer is given."""
         items = [item.as_dict(machine) for item in self.items]
         seconds = {} if machine is None else {"seconds": sum(self.seconds(machine).values())}
-        return {"memory": self.memory, **seconds, "work": self.work.as_dict(), "items": items}
+        counts = {"memory": self.memory, **seconds, "work": self.work.as_dict()}
+        return {**counts, "items": items, "warnings": list(self.warnings)}
 
 
 def make_plan(

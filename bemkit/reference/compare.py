@@ -82,7 +82,7 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
     """
     scene = replace(scene, discretisation=QuadraticGalerkin())
     solutions = _fine_solutions(scene, most_elements)
-    solutions = sorted((s for s in solutions if s.is_converged), key=lambda s: s.mesh.n_elements)
+    solutions = sorted((s for s in solutions if s.is_certified), key=lambda s: s.mesh.n_elements)
     if len(solutions) < 2:
         raise OverResolutionError(
             f"no two converged solutions with up to {most_elements} quadratic elements: give more, or another scene"

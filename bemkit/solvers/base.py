@@ -36,6 +36,10 @@ class Status(Enum):
         "travel; move body and obstacle together, so that they nearly touch."
     )
     INNER_FAILED = "An inner solve failed, for the reason given in the message; change the options of the inner solver."
+    ACCURACY_NOT_REACHED = (
+        "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
+        "elements or more time, or ask for less."
+    )
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
 

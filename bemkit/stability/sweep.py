@@ -106,6 +106,11 @@ class Attempt(NamedTuple):
         """Whether the solver vouches for a solution."""
         return self.solution is not None and self.solution.is_converged
 
+    @property
+    def is_certified(self) -> bool:
+        """Whether there is a solution that is certified, be it as accurate as was wished or not."""
+        return self.solution is not None and self.solution.is_certified
+
 
 def sweep(
     scene: Scene,

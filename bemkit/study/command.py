@@ -91,7 +91,7 @@ def errors(
         rows = session.run()
     with bad_input():
         outputs.write(wishes.scene.title, rows)
-    return 0 if all(row.status == "converged" for row in rows) else NOT_CONVERGED
+    return 0 if all(row.is_certified for row in rows) else NOT_CONVERGED
 
 
 @study.command("paper-tables")

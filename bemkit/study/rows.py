@@ -37,7 +37,7 @@ class Row:
     estimated_error : float
         In the energy norm, relative, as the solution itself tells; nan for collocation.
     energy, sigma_n, sigma_t, displacement, force_normal, force_tangential, transitions : float
-        Relative errors, see `bemkit.reference.errors_of`; nan unless the driver converged.
+        Relative errors, see `bemkit.reference.errors_of`; nan unless the row is certified.
     message : str
         Why there is no result, or why an accuracy was not reached.
     """
@@ -68,6 +68,11 @@ class Row:
     force_tangential: float
     transitions: float
     message: str
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether there is a result, be it as accurate as was wished or not."""
+        return self.status in ("converged", "accuracy_not_reached")
 
     @property
     def series(self) -> tuple[str, str, str]:

@@ -57,7 +57,7 @@ def print_series(
         table.add_row(*_costs(row, is_wide=is_wide).values(), *errors)
     console.print(table)
     for row in rows:
-        if row.status != "converged":
+        if not row.is_certified:
             console.print(Text(f"  {_aim(row.size)}: {row.status.replace('_', ' ')}: {row.message}", style="red"))
         elif row.message:
             # the first sentence; the rest is in the files

@@ -90,7 +90,8 @@ def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
     assert near.message == ""
     assert near.estimated_error <= 1e-2
     assert "The accuracy 1e-06 was not reached: more than 100 elements would be needed" in far.message
-    assert far.status == "converged"
+    assert far.status == "accuracy_not_reached"
+    assert far.is_certified
     assert far.elements <= 100
     assert far.energy < 1e-4
 
