@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
+from bemkit.geometry.vectors import turned_right
 from bemkit.operators.boundary import mass
 from bemkit.operators.dense import Cholesky
 from bemkit.operators.linear import DenseCholesky, LinearSolver, LinearSolverWish
@@ -120,10 +122,20 @@ class GalerkinMap:
         return pressures.reshape(-1, len(self.mesh.loops))
 
     @cached_property
+    def _fluxes(self) -> FloatArray:
+        """(n_dofs, n_loops) change of volume per displacement dof on each loop of an incompressible body.
+
+        Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
+        """
+        if not self._pressures.shape[1]:
+            return np.zeros((self.displacement_space.n_dofs, 0))
+        fluxes = [self.nodal_forces(loop, lambda _, normals: normals).ravel() for loop in self.mesh.loops]
+        return np.where(vanishing_dofs(self.displacement_space), 0.0, fluxes).T
+
+    @cached_property
     def _volume(self) -> FloatArray:
         """(n_dofs, 0 or 1) change of volume per displacement dof of an incompressible body."""
-        total = self._pressures.sum(axis=1, keepdims=True)[:, : min(self._pressures.shape[1], 1)]
-        return np.asarray(mass(self.displacement_space, self.traction_space).matrix().T @ total)
+        return self._fluxes.sum(axis=1, keepdims=True)[:, : self._fluxes.shape[1]]
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -173,14 +185,21 @@ class GalerkinMap:
         points, weights = gauss_legendre(self.traction_space.degree + 1)
         mean = self.traction_space.basis(points) @ weights / 2.0
         tractions = self.tractions(displacement)
-        if self._pressures.shape[1]:
-            identity = mass(self.displacement_space, self.traction_space).matrix()
-            missing = force.ravel() - identity.T @ tractions.ravel()
-            sizes = np.linalg.lstsq(identity.T @ self._pressures, missing, rcond=None)[0]
-            tractions = tractions + (self._pressures @ sizes).reshape(-1, 2)
         at_dofs = tractions[self.traction_space.element_dofs]
         means: FloatArray = np.einsum("p,epc->ec", mean, at_dofs)
+        if self._fluxes.shape[1]:
+            identity = mass(self.displacement_space, self.traction_space).matrix()
+            missing = force.ravel() - identity.T @ tractions.ravel()
+            pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
+            for loop, pressure in zip(self.mesh.loops, pressures, strict=True):
+                means[loop] += pressure * self._mean_normals[loop]
         return means
+
+    @property
+    def _mean_normals(self) -> FloatArray:
+        """(n_elements, 2) normals integrated along each element, over its length."""
+        start, end = self.mesh.nodes[self.mesh.elements].transpose(1, 0, 2)
+        return turned_right(end - start) / self.mesh.lengths[:, None]
 
 
 def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
