@@ -55,19 +55,7 @@ class CollocationMap:
 
     def matrix(self) -> FloatArray:
         """Return the weak (n_dofs, n_dofs) matrix [Pa]; it is not symmetric."""
-        self._check_holes(np.ones((self.mesh.n_elements, 2), bool))
         return self._matrix
-
-    def _check_holes(self, is_free: BoolArray) -> None:
-        """Refuse what the displacement equation cannot tell: the pressure in a hole of an incompressible body."""
-        if not self.material.is_incompressible:
-            return
-        for loop, area in zip(self.mesh.loops, self.mesh.loop_areas, strict=True):
-            if area < 0.0 and is_free[loop].any():
-                raise SingularMatrixError(
-                    "collocation cannot find the pressure in a hole of an incompressible body (poisson_ratio 0.5): "
-                    "use linear or quadratic Galerkin elements, or a ratio below 0.5"
-                )
 
     def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
         """Return the resultants of a traction field on the elements."""
@@ -78,7 +66,6 @@ class CollocationMap:
 
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """
-        self._check_holes(conditions.is_free)
         name = "the body held by its supports and its contact boundary"
         return ColumnExchange(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 
