@@ -38,13 +38,14 @@ class Reciprocity:
     ----------
     on_traction : (n_loops, 2 n_elements) array [m^2/Pa]
     on_displacement : (n_loops, 2 n_elements) array [m]
-    normals : (2 n_elements, n_loops) array
-        The normals of each loop: errors of the displacement equation that make room for these equations.
+    fields : (2 n_elements, n_loops) array
+        The fields at the midpoints: errors of the displacement equation that make room for these equations. They are
+        as smooth as the fields, so that elements at corners, however short, are not torn apart.
     """
 
     on_traction: FloatArray
     on_displacement: FloatArray
-    normals: FloatArray
+    fields: FloatArray
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> Reciprocity:
@@ -60,37 +61,40 @@ class Reciprocity:
         """
         panels = Panels(mesh.whole)
         slopes = Slopes.of(mesh.whole, panels) if takes_slopes else None
-        rows = []
-        normals = np.zeros((mesh.n_elements, 2, len(mesh.loops)))
-        for number, (loop, area) in enumerate(zip(mesh.loops, mesh.loop_areas, strict=True)):
-            normals[loop, :, number] = mesh.normals[loop]
+        on_tractions, on_displacements, fields = [], [], []
+        for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
             on_displacement = field.displacement[None, :]
             if slopes is not None:
-                slopes.add_to(on_displacement, (field.gradient / (panels.half * panels.tangent))[None, :], is_conjugate=False)
-            rows.append((_folded(mesh, field.traction), _folded(mesh, on_displacement[0])))
-        on_traction, on_displacements = np.array(rows).transpose(1, 0, 2)
-        return cls(on_traction, on_displacements, normals.reshape(-1, len(mesh.loops)))
+                on_slope = field.gradient / (panels.half * panels.tangent)
+                slopes.add_to(on_displacement, on_slope[None, :], is_conjugate=False)
+            on_tractions.append(_folded(mesh, field.traction))
+            on_displacements.append(_folded(mesh, on_displacement[0]))
+            fields.append(np.stack([field.value.real, field.value.imag], axis=1)[: mesh.n_elements].ravel())
+        return cls(np.array(on_tractions), np.array(on_displacements), np.array(fields).T)
 
 
 @dataclass(frozen=True, eq=False)
 class _Field:
     """Work of densities on w and t(w) / (2 mu): Re sum of (traction t), and of (displacement u + gradient g).
 
-    Each is an (n_elements,) complex array of the whole body; the displacement on an element is u + g (y - x).
+    Each is an (n_elements,) complex array of the whole body; the displacement on an element is u + g (y - x). `value`
+    is the field at x.
     """
 
+    value: ComplexArray
     traction: ComplexArray
     displacement: ComplexArray
     gradient: ComplexArray
 
 
 def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
-    """Return the field w = (1 - 2 nu) (z - c), by the diameter of the body."""
-    z, arm, dz = _quadrature(mesh.whole)
+    """Return the field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor."""
     whole = mesh.whole
+    z, arm, dz = _quadrature(whole)
     centre, factor = _plane(mesh.centre), 1.0 - 2.0 * material.effective_poisson_ratio
     return _Field(
+        (_plane(whole.centres) - centre) / mesh.diameter,
         np.sum((z - centre).conj() * np.abs(dz), axis=1) * (factor / (2.0 * material.shear_modulus * mesh.diameter)),
         1j * _plane(whole.end - whole.start).conj() / mesh.diameter,
         1j * np.sum(arm * dz.conj(), axis=1) / mesh.diameter,
@@ -100,15 +104,16 @@ def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
 def _source(mesh: BoundaryMesh, material: Material, loop: IntArray) -> _Field:
     """Return the field w = a / conj(z - c) of a source of volume in a hole, and in its images."""
     z, arm, dz = _quadrature(mesh.whole)
-    start, end = _plane(mesh.whole.start), _plane(mesh.whole.end)
+    start, middle, end = (_plane(points) for points in (mesh.whole.start, mesh.whole.centres, mesh.whole.end))
     centre, radius = _largest_circle(mesh, loop)
     images = [centre] if mesh.symmetry is None else [mesh.symmetry.reflected(centre, g) for g in mesh.symmetry.images]
-    traction, displacement, gradient = np.zeros((3, len(z)), complex)
+    value, traction, displacement, gradient = np.zeros((4, len(z)), complex)
     for c in _plane(np.array(images)):
+        value += radius / (middle - c).conj()
         traction += np.sum(np.abs(dz) / (z - c), axis=1) * (radius / (2.0 * material.shear_modulus))
         displacement += 1j * radius * (end - start) / ((start - c) * (end - c))
         gradient += 1j * radius * np.sum(arm * dz / (z - c) ** 2, axis=1)
-    return _Field(traction, displacement, gradient)
+    return _Field(value, traction, displacement, gradient)
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:

@@ -36,6 +36,10 @@ class Status(Enum):
         "travel; move body and obstacle together, so that they nearly touch."
     )
     INNER_FAILED = "An inner solve failed, for the reason given in the message; change the options of the inner solver."
+    NEGATIVE_ENERGY = (
+        "The elastic energy is negative or can become so, because the elements are too long for collocation; "
+        "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."
+    )
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
 

@@ -81,7 +81,7 @@ class ColumnExchange:
         reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
         self._on_traction = rotate_columns(reciprocity.on_traction, conditions.frame)
         self._on_displacement = rotate_columns(reciprocity.on_displacement, conditions.frame)
-        errors = np.column_stack([motions, reciprocity.normals])
+        errors = np.column_stack([motions, reciprocity.fields])
         order = n_rows + errors.shape[1]
         matrix, right = np.zeros((order, order)), np.zeros((order, opened.size), order="F")
         frame = conditions.frame
