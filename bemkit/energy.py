@@ -21,6 +21,8 @@ from bemkit.solvers.base import ContactSolution, Status
 _ROUND_OFF = 1e-10
 """Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
 a ring whose thickness is a hundredth of its radius has 1e-7 of the largest stiffness."""
+_CARRIED = 64.0 * float(np.finfo(float).eps)
+"""Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
 
 
 def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) -> ContactSolution:
@@ -44,7 +46,7 @@ def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) ->
     else:
         condensed = model.body.condensed
         displacement, force = model.body.recover(result.state)
-        if is_indefinite(model.body.dense.stiffness):
+        if is_indefinite(model.body.dense.stiffness, condensed.sensitivity):
             return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.elastic.displacement_space
     motions = resting_motions(space.mesh, dof_points(space))
@@ -78,12 +80,22 @@ def negative_share(
     return -work / size if work < -round_off else 0.0
 
 
-def is_indefinite(stiffness: FloatArray) -> bool:
-    """Tell whether the symmetric part of a stiffness has an eigenvalue that is negative beyond round-off."""
+def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) -> bool:
+    """Tell whether the symmetric part of a stiffness has an eigenvalue that is negative beyond round-off.
+
+    Parameters
+    ----------
+    stiffness : (n, n) array [N/m]
+    sensitivity : (n_nodes, 2) array, optional
+        Of the body that it was condensed from, whose round-off it carries; see `CondensedMap`.
+    """
     if not np.isfinite(stiffness).all():
         return False  # overflow has a name of its own
     symmetric = 0.5 * (stiffness + stiffness.T)
-    symmetric[np.diag_indices_from(symmetric)] += _ROUND_OFF * np.abs(symmetric).max(initial=0.0)
+    round_off = _ROUND_OFF * float(np.abs(symmetric).max(initial=0.0))
+    if sensitivity is not None:
+        round_off += _CARRIED * float(np.abs(sensitivity).max(initial=0.0))
+    symmetric[np.diag_indices_from(symmetric)] += round_off
     try:
         np.linalg.cholesky(symmetric)
     except np.linalg.LinAlgError:

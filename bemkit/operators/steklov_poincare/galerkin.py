@@ -105,37 +105,46 @@ class GalerkinMap:
         return self._assemble()
 
     def _assemble(self) -> Layers:
-        return assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
+        pressures, fluxes = self._pressures, self._fluxes
+        return assemble_layers(self.displacement_space, self.traction_space, self.material, pressures, fluxes)
 
     @cached_property
     def _pressures(self) -> FloatArray:
-        """(n_traction_dofs, n_loops) tractions that move an incompressible body nowhere; else no columns."""
-        if not self.material.is_incompressible or self.mesh.is_exterior:
-            return np.zeros((self.traction_space.n_dofs, 0))
+        """(n_traction_dofs, n_pressures) uniform pressures, for which the map takes normals that are exact.
+
+        That of the whole boundary, those of each loop of an incompressible body, none of an exterior.
+        """
         dofs = self.traction_space.element_dofs
         everywhere = np.arange(self.mesh.n_elements)
         normals = np.zeros((self.traction_space.n_dofs // 2, 2))
         normals[dofs] = self.mesh.normals_at(everywhere, self.traction_space.local_nodes)
-        pressures = np.zeros((len(normals), 2, len(self.mesh.loops)))
-        for number, loop in enumerate(self.mesh.loops):
-            pressures[dofs[loop].ravel(), :, number] = normals[dofs[loop].ravel()]
-        return pressures.reshape(-1, len(self.mesh.loops))
+        pressures = np.zeros((len(normals), 2, len(self._pressed)))
+        for number, elements in enumerate(self._pressed):
+            pressures[dofs[elements].ravel(), :, number] = normals[dofs[elements].ravel()]
+        return pressures.reshape(self.traction_space.n_dofs, -1)
+
+    @property
+    def _pressed(self) -> tuple[IntArray, ...]:
+        """The elements under each of the uniform pressures."""
+        if self.mesh.is_exterior:
+            return ()
+        return self.mesh.loops if self.material.is_incompressible else (np.arange(self.mesh.n_elements),)
 
     @cached_property
     def _fluxes(self) -> FloatArray:
-        """(n_dofs, n_loops) change of volume per displacement dof on each loop of an incompressible body.
+        """(n_dofs, n_pressures) change of volume per displacement dof where each of the pressures acts.
 
         Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
         """
-        if not self._pressures.shape[1]:
-            return np.zeros((self.displacement_space.n_dofs, 0))
-        fluxes = [self.nodal_forces(loop, lambda _, normals: normals).ravel() for loop in self.mesh.loops]
-        return np.where(vanishing_dofs(self.displacement_space), 0.0, fluxes).T
+        fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
+        flux = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
+        return np.where(vanishing_dofs(self.displacement_space), 0.0, flux).T
 
     @cached_property
     def _volume(self) -> FloatArray:
         """(n_dofs, 0 or 1) change of volume per displacement dof of an incompressible body."""
-        return self._fluxes.sum(axis=1, keepdims=True)[:, : self._fluxes.shape[1]]
+        n_columns = int(self.material.is_incompressible and not self.mesh.is_exterior)
+        return self._fluxes.sum(axis=1, keepdims=True)[:, :n_columns]
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -191,8 +200,8 @@ class GalerkinMap:
             identity = mass(self.displacement_space, self.traction_space).matrix()
             missing = force.ravel() - identity.T @ tractions.ravel()
             pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
-            for loop, pressure in zip(self.mesh.loops, pressures, strict=True):
-                means[loop] += pressure * self._mean_normals[loop]
+            for elements, pressure in zip(self._pressed, pressures, strict=True):
+                means[elements] += pressure * self._mean_normals[elements]
         return means
 
     @property
