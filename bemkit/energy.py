@@ -51,7 +51,9 @@ def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) ->
     space = model.elastic.displacement_space
     motions = resting_motions(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, condensed.sensitivity)
-    return _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
+    return (
+        _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
+    )
 
 
 def negative_share(

@@ -128,7 +128,9 @@ def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, flo
     arms = points - whole.centres[touching, None]
     ahead = np.einsum("tpc,tc->tp", arms, whole.normals[touching])
     is_ahead = ahead > 0.0
-    radii = np.divide(np.sum(arms**2, axis=2), 2.0 * ahead, out=np.full(ahead.shape, np.inf), where=is_ahead).min(axis=1)
+    radii = np.divide(np.sum(arms**2, axis=2), 2.0 * ahead, out=np.full(ahead.shape, np.inf), where=is_ahead).min(
+        axis=1
+    )
     largest = int(np.argmax(np.where(np.isfinite(radii), radii, 0.0)))
     radius = float(radii[largest])
     return whole.centres[touching[largest]] + radius * whole.normals[touching[largest]], radius
@@ -151,4 +153,5 @@ def _folded(mesh: BoundaryMesh, on: ComplexArray) -> FloatArray:
     """Return the row (2 n_elements,) of Re sum (on v), v a symmetric density on the whole body."""
     images = np.ones((1, 2)) if mesh.symmetry is None else mesh.symmetry.images
     rows = np.stack([on.real, -on.imag], axis=1).reshape(len(images), mesh.n_elements, 2)
-    return np.einsum("gnc,gc->nc", rows, images).ravel()
+    folded: FloatArray = np.einsum("gnc,gc->nc", rows, images).ravel()
+    return folded

@@ -5,9 +5,9 @@ midpoints of the element and its neighbours suggest; that is u_j + s_j p(t) with
 t of the element, p(t) = t on straight ones. The unknowns are still one displacement for each element. Rotations have
 the slope i everywhere, and so are held exactly.
 
-The parabola through the three midpoints differs from that in the mean by b_j (l tau)^2 / 3, b_j its leading coefficient,
-and this much is added to the constant part. Without it a bent body seems to be displaced by h^2 / 24 of its curvature
-everywhere but at the midpoint itself, which no thin body forgives.
+The parabola through the three midpoints differs from that in the mean by b_j (l tau)^2 / 3, b_j its leading
+coefficient, and this much is added to the constant part. Without it a bent body seems to be displaced by h^2 / 24 of
+its curvature everywhere but at the midpoint itself, which no thin body forgives.
 """
 
 from __future__ import annotations
@@ -84,9 +84,10 @@ class Slopes:
 
     def _of_value(self, on: ComplexArray, on_slope: ComplexArray, is_conjugate: bool) -> tuple[ComplexArray, ...]:
         """Return the coefficients of the values before, on and after each element."""
-        slopes, means = (self.before, self.own, self.after), (self.mean_before, self.mean_own, self.mean_after)
+        slopes = np.array([self.before, self.own, self.after])
+        means = np.array([self.mean_before, self.mean_own, self.mean_after])
         if is_conjugate:
-            slopes, means = tuple(w.conj() for w in slopes), tuple(w.conj() for w in means)
+            slopes, means = slopes.conj(), means.conj()
         return tuple(on_slope * slope + on * mean for slope, mean in zip(slopes, means, strict=True))
 
     @cached_property

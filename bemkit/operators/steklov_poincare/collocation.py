@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import ConstantSpace
-from bemkit.operators.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.steklov_poincare.exchange import ColumnExchange
@@ -29,11 +28,12 @@ class CollocationMap:
 
     Notes
     -----
-    The paper's discretisation, with two additions. With slopes, rotations cause no tractions, as translations do not in
-    any case; constant elements do not hold them by themselves. And plain collocation satisfies the equilibrium of
+    The paper's discretisation, with three additions. With slopes, rotations cause no tractions, as translations do not
+    in any case; constant elements do not hold them by themselves. Plain collocation satisfies the equilibrium of
     forces and moments only up to the discretisation error: here a rigid motion c is added to the equations and the
     resultants of the tractions are set to zero; c vanishes with the mesh size. On an exterior neither c nor the
-    condition on the resultants is there.
+    condition on the resultants is there. Likewise one reciprocity for each loop tells the pressure there, which the
+    displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.reciprocity`).
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material, *, slopes: bool = True) -> None:

@@ -22,7 +22,7 @@ from bemkit.operators.memory import physical_memory
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
-from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers
+from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers, dilatation_of
 from bemkit.operators.steklov_poincare.nodes import integrate_traction, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
@@ -137,14 +137,15 @@ class GalerkinMap:
         Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
         """
         fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
-        flux = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
-        return np.where(vanishing_dofs(self.displacement_space), 0.0, flux).T
+        flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
+        flux[:, vanishing_dofs(self.displacement_space)] = 0.0
+        return np.asarray(flux.T)
 
     @cached_property
     def _volume(self) -> FloatArray:
         """(n_dofs, 0 or 1) change of volume per displacement dof of an incompressible body."""
         n_columns = int(self.material.is_incompressible and not self.mesh.is_exterior)
-        return self._fluxes.sum(axis=1, keepdims=True)[:, :n_columns]
+        return np.asarray(self._fluxes.sum(axis=1, keepdims=True)[:, :n_columns])
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -184,10 +185,27 @@ class GalerkinMap:
 
         Of an incompressible body they lack the pressures, which displacements do not tell.
         """
+        rest = self._tractions_without_pressures(displacement.ravel())
+        if self.material.is_incompressible or self.mesh.is_exterior:
+            return rest.reshape(-1, 2)
+        # the pressure by the work on the dilatation x, whose forces are those of a unit tension over beta
+        beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)
+        of_dilatation = self._tractions_without_pressures(dilatation)
+        everywhere, centre = np.arange(self.mesh.n_elements), self.mesh.centre
+        arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
+        flux = self._fluxes[:, 0]
+        tension = (flux @ displacement.ravel() / beta - arms @ rest) / (
+            flux @ dilatation - beta * (arms @ of_dilatation)
+        )
+        total = rest - beta * tension * of_dilatation + tension * self._pressures[:, 0]
+        return np.asarray(total).reshape(-1, 2)
+
+    def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
+        """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""
         if "factors" in self.__dict__ or "layers" not in self.__dict__:
             factors = self.factors
-            return factors.single_layer.solve_upper(factors.strained @ displacement.ravel()).reshape(-1, 2)
-        return self.layers.tractions(displacement.reshape(-1, 1)).reshape(-1, 2)
+            return factors.single_layer.solve_upper(factors.strained @ displacement)
+        return self.layers.tractions(displacement[:, None])[:, 0]
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
@@ -196,19 +214,14 @@ class GalerkinMap:
         tractions = self.tractions(displacement)
         at_dofs = tractions[self.traction_space.element_dofs]
         means: FloatArray = np.einsum("p,epc->ec", mean, at_dofs)
-        if self._fluxes.shape[1]:
+        if self.material.is_incompressible and not self.mesh.is_exterior:
             identity = mass(self.displacement_space, self.traction_space).matrix()
             missing = force.ravel() - identity.T @ tractions.ravel()
             pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
+            normals = turned_right(self.mesh.end - self.mesh.start) / self.mesh.lengths[:, None]  # their means
             for elements, pressure in zip(self._pressed, pressures, strict=True):
-                means[elements] += pressure * self._mean_normals[elements]
+                means[elements] += pressure * normals[elements]
         return means
-
-    @property
-    def _mean_normals(self) -> FloatArray:
-        """(n_elements, 2) normals integrated along each element, over its length."""
-        start, end = self.mesh.nodes[self.mesh.elements].transpose(1, 0, 2)
-        return turned_right(end - start) / self.mesh.lengths[:, None]
 
 
 def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:

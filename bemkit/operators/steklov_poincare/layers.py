@@ -112,8 +112,12 @@ def assemble_layers(
     layers = Layers(factor, resultant, _without(strain, at_rest), hyper, work)
     if material.is_incompressible or not fluxes.shape[1]:
         return layers
-    dilatation = (dof_points(u) - mesh.centre).reshape(-1, 1)
-    return _under_dilatation(layers, np.where(vanishing_dofs(u)[:, None], 0.0, dilatation), _without(fluxes.T, at_rest).T, material)
+    return _under_dilatation(layers, dilatation_of(u)[:, None], _without(fluxes.T, at_rest).T, material)
+
+
+def dilatation_of(space: BoundarySpace) -> FloatArray:
+    """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
+    return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
 
 
 def _under_dilatation(layers: Layers, dilatation: FloatArray, flux: FloatArray, material: Material) -> Layers:
@@ -132,9 +136,10 @@ def _under_dilatation(layers: Layers, dilatation: FloatArray, flux: FloatArray, 
         x, and f.
     material : Material
     """
-    beta = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus)
+    beta = material.plane_compressibility
     rest = flux - beta * layers.apply(dilatation)
-    return replace(layers, hypersingular=layers.hypersingular + rest @ rest.T / (beta * np.vdot(dilatation, rest)))
+    hyper = layers.hypersingular + rest @ rest.T / (beta * np.vdot(dilatation, rest))
+    return replace(layers, hypersingular=hyper, work=layers.work + Work(right_hand_sides=1))
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
