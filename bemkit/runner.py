@@ -14,6 +14,7 @@ from bemkit.clock import StageClock
 from bemkit.contact.admissibility import find_unsolvable_load
 from bemkit.contact.body import ContactState
 from bemkit.elasticity import ElasticModel, build_elastic_model
+from bemkit.energy import with_energy_checked
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
@@ -150,6 +151,7 @@ def _solve_in_turn(
         result = solve(model.problem, step.solver, start=state, throw=False, callback=callback)
         if not result.history:
             raise UnsolvableSceneError(_reason(model, result))
+        result = with_energy_checked(model, result)
         clock = clock.closed(Stage.SOLVE)
         solutions.append(_solution(model, result, plan, clock))
         clock = StageClock.start()
@@ -175,7 +177,7 @@ def _solve_without_contact(
         if solutions:
             model = model.under(step)
         clock = clock.closed(Stage.CONDENSE)
-        result = model.certified()
+        result = with_energy_checked(model, model.certified())
         if callback is not None:
             callback(result.history[-1])
         clock = clock.closed(Stage.SOLVE)
@@ -281,9 +283,9 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     if escape is not None:
         raise UnsolvableSceneError(describe_escape(model, escape))
     clock = clock.closed(Stage.CONDENSE)
-    found = probe(model.problem, scene.solver, n_starts=n_starts)
+    found = [with_energy_checked(model, result) for result in probe(model.problem, scene.solver, n_starts=n_starts)]
     clock = clock.closed(Stage.SOLVE)
-    return tuple(_solution(model, result, plan, clock) for result in found)
+    return tuple(_solution(model, result, plan, clock) for result in found if result.is_converged)
 
 
 def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution]:

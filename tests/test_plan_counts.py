@@ -101,7 +101,7 @@ def test_the_counts_of_the_papers_first_example() -> None:
     assert work.double_layer == Entries.full(n_rows, n_rows - n_held)
     assert work.hypersingular == Entries()
     assert work.element_pairs == 40**2
-    assert work.factorisations == (Factorisation(FactorKind.LU, n_rows + 3),)
+    assert work.factorisations == (Factorisation(FactorKind.LU, n_rows + 4),)  # three resultants and one reciprocity
     assert (work.right_hand_sides, work.contact_unknowns) == (20 + 1, 20)
     # what the exchange of columns is for: at most 70 % of the full matrices V and K are computed, 65 % stored
     assert work.single_layer.computed + work.double_layer.computed <= 0.7 * 2 * n_rows**2

@@ -147,10 +147,9 @@ def fill_columns(
         for run in double:
             run.write(rows, found.on_displacement[:, run.elements], found.on_conjugate_displacement[:, run.elements])
         if data.traction.any():
-            known[rows] += found.on_traction @ data.traction + found.on_conjugate_traction @ data.traction.conj()
+            known[rows] += _product(found.on_traction, found.on_conjugate_traction, data.traction)
         if data.displacement.any():
-            known[rows] -= found.on_displacement @ data.displacement
-            known[rows] -= found.on_conjugate_displacement @ data.displacement.conj()
+            known[rows] -= _product(found.on_displacement, found.on_conjugate_displacement, data.displacement)
 
     step = max(1, CHUNK_PAIRS // whole.n_elements)
     chunks = (slice(first, min(first + step, n)) for first in range(0, n, step))
@@ -160,3 +159,9 @@ def fill_columns(
         run.add(own, own, *balance)
     known -= balance[0] * data.displacement + balance[1] * data.displacement.conj()
     return Filled(known, n * sum(part.stop - part.start for part, _ in parts))
+
+
+def _product(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, density: ComplexArray) -> ComplexArray:
+    """Return on v + on_conjugate conj(v), without BLAS: its threads and those of the chunks wait for each other."""
+    product: ComplexArray = np.einsum("ij,j->i", on, density) + np.einsum("ij,j->i", on_conjugate, density.conj())
+    return product

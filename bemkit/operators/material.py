@@ -68,6 +68,11 @@ class Material:
         return self.effective_poisson_ratio > 0.5 - 1e-12
 
     @property
+    def plane_compressibility(self) -> float:
+        """Strain along x and y under a unit tension along both [1/Pa]: (1 - 2 nu) / (2 mu) in plane strain."""
+        return (1.0 - 2.0 * self.effective_poisson_ratio) / (2.0 * self.shear_modulus)
+
+    @property
     def kappa(self) -> float:
         """Kolosov's constant [-]: 3 - 4 nu in plane strain, (3 - nu) / (1 + nu) in plane stress."""
         return 3.0 - 4.0 * self.effective_poisson_ratio

@@ -27,7 +27,7 @@ def planned_work(decisions: Decisions, sizes: Sizes) -> Work:
 
 def _galerkin(decisions: Decisions, sizes: Sizes) -> Work:
     n_tractions, n_displacements = sizes.n_tractions, sizes.n_displacements
-    # of the single layer: the resultants and the idle pressures; of the body: its pressure
+    # of the single layer: the resultants and the pressures; of the body: the one that keeps its volume, or a dilatation
     n_columns = sizes.n_motions + sizes.n_pressures + min(sizes.n_pressures, 1)
     factorisations = [Factorisation(FactorKind.CHOLESKY, n_tractions)]
     if decisions.forms_matrix:
@@ -49,5 +49,5 @@ def _collocation(sizes: Sizes) -> Work:
         element_pairs=sizes.n_collocation_pairs,
         single_layer=Entries.full(n, sizes.n_fixed + sizes.n_open) + Entries(n * sizes.n_loaded),
         double_layer=Entries.full(n, sizes.n_free + sizes.n_open) + Entries(n * sizes.n_moved),
-        factorisations=(Factorisation(FactorKind.LU, n + sizes.n_motions),),
+        factorisations=(Factorisation(FactorKind.LU, n + sizes.n_motions + sizes.n_loops),),
     )

@@ -183,7 +183,7 @@ def _left_out(name: str, reason: str, n_columns: int, n_all: int) -> PlanItem:
 
 def _condensation_items(decisions: Decisions, sizes: Sizes, why_solver: str) -> Iterator[PlanItem]:
     is_galerkin = decisions.formulation is Formulation.GALERKIN
-    f, o, n = sizes.n_free, sizes.n_open, sizes.n_displacements + sizes.n_motions
+    f, o, n = sizes.n_free, sizes.n_open, sizes.n_displacements + sizes.n_motions + sizes.n_loops
     if is_galerkin and decisions.forms_matrix:
         flops = f**3 / 3.0 + 2.0 * f * f * o + 2.0 * f * o * o
         reason = f"{why_solver}; order {f}"
@@ -216,7 +216,7 @@ def _multigrid(decisions: Decisions, sizes: Sizes) -> PlanItem:
 
 
 def _pressure(is_galerkin: bool, sizes: Sizes) -> PlanItem:
-    is_incompressible = sizes.n_pressures > 0
+    is_incompressible = sizes.n_volumes > 0
     reason = "Poisson's ratio is 1/2" if is_incompressible else "the body is compressible"
     if is_incompressible and not is_galerkin:
         reason = "collocation has it among the tractions"

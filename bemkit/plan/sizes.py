@@ -48,7 +48,9 @@ class Sizes:
     n_motions, n_free_motions : int
         Rigid motions that cause no traction (3, or none on an exterior), and those of them that no support holds.
     n_pressures : int
-        Uniform pressures that move an incompressible body nowhere.
+        Uniform pressures that a Galerkin map holds exactly: of each loop if incompressible, else of all at once.
+    n_volumes : int
+        Pressures that keep the volume: one of an incompressible body.
     """
 
     n_elements: int
@@ -70,6 +72,7 @@ class Sizes:
     n_motions: int
     n_free_motions: int
     n_pressures: int
+    n_volumes: int
 
 
 def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions) -> Sizes:
@@ -118,7 +121,8 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
         n_contact_unknowns=2 * nodes.nodes.size - int(np.count_nonzero(tangent_is_free)),
         n_motions=len(possible_motions(mesh)),
         n_free_motions=len(free_motions(conditions, nodes, space)),
-        n_pressures=len(mesh.loops) if holds_volume else 0,
+        n_pressures=len(mesh.loops) if holds_volume else int(not mesh.is_exterior),
+        n_volumes=int(holds_volume),
     )
 
 

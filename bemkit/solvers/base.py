@@ -40,6 +40,10 @@ class Status(Enum):
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
     )
+    NEGATIVE_ENERGY = (
+        "The elastic energy is negative or can become so, because the elements are too long for collocation; "
+        "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."
+    )
     NOT_FINITE = "Numbers overflowed or became undefined; check stiffness, load and friction law for huge entries."
 
 

@@ -100,5 +100,5 @@ def test_rotating_disk_by_a_particular_solution() -> None:
         u = neumann(elastic, force) + particular(points)
         exact = points * ((1 - nu) * ((3 + nu) * radius**2 - (1 + nu) * radius**2) / (8 * modulus))
         errors.append(distance(elastic, u, exact))
-    assert errors[-1] < 1e-4
-    assert abs(observed_order(errors) - 3.0) < 0.25
+    # the rest is a uniform widening under a uniform tension, which the map holds to round-off on curved elements too
+    assert max(errors) < 1e-12

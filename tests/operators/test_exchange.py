@@ -14,6 +14,7 @@ from bemkit.operators.collocation import collocation_matrices, fill_columns
 from bemkit.operators.columns import column_runs
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.reciprocity import Reciprocity
 from bemkit.operators.rigid import resting_motions
 from bemkit.operators.steklov_poincare import CollocationMap
 from bemkit.operators.work import Entries
@@ -43,7 +44,7 @@ def any_conditions(mesh: BoundaryMesh, seed: int) -> NodalConditions:
 def whole_equations(
     mesh: BoundaryMesh, conditions: NodalConditions, force: FloatArray, opened: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve the bordered equations with full matrices in x and y: unknown u and t and c, all conditions as rows."""
+    """Solve the bordered equations with full matrices in x and y: unknown u, t and errors, all conditions as rows."""
     n = 2 * mesh.n_elements
     single, double = collocation_matrices(mesh, MATERIAL)[0], with_slopes(mesh)
     motions = resting_motions(mesh, mesh.centres)
@@ -51,16 +52,19 @@ def whole_equations(
     turn = np.zeros((n, n))
     for k, frame in enumerate(conditions.frame):
         turn[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = frame
-    system = np.zeros((2 * n + 3, 2 * n + 3))
-    right = np.zeros(2 * n + 3)
-    system[:n, :n], system[:n, n : 2 * n], system[:n, 2 * n :] = 0.5 * np.eye(n) + double, -single, motions
+    reciprocity = Reciprocity.of(mesh, MATERIAL, takes_slopes=True)
+    errors = np.column_stack([motions, reciprocity.fields])
+    order = 2 * n + errors.shape[1]
+    system, right = np.zeros((order, order)), np.zeros(order)
+    system[:n, :n], system[:n, n : 2 * n], system[:n, 2 * n :] = 0.5 * np.eye(n) + double, -single, errors
     is_free = conditions.is_free.ravel()
     held = np.where(conditions.is_fixed, conditions.displacement, 0.0).ravel()
     held[conditions.is_open.ravel()] = opened
     system[n : 2 * n, :n] = np.where(is_free[:, None], 0.0, turn)
     system[n : 2 * n, n : 2 * n] = np.where(is_free[:, None], turn, 0.0)
     right[n : 2 * n] = np.where(is_free, turn @ (force.ravel() / weights), held)
-    system[2 * n :, n : 2 * n] = (weights[:, None] * motions).T
+    system[2 * n : 2 * n + 3, n : 2 * n] = (weights[:, None] * motions).T
+    system[2 * n + 3 :, :n], system[2 * n + 3 :, n : 2 * n] = -reciprocity.on_displacement, reciprocity.on_traction
     solution = np.linalg.solve(system, right)
     return solution[:n].reshape(-1, 2), (weights * solution[n : 2 * n]).reshape(-1, 2)
 
@@ -90,6 +94,23 @@ def slopes_of(mesh: BoundaryMesh) -> FloatArray:
     return result
 
 
+def means_of(mesh: BoundaryMesh) -> FloatArray:
+    """Return the matrix (2 n, 2 n) of the means of b (y - x)^2, b the leading coefficient of parabolas."""
+    x = mesh.centres @ np.array([1.0, 1j])
+    span = (mesh.tangents @ np.array([1.0, 1j])) * mesh.lengths
+    is_corner = corner_nodes(mesh)
+    result = np.zeros((2 * len(x), 2 * len(x)))
+    for loop in mesh.loops:
+        for here, i in enumerate(loop.tolist()):
+            near = [int(loop[here - 1]), i, int(loop[here + 1 - len(loop)])]
+            if is_corner[mesh.elements[i]].any():
+                continue
+            leading = np.linalg.inv(np.vander(x[near], 3))[0]
+            for j, c in zip(near, leading * span[i] ** 2 / 12.0, strict=True):
+                result[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += [[c.real, -c.imag], [c.imag, c.real]]
+    return result
+
+
 def test_slopes_against_the_kernels_of_kelvin() -> None:
     mesh = MESHES["plate with hole"]()
     n, nu = mesh.n_elements, 0.3
@@ -110,7 +131,8 @@ def test_slopes_against_the_kernels_of_kelvin() -> None:
             moments[i, :, j] = np.einsum("ijp,jkp,p->ik", kernel, turned_by, measure)
     _, double = collocation_matrices(mesh, MATERIAL)
     found = (with_slopes(mesh) - double).reshape(n, 2, n, 2)
-    expected = (moments.reshape(2 * n, 2 * n) @ slopes_of(mesh)).reshape(n, 2, n, 2)
+    added = moments.reshape(2 * n, 2 * n) @ slopes_of(mesh) + double @ means_of(mesh)
+    expected = added.reshape(n, 2, n, 2)
     # the moments on their own elements, which quadrature cannot give, act on the element and its neighbours
     rows, columns = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
     near = np.zeros((n, n), bool)
@@ -166,7 +188,8 @@ def test_only_columns_that_something_multiplies_are_computed() -> None:
     assert work.single_layer == Entries(computed=48 * (12 + 6 + 6), stored=48 * (12 + 6))
     assert work.double_layer == Entries(computed=48 * (48 - 6), stored=48 * (48 - 6))
     assert work.element_pairs == 24 * 24
-    assert [each.order for each in work.factorisations] == [51]
+    # 48 equations, three resultants and one reciprocity
+    assert [each.order for each in work.factorisations] == [52]
     assert work.right_hand_sides == 12 + 1
 
 

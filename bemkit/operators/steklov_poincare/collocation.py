@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import ConstantSpace
-from bemkit.operators.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.steklov_poincare.exchange import ColumnExchange
@@ -29,11 +28,12 @@ class CollocationMap:
 
     Notes
     -----
-    The paper's discretisation, with two additions. With slopes, rotations cause no tractions, as translations do not in
-    any case; constant elements do not hold them by themselves. And plain collocation satisfies the equilibrium of
+    The paper's discretisation, with three additions. With slopes, rotations cause no tractions, as translations do not
+    in any case; constant elements do not hold them by themselves. Plain collocation satisfies the equilibrium of
     forces and moments only up to the discretisation error: here a rigid motion c is added to the equations and the
     resultants of the tractions are set to zero; c vanishes with the mesh size. On an exterior neither c nor the
-    condition on the resultants is there.
+    condition on the resultants is there. Likewise one reciprocity for each loop tells the pressure there, which the
+    displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.reciprocity`).
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material, *, slopes: bool = True) -> None:
@@ -55,19 +55,7 @@ class CollocationMap:
 
     def matrix(self) -> FloatArray:
         """Return the weak (n_dofs, n_dofs) matrix [Pa]; it is not symmetric."""
-        self._check_holes(np.ones((self.mesh.n_elements, 2), bool))
         return self._matrix
-
-    def _check_holes(self, is_free: BoolArray) -> None:
-        """Refuse what the displacement equation cannot tell: the pressure in a hole of an incompressible body."""
-        if not self.material.is_incompressible:
-            return
-        for loop, area in zip(self.mesh.loops, self.mesh.loop_areas, strict=True):
-            if area < 0.0 and is_free[loop].any():
-                raise SingularMatrixError(
-                    "collocation cannot find the pressure in a hole of an incompressible body (poisson_ratio 0.5): "
-                    "use linear or quadratic Galerkin elements, or a ratio below 0.5"
-                )
 
     def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
         """Return the resultants of a traction field on the elements."""
@@ -78,7 +66,6 @@ class CollocationMap:
 
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """
-        self._check_holes(conditions.is_free)
         name = "the body held by its supports and its contact boundary"
         return ColumnExchange(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 

@@ -14,6 +14,7 @@ from bemkit.operators.columns import ColumnRun, column_runs
 from bemkit.operators.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.reciprocity import Reciprocity
 from bemkit.operators.rigid import resting_motions
 from bemkit.operators.steklov_poincare.given import GivenData, in_plane
 from bemkit.operators.steklov_poincare.nodes import rotate_columns
@@ -77,15 +78,21 @@ class ColumnExchange:
         self._tractions, self._displacements = _in_two(~conditions.is_free), _in_two(conditions.is_free)
         n_rows, n_tractions, opened = self._weights.size, self._tractions.size, _in_two(conditions.is_open)
 
-        order = n_rows + motions.shape[1]
+        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
+        self._on_traction = rotate_columns(reciprocity.on_traction, conditions.frame)
+        self._on_displacement = rotate_columns(reciprocity.on_displacement, conditions.frame)
+        errors = np.column_stack([motions, reciprocity.fields])
+        order = n_rows + errors.shape[1]
         matrix, right = np.zeros((order, order)), np.zeros((order, opened.size), order="F")
         frame = conditions.frame
         single = column_runs(matrix[:n_rows, :n_tractions], self._tractions, frame)
         double = column_runs(matrix[:n_rows, n_tractions:n_rows], self._displacements, frame)
         data = GivenData.of(conditions, force, conditions.displacement)
         known, work = self._sweep(data, single, [*double, *column_runs(right[:n_rows], opened, frame)])
-        matrix[:n_rows, n_rows:] = np.concatenate([motions[0::2], motions[1::2]])
-        matrix[n_rows:, :n_tractions] = self._resultants(self._tractions)
+        matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
+        matrix[n_rows:, :n_tractions] = self._of_tractions(self._tractions)
+        matrix[n_rows:, n_tractions:n_rows] = self._of_displacements(self._displacements)
+        right[n_rows:] = self._of_displacements(opened)
         self._factor = DenseLU(matrix, name)
         self._response = -self._by_dof(self._factor.solve(right)[:, np.argsort(opened)])
         work += Work(
@@ -119,19 +126,26 @@ class ColumnExchange:
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
         """Return the unknowns by dof, the open displacements at rest."""
-        free = np.flatnonzero(self._conditions.is_free)
-        traction = data.force.ravel()[free] / self._weights[free]
-        return self._by_dof(self._factor.solve(np.concatenate([known, self._resultants(free) @ traction])))
+        free, fixed = (np.flatnonzero(x) for x in (self._conditions.is_free, self._conditions.is_fixed))
+        traction, displacement = data.force.ravel()[free] / self._weights[free], data.displacement.ravel()[fixed]
+        balances = self._of_tractions(free) @ traction - self._of_displacements(fixed) @ displacement
+        return self._by_dof(self._factor.solve(np.concatenate([known, balances])))
 
-    def _resultants(self, dofs: IntArray) -> FloatArray:
-        """Return the resultants (n_motions, n_dofs) of tractions, of the size of the displacements that they cause.
+    def _of_tractions(self, dofs: IntArray) -> FloatArray:
+        """Return the resultants of tractions, and their part in the reciprocities: (n_balances, n_dofs).
 
-        Equations of one size are all solved to round-off; larger ones would gather that of their pivots.
+        Resultants are of the size of the displacements that they cause: equations of one size are all solved to
+        round-off; larger ones would gather that of their pivots.
         """
         material = self._material
         compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
-        result: FloatArray = (self._local_motions[dofs] * (compliance * self._weights)[dofs, None]).T
-        return result
+        resultants = (self._local_motions[dofs] * (compliance * self._weights)[dofs, None]).T
+        return np.concatenate([resultants, self._on_traction[:, dofs]])
+
+    def _of_displacements(self, dofs: IntArray) -> FloatArray:
+        """Return the part of displacements in the same equations, (n_balances, n_dofs); resultants have none."""
+        none = np.zeros((self._local_motions.shape[1], dofs.size))
+        return np.concatenate([none, self._on_displacement[:, dofs]])
 
     def _by_dof(self, unknowns: FloatArray) -> FloatArray:
         """Sort the unknowns by dof: tractions where the displacement is given or open, else displacements."""

@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
+from bemkit.geometry.vectors import turned_right
 from bemkit.operators.boundary import mass
 from bemkit.operators.dense import Cholesky
 from bemkit.operators.linear import DenseCholesky, LinearSolver, LinearSolverWish
@@ -20,7 +22,7 @@ from bemkit.operators.memory import physical_memory
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
-from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers
+from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers, dilatation_of
 from bemkit.operators.steklov_poincare.nodes import integrate_traction, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
@@ -103,27 +105,47 @@ class GalerkinMap:
         return self._assemble()
 
     def _assemble(self) -> Layers:
-        return assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
+        pressures, fluxes = self._pressures, self._fluxes
+        return assemble_layers(self.displacement_space, self.traction_space, self.material, pressures, fluxes)
 
     @cached_property
     def _pressures(self) -> FloatArray:
-        """(n_traction_dofs, n_loops) tractions that move an incompressible body nowhere; else no columns."""
-        if not self.material.is_incompressible or self.mesh.is_exterior:
-            return np.zeros((self.traction_space.n_dofs, 0))
+        """(n_traction_dofs, n_pressures) uniform pressures, for which the map takes normals that are exact.
+
+        That of the whole boundary, those of each loop of an incompressible body, none of an exterior.
+        """
         dofs = self.traction_space.element_dofs
         everywhere = np.arange(self.mesh.n_elements)
         normals = np.zeros((self.traction_space.n_dofs // 2, 2))
         normals[dofs] = self.mesh.normals_at(everywhere, self.traction_space.local_nodes)
-        pressures = np.zeros((len(normals), 2, len(self.mesh.loops)))
-        for number, loop in enumerate(self.mesh.loops):
-            pressures[dofs[loop].ravel(), :, number] = normals[dofs[loop].ravel()]
-        return pressures.reshape(-1, len(self.mesh.loops))
+        pressures = np.zeros((len(normals), 2, len(self._pressed)))
+        for number, elements in enumerate(self._pressed):
+            pressures[dofs[elements].ravel(), :, number] = normals[dofs[elements].ravel()]
+        return pressures.reshape(self.traction_space.n_dofs, -1)
+
+    @property
+    def _pressed(self) -> tuple[IntArray, ...]:
+        """The elements under each of the uniform pressures."""
+        if self.mesh.is_exterior:
+            return ()
+        return self.mesh.loops if self.material.is_incompressible else (np.arange(self.mesh.n_elements),)
+
+    @cached_property
+    def _fluxes(self) -> FloatArray:
+        """(n_dofs, n_pressures) change of volume per displacement dof where each of the pressures acts.
+
+        Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
+        """
+        fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
+        flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
+        flux[:, vanishing_dofs(self.displacement_space)] = 0.0
+        return np.asarray(flux.T)
 
     @cached_property
     def _volume(self) -> FloatArray:
         """(n_dofs, 0 or 1) change of volume per displacement dof of an incompressible body."""
-        total = self._pressures.sum(axis=1, keepdims=True)[:, : min(self._pressures.shape[1], 1)]
-        return np.asarray(mass(self.displacement_space, self.traction_space).matrix().T @ total)
+        n_columns = int(self.material.is_incompressible and not self.mesh.is_exterior)
+        return np.asarray(self._fluxes.sum(axis=1, keepdims=True)[:, :n_columns])
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -163,23 +185,42 @@ class GalerkinMap:
 
         Of an incompressible body they lack the pressures, which displacements do not tell.
         """
+        rest = self._tractions_without_pressures(displacement.ravel())
+        if self.material.is_incompressible or self.mesh.is_exterior:
+            return rest.reshape(-1, 2)
+        # the pressure by the work on the dilatation x, whose forces are those of a unit tension over beta
+        beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)
+        of_dilatation = self._tractions_without_pressures(dilatation)
+        everywhere, centre = np.arange(self.mesh.n_elements), self.mesh.centre
+        arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
+        flux = self._fluxes[:, 0]
+        tension = (flux @ displacement.ravel() / beta - arms @ rest) / (
+            flux @ dilatation - beta * (arms @ of_dilatation)
+        )
+        total = rest - beta * tension * of_dilatation + tension * self._pressures[:, 0]
+        return np.asarray(total).reshape(-1, 2)
+
+    def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
+        """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""
         if "factors" in self.__dict__ or "layers" not in self.__dict__:
             factors = self.factors
-            return factors.single_layer.solve_upper(factors.strained @ displacement.ravel()).reshape(-1, 2)
-        return self.layers.tractions(displacement.reshape(-1, 1)).reshape(-1, 2)
+            return factors.single_layer.solve_upper(factors.strained @ displacement)
+        return self.layers.tractions(displacement[:, None])[:, 0]
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
         points, weights = gauss_legendre(self.traction_space.degree + 1)
         mean = self.traction_space.basis(points) @ weights / 2.0
         tractions = self.tractions(displacement)
-        if self._pressures.shape[1]:
-            identity = mass(self.displacement_space, self.traction_space).matrix()
-            missing = force.ravel() - identity.T @ tractions.ravel()
-            sizes = np.linalg.lstsq(identity.T @ self._pressures, missing, rcond=None)[0]
-            tractions = tractions + (self._pressures @ sizes).reshape(-1, 2)
         at_dofs = tractions[self.traction_space.element_dofs]
         means: FloatArray = np.einsum("p,epc->ec", mean, at_dofs)
+        if self.material.is_incompressible and not self.mesh.is_exterior:
+            identity = mass(self.displacement_space, self.traction_space).matrix()
+            missing = force.ravel() - identity.T @ tractions.ravel()
+            pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
+            normals = turned_right(self.mesh.end - self.mesh.start) / self.mesh.lengths[:, None]  # their means
+            for elements, pressure in zip(self._pressed, pressures, strict=True):
+                means[elements] += pressure * normals[elements]
         return means
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from bemkit.operators.work import Entries, Work
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """S = hypersingular + strain^T V^-1 strain, V inverted on tractions without a resultant.
+    """S = hypersingular + strain^T V^-1 strain, V inverted on tractions without a resultant or a uniform pressure.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Layers:
     strain : (n_traction_dofs, n_dofs) array
         1/2 M + K.
     hypersingular : (n_dofs, n_dofs) array
-        W.
+        W, of a compressible body with the part of the uniform pressure.
     work : Work
         What they took.
     """
@@ -62,7 +62,11 @@ class Layers:
 
 
 def assemble_layers(
-    displacements: BoundarySpace, tractions: BoundarySpace, material: Material, pressures: FloatArray
+    displacements: BoundarySpace,
+    tractions: BoundarySpace,
+    material: Material,
+    pressures: FloatArray,
+    fluxes: FloatArray,
 ) -> Layers:
     """Assemble V, K and W of a map and factor V.
 
@@ -71,11 +75,14 @@ def assemble_layers(
     displacements, tractions : BoundarySpace
     material : Material
     pressures : (n_traction_dofs, n_pressures) array
-        Tractions that move the body nowhere.
+        Uniform pressures as traction dofs hold them, on which V is not inverted.
+    fluxes : (n_dofs, n_pressures) array
+        What displacements change the volume by where these pressures act.
 
     Returns
     -------
     Layers
+        Of a compressible body with the exact pressure, see `_under_dilatation`.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     v, k, w = single_layer(t, t, material), double_layer(u, t, material), hypersingular(u, u, material)
@@ -102,7 +109,37 @@ def assemble_layers(
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
     hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
     work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
-    return Layers(factor, resultant, _without(strain, at_rest), hyper, work)
+    layers = Layers(factor, resultant, _without(strain, at_rest), hyper, work)
+    if material.is_incompressible or not fluxes.shape[1]:
+        return layers
+    return _under_dilatation(layers, dilatation_of(u)[:, None], _without(fluxes.T, at_rest).T, material)
+
+
+def dilatation_of(space: BoundarySpace) -> FloatArray:
+    """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
+    return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
+
+
+def _under_dilatation(layers: Layers, dilatation: FloatArray, flux: FloatArray, material: Material) -> Layers:
+    """Return a map whose tractions also hold the exact normals n, times any pressure.
+
+    Curved elements hold normals only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as V n
+    does, would resist every change of volume of a nearly incompressible body. With the dilatation x, whose tractions
+    are n / beta, beta = (1 - 2 nu) / (2 mu), the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
+    S + q q^T for the wider space, q = (f - beta S x) / sqrt(beta x (f - beta S x)), f the flux of displacements.
+
+    Parameters
+    ----------
+    layers : Layers
+        Without uniform pressure.
+    dilatation, flux : (n_dofs, 1) arrays
+        x, and f.
+    material : Material
+    """
+    beta = material.plane_compressibility
+    rest = flux - beta * layers.apply(dilatation)
+    hyper = layers.hypersingular + rest @ rest.T / (beta * np.vdot(dilatation, rest))
+    return replace(layers, hypersingular=hyper, work=layers.work + Work(right_hand_sides=1))
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
