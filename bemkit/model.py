@@ -21,6 +21,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact_data import ContactData, find_contact
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.space import dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.nodal import supported
 from bemkit.operators.rigid import without_motion
