@@ -13,6 +13,7 @@ from bemkit.boundary_data import Units, find_units
 from bemkit.clock import StageClock
 from bemkit.contact.admissibility import find_unsolvable_load
 from bemkit.contact.body import ContactState
+from bemkit.contact_warnings import contact_warnings
 from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.energy import with_energy_checked
 from bemkit.escape import describe_escape
@@ -196,6 +197,7 @@ def _reason(model: Model, result: ContactSolution) -> str:
 def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, clock: StageClock) -> Solution:
     """Turn what the driver found into physical fields."""
     transitions: tuple[Transition, ...] = ()
+    warnings: tuple[str, ...] = ()
     if isinstance(model, ElasticModel):
         displacement, traction, energy = model.boundary_fields()
         table = ContactTable.empty()
@@ -204,6 +206,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
         displacement, traction, energy = model.boundary_fields(state)
         table = _contact_table(model, state, node_status)
         transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
+        warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
     clock = clock.closed(Stage.RECOVER)
@@ -227,7 +230,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
         work=model.work,
         message=result.message,
     )
-    return replace(solution, warnings=find_warnings(solution))
+    return replace(solution, warnings=(*find_warnings(solution), *warnings))
 
 
 def _summed(scene: Scene, steps: Sequence[Solution]) -> Solution:

@@ -200,6 +200,11 @@ def test_contact_at_a_large_angle_is_warned_of() -> None:
     assert warnings_of(block(FLOOR_PART, press)) == ()
 
 
+def test_solutions_carry_these_warnings() -> None:
+    press = bk.Part("press", bk.PrescribedDisplacement(x=1e-3, y=0.0), sides=("top",))
+    assert any("Supports push part 'wall'" in warning for warning in bk.run(block(WALL_PART, press)).warnings)
+
+
 def test_a_support_that_drives_the_body_into_an_obstacle_is_warned_of() -> None:
     press = bk.Part("press", bk.PrescribedDisplacement(x=1e-3, y=0.0), sides=("top",))
     (warning,) = warnings_of(block(WALL_PART, press))

@@ -15,7 +15,7 @@ PACKAGE = Path(bemkit.__file__).parent
 
 # imports point up only: a module may import those of its own layer and of earlier ones
 LAYERS = [
-    {"arrays", "complaint", "expression", "files", "hdf5"},
+    {"arrays", "complaint", "errors", "expression", "files", "hdf5"},
     {"geometry"},
     {"operators"},
     {"contact"},
@@ -34,7 +34,7 @@ LAYERS = [
         "shipped",
     },
     {"clock", "solution", "scenefile", "escape"},
-    {"warm_start", "held_friction", "contact_warnings"},
+    {"warm_start", "held_friction", "contact_warnings", "energy", "solution_warnings", "totals"},
     {"planfile", "io", "tables", "boundary_figure", "plotting", "interior", "runner", "adaptive", "reference"},
     {"outputs", "report", "explain", "rowfile", "testing", "cascade"},
     {"study", "stability"},
