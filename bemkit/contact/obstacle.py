@@ -12,12 +12,14 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.expression import ScalarField, check_field, evaluate_field
 
 FACING = 1e-12
 """Cosine of the angle between the body's normal and the contact direction below which a point does not face the
 obstacle: round-off of a side that runs along it."""
+_TOUCHING = 1e-12
+"""Distance from a polygon, relative to the coordinates, that may be their round-off."""
 
 
 class Obstacle(Protocol):
@@ -220,13 +222,18 @@ class PolygonalObstacle:
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the nearest side or corner; see `Obstacle.gap`."""
-        distance = np.hypot(*self._to_nearest(points).T)
+        towards, _, _ = self._nearest(points)
+        distance = np.hypot(*towards.T)
         return np.asarray(np.where(self._holds(points), -distance, distance))
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction to the nearest point, out of it where the polygon holds the point."""
-        towards = self._to_nearest(points)
-        return _unit_vectors(np.where(self._holds(points)[:, None], -towards, towards), self._inward(points))
+        towards, inward, is_corner = self._nearest(points)
+        away = np.where(self._holds(points)[:, None], -towards, towards)
+        # of a point on the polygon itself the vector is round-off: its side knows better, and at a corner the body
+        touches = np.hypot(*towards.T) <= _TOUCHING * np.abs(np.concatenate([self.vertices, points])).max()
+        at_corner = np.where(touches[:, None], normals, _unit_vectors(away, normals))
+        return np.where(is_corner[:, None], at_corner, inward)
 
     def _sides(self) -> tuple[FloatArray, FloatArray]:
         """Return start (n_sides, 2) and vector to the end (n_sides, 2) of each side, anticlockwise."""
@@ -236,23 +243,16 @@ class PolygonalObstacle:
             start = start[::-1]
         return start, np.roll(start, -1, axis=0) - start
 
-    def _nearest(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return the vectors (n, n_sides, 2) to the nearest point of each side, and the nearest side (n,)."""
+    def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Return the vectors (n, 2) to the nearest points, the inward normals (n, 2) there, and which are corners."""
         start, along = self._sides()
         offset = start - points[:, None, :]
         share = np.clip(-np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
         to_side = offset + share[:, :, None] * along
-        return to_side, np.argmin(np.sum(to_side**2, axis=2), axis=1)
-
-    def _to_nearest(self, points: FloatArray) -> FloatArray:
-        to_side, nearest = self._nearest(points)
-        return np.asarray(to_side[np.arange(len(points)), nearest])
-
-    def _inward(self, points: FloatArray) -> FloatArray:
-        """Return the inward normals (n, 2) of the nearest sides."""
-        _, along = self._sides()
-        unit = along / np.hypot(*along.T)[:, None]
-        return np.stack([-unit[:, 1], unit[:, 0]], axis=1)[self._nearest(points)[1]]
+        rows, nearest = np.arange(len(points)), np.argmin(np.sum(to_side**2, axis=2), axis=1)
+        unit = along[nearest] / np.hypot(*along[nearest].T)[:, None]
+        chosen = share[rows, nearest]
+        return to_side[rows, nearest], np.stack([-unit[:, 1], unit[:, 0]], axis=1), (chosen == 0.0) | (chosen == 1.0)
 
     def _holds(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: points inside, by the number of sides that a ray to the right crosses."""

@@ -131,6 +131,27 @@ def test_a_polygon_large_and_far_away_is_a_half_plane() -> None:
         np.testing.assert_allclose(mine, other, atol=1e-15)
 
 
+@given(st.floats(0.01, 0.99), st.integers(0, 3), angles)
+def test_points_that_rest_on_a_tilted_polygon_touch_its_sides(share: float, number: int, angle: float) -> None:
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    vertices = np.array(DART) @ turn.T + [30.0, -70.0]
+    along = vertices[(number + 1) % 4] - vertices[number]
+    at = (vertices[number] + share * along)[None]  # on the side but for round-off
+    outward = np.array([[along[1], -along[0]]]) / math.hypot(*along)
+    gap, direction = measure_contact(PolygonalObstacle(tuple(map(tuple, vertices.tolist()))), at, -outward)
+    np.testing.assert_allclose(direction, -outward, atol=1e-12)
+    assert gap[0] == pytest.approx(0.0, abs=1e-12)  # coordinates of about 100
+
+
+def test_a_body_that_rests_on_a_corner_touches_along_its_own_normal() -> None:
+    normals = np.array([[0.6, -0.8]])
+    gap, direction = measure_contact(
+        PolygonalObstacle(((0.0, 0.0), (1.0, -2.0), (1.0, 0.0))), np.zeros((1, 2)), normals
+    )
+    assert gap[0] == 0.0
+    np.testing.assert_array_equal(direction, normals)
+
+
 def test_a_point_on_the_side_of_a_polygon_is_pushed_against_its_normal() -> None:
     square = PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
     gap, direction = measure_contact(square, np.array([[0.5, 1.0]]), np.array([[0.0, -1.0]]))
