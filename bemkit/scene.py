@@ -37,6 +37,10 @@ Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
 """A condition on the coordinates, such as ``Expression("x > 0.5")``."""
 
 
+LARGEST_KRYLOV_ERROR = 1e-4
+"""Largest relative error of conjugate gradients: energies and forces on the contact boundary err by its square."""
+
+
 class NoContactError(ValueError):
     """A question about contact, asked of a scene without any."""
 
@@ -265,11 +269,8 @@ class Scene:
             self._check_without_contact()
         if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
             raise ValueError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
-        if isinstance(self.discretisation, ConstantCollocation) and isinstance(self.linear_solver, Krylov):
-            raise ValueError(
-                f"linear_solver is {self.linear_solver}, which needs symmetric equations, and those of collocation are "
-                "not: choose the discretisation 'linear' or 'quadratic', or leave the linear solver out"
-            )
+        if isinstance(self.linear_solver, Krylov):
+            self._check_krylov(self.linear_solver)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         names = [side.name for loop in self.shape.outline().loops for side in loop]
@@ -288,6 +289,18 @@ class Scene:
                     f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
                     "part the condition 'contact' with an obstacle"
                 )
+
+    def _check_krylov(self, solver: Krylov) -> None:
+        if isinstance(self.discretisation, ConstantCollocation):
+            raise ValueError(
+                f"linear_solver is {solver}, which needs symmetric equations, and those of collocation are not: choose "
+                "the discretisation 'linear' or 'quadratic', or leave the linear solver out"
+            )
+        if (error := solver.error_at(self.material)) > LARGEST_KRYLOV_ERROR:
+            raise ValueError(
+                f"linear_solver is {solver} at the Poisson ratio {self.material.poisson_ratio}, where its rtol leaves "
+                f"errors of {error:.0e}: choose 'direct', or leave the linear solver out"
+            )
 
     def _check_accuracy(self, accuracy: float) -> None:
         if isinstance(self.discretisation, ConstantCollocation):

@@ -16,6 +16,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.operators.block_cg import Iterations, block_cg
 from bemkit.operators.dense import Cholesky, multiply
+from bemkit.operators.material import Material
 from bemkit.operators.work import Factorisation
 
 if TYPE_CHECKING:
@@ -126,6 +127,14 @@ class Krylov:
         for name in ("max_steps", "coarsest"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}: give a positive whole number")
+
+    def error_at(self, material: Material) -> float:
+        """Return the relative error that `rtol` may leave in a solution.
+
+        Of nearly incompressible bodies it is larger by 1 / (1 - 2 nu), the ratio of the stiffnesses against changes of
+        volume and of shape; at nu = 1/2 an equation of its own keeps the volume.
+        """
+        return self.rtol if material.is_incompressible else self.rtol / (1.0 - 2.0 * material.effective_poisson_ratio)
 
     @property
     def forms_matrix(self) -> bool:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
-from bemkit.operators.linear import Automatic, Choice, LinearSolverWish
+from bemkit.operators.linear import Automatic, Choice, DenseCholesky, Krylov, LinearSolverWish
 from bemkit.operators.linear_choice import choose_linear_solver
 from bemkit.operators.memory import physical_memory
-from bemkit.scene import ConstantCollocation, QuadraticGalerkin, Scene
+from bemkit.scene import LARGEST_KRYLOV_ERROR, ConstantCollocation, QuadraticGalerkin, Scene
 
 
 class Formulation(enum.Enum):
@@ -88,5 +88,12 @@ def decide(scene: Scene, mesh: BoundaryMesh, n_load_steps: int) -> Decisions:
         takes_slopes=isinstance(discretisation, ConstantCollocation) and discretisation.slopes,
         n_load_steps=n_load_steps,
         has_contact=bool(scene.contact_parts),
-        linear_solver=scene.linear_solver,
+        linear_solver=_linear_solver(scene),
     )
+
+
+def _linear_solver(scene: Scene) -> LinearSolverWish:
+    """Return what the scene asks for, or a factorisation where iteration would be too inexact."""
+    if isinstance(scene.linear_solver, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
+        return DenseCholesky()
+    return scene.linear_solver

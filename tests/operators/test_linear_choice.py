@@ -10,6 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.operators.linear_choice import choose_linear_solver, direct_cost, krylov_cost
 from bemkit.plan import make_plan
+from bemkit.plan.decisions import decide
 
 AUTOMATIC = bk.Automatic()
 
@@ -55,6 +56,19 @@ def test_what_was_asked_for_is_taken() -> None:
     choice = choose_linear_solver(wish, 100, 100)
     assert choice.solver is wish
     assert choice.reason == "asked for"
+
+
+def test_nearly_incompressible_bodies_are_factored() -> None:
+    scene = replace(SCENE, discretisation=bk.LinearGalerkin())
+    rubber = replace(scene, material=bk.Material(1e4, 0.4999999))
+    assert decide(rubber, rubber.build_mesh(), 1).linear_solver == bk.DenseCholesky()
+    assert decide(scene, scene.build_mesh(), 1).linear_solver == AUTOMATIC
+    with pytest.raises(
+        ValueError, match=r"at the Poisson ratio 0\.4999999, where its rtol leaves errors of 5e-03: choose"
+    ):
+        replace(rubber, linear_solver=bk.Krylov())
+    replace(rubber, linear_solver=bk.Krylov(rtol=1e-12))
+    replace(scene, material=bk.Material(1e4, 0.5), linear_solver=bk.Krylov())  # where the volume has its own equation
 
 
 SCENE = replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=60))
