@@ -8,11 +8,15 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.estimate import blind_elements
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.scene import Clamped, ConstantCollocation, PrescribedDisplacement, Roller
 from bemkit.solution import ContactTable, Solution, are_neighbours
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
+LARGEST_TURN = 50.0
+"""Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
+the estimate says 3 %; of 45 degrees it says enough."""
 FEWEST_NODES = 4
 """Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
 
@@ -31,7 +35,7 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     """
     if not solution.is_certified:
         return solution.plan.warnings
-    return (*solution.plan.warnings, *_error(solution), *_narrow_zones(solution))
+    return (*solution.plan.warnings, *_error(solution), *_coarse_curves(solution.mesh), *_narrow_zones(solution))
 
 
 def _error(solution: Solution) -> Iterator[str]:
@@ -53,6 +57,22 @@ def _error(solution: Solution) -> Iterator[str]:
                 f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
                 "use more elements there."
             )
+
+
+def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
+    """Doubt elements that go around a large part of a circle: their error is not yet that of short elements."""
+    curved = np.flatnonzero(~mesh.is_straight)
+    if not curved.size:
+        return
+    before, middle, after = np.moveaxis(mesh.normals_at(curved, np.array([-1.0, 0.0, 1.0])), 1, 0)
+    cosines = np.stack([np.sum(before * middle, axis=1), np.sum(middle * after, axis=1)])
+    turn = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).sum(axis=0)
+    if turn.max() > LARGEST_TURN:
+        x, y = mesh.centres[curved[np.argmax(turn)]]
+        yield (
+            f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}), where no error "
+            "estimate holds: use more elements there."
+        )
 
 
 def _narrow_zones(solution: Solution) -> Iterator[str]:

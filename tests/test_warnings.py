@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+import bemkit as bk
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.obstacle import Gap
 from bemkit.expression import Expression
@@ -169,3 +170,18 @@ def test_a_load_history_keeps_the_warnings_of_all_its_steps() -> None:
     steps = run_history([scene])
     assert steps[0].warnings
     assert set(run(scene).warnings) == {*steps[0].warnings, *steps[1].warnings}
+
+
+@pytest.mark.parametrize(("elements", "degrees"), [(8, 90), (16, None)])
+def test_elements_that_go_around_a_quarter_of_a_circle_are_doubted(elements: int, degrees: int | None) -> None:
+    squeeze = bk.Part("squeeze", bk.Pressure(bk.Expression("x**2")), sides=tuple(f"outer-{k}" for k in range(1, 5)))
+    scene = bk.Scene(
+        title="ring",
+        shape=bk.Ring(0.9, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(squeeze,),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        mesh=bk.MeshOptions(elements=elements),
+    )
+    found = [warning for warning in bk.run(scene).warnings if "turns by" in warning]
+    assert [f"turns by {degrees} degrees on one element" in warning for warning in found] == [True] * bool(degrees)
