@@ -9,11 +9,14 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.estimate import blind_elements
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.space import break_nodes
 from bemkit.scene import Clamped, ConstantCollocation, PrescribedDisplacement, Roller
 from bemkit.solution import ContactTable, Solution, are_neighbours
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
+LARGEST_SHARE_ALONE = 0.2
+"""Share of the boundary without an estimate above which the estimate of the whole says too little."""
 LARGEST_TURN = 50.0
 """Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
 the estimate says 3 %; of 45 degrees it says enough."""
@@ -48,6 +51,11 @@ def _error(solution: Solution) -> Iterator[str]:
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
     elif error > LARGEST_ERROR:
         yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
+    if (share := _share_alone(solution.mesh)) > LARGEST_SHARE_ALONE:
+        yield (
+            f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where no "
+            "error can be estimated: use more elements."
+        )
     is_blind = blind_elements(solution.mesh, solution.plan.decisions.traction_degree)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
@@ -57,6 +65,13 @@ def _error(solution: Solution) -> Iterator[str]:
                 f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
                 "use more elements there."
             )
+
+
+def _share_alone(mesh: BoundaryMesh) -> float:
+    """Return the share of the boundary on elements without a neighbour on their piece, whose strains meet no others."""
+    whole = mesh.whole
+    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
+    return float(whole.lengths[is_alone].sum() / whole.lengths.sum())
 
 
 def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:

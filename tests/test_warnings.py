@@ -185,3 +185,18 @@ def test_elements_that_go_around_a_quarter_of_a_circle_are_doubted(elements: int
     )
     found = [warning for warning in bk.run(scene).warnings if "turns by" in warning]
     assert [f"turns by {degrees} degrees on one element" in warning for warning in found] == [True] * bool(degrees)
+
+
+@pytest.mark.parametrize(("elements", "is_doubted"), [(4, True), (8, False)])
+def test_elements_that_stand_alone_have_no_estimate(elements: int, is_doubted: bool) -> None:
+    scene = bk.Scene(
+        title="block",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("load", bk.Traction(y=-1e-3), sides=("top",)),
+        ),
+        mesh=bk.MeshOptions(elements=elements),
+    )
+    assert any("On 100 % of the boundary single" in warning for warning in bk.run(scene).warnings) == is_doubted
