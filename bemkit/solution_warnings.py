@@ -53,8 +53,8 @@ def _error(solution: Solution) -> Iterator[str]:
         yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
     if (share := _share_alone(solution.mesh)) > LARGEST_SHARE_ALONE:
         yield (
-            f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where no "
-            "error can be estimated: use more elements."
+            f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
+            "no error can be estimated: use more elements."
         )
     is_blind = blind_elements(solution.mesh, solution.plan.decisions.traction_degree)
     for part in solution.scene.parts:
