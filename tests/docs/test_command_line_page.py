@@ -59,7 +59,7 @@ def test_every_option_is_listed_and_accepted(path: str) -> None:
 
 
 def test_exit_codes() -> None:
-    codes = [0, cli.NOT_CONVERGED, cli.BAD_INPUT, cli.INTERRUPTED, cli.PIPE_CLOSED]
+    codes = [0, cli.NOT_CONVERGED, cli.BAD_INPUT, cli.INACCURATE, cli.INTERRUPTED, cli.PIPE_CLOSED]
     assert [int(row[0]) for row in table(section(PAGE, "Exit codes"))] == codes
 
 
