@@ -24,6 +24,9 @@ class DiscBetweenPlates:
     material : Material
     n_terms : int
         Coefficients of the pressure.
+    along_normals : bool
+        Contact acts along the normals of the undeformed circle, as by a gap formula, instead of along those of the
+        plates; pressures differ by the order of the half-angle.
 
     Raises
     ------
@@ -32,14 +35,16 @@ class DiscBetweenPlates:
 
     Notes
     -----
-    Gaps are measured along the normals of the undeformed circle, as everywhere in bemkit. Angles count from the middle
-    of the lower contact, anticlockwise.
+    Angles count from the middle of the lower contact, anticlockwise. The displacements that tractions t_k e^(ik angle)
+    cause, u_k = t_k / S_k with the symbols S_k of the circle, are summed in closed form for the plates' directions and
+    for the normals. By symmetry tractions on the upper half are opposite to those on the lower one.
     """
 
     radius: float
     approach: float
     material: Material
     n_terms: int = N_TERMS
+    along_normals: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.approach < 0.25 * self.radius:
@@ -79,14 +84,12 @@ class DiscBetweenPlates:
         length = 0.5 * np.pi * self.radius if length is None else length
         s, weight = places_along(length, (e * self.radius,))
         angle = s / self.radius
-        u_r = np.where(
-            angle < e, self._gap(angle, self.approach), self.radius * pressure.displacement(self._radial, angle)
-        )
+        u_n = np.where(angle < e, self._gap(angle), self.radius * pressure.displacement(self._towards, angle))
         force = self.radius * pressure.integral(np.ones_like)
-        work = -self.radius * pressure.integral(lambda phi: self._gap(phi, self.approach))
+        work = -self.radius * pressure.integral(self._gap)
         answer = Answer(
-            u_n=u_r,
-            u_t=self.radius * pressure.displacement(self._circumferential, angle),
+            u_n=u_n,
+            u_t=self.radius * pressure.displacement(self._across, angle),
             sigma_n=-pressure.at(angle),
             sigma_t=np.zeros_like(s),
             energy=0.25 * work,
@@ -102,27 +105,46 @@ class DiscBetweenPlates:
 
     def load(self) -> float:
         """Return the force on each plate [N/m]."""
-        return self.radius * self._solved(self.half_angle)[0].integral(np.cos)
+        pressure, _ = self._solved(self.half_angle)
+        return self.radius * pressure.integral(np.cos if self.along_normals else np.ones_like)
 
-    def _gap(self, angle: FloatArray, approach: float) -> FloatArray:
-        return np.asarray((self.radius - approach) / np.cos(angle) - self.radius)
+    def _gap(self, angle: FloatArray) -> FloatArray:
+        distance = self.radius * (1.0 - np.cos(angle)) - self.approach
+        return np.asarray(distance / np.cos(angle) if self.along_normals else distance)
 
     def _solved(self, half_angle: float) -> tuple[EvenPressure, float]:
         """Return the pressure over angles on a given zone, and the approach over the radius that belongs to it."""
+
+        def stretch(angle: FloatArray) -> FloatArray:
+            return 1.0 / np.cos(angle) if self.along_normals else np.ones_like(angle)
+
         return solve_pressure(
-            self._radial,
-            half_angle,
-            lambda angle: 1.0 / np.cos(angle),
-            lambda angle: 1.0 / np.cos(angle) - 1.0,
-            self.n_terms,
+            self._towards, half_angle, stretch, lambda angle: (1.0 - np.cos(angle)) * stretch(angle), self.n_terms
         )
+
+    def _towards(self, angle: FloatArray) -> FloatArray:
+        """u_n / radius of unit line pressures at an angle and opposite to it."""
+        if self.along_normals:
+            return self._radial(angle)
+        c, _ = self._sums(angle)
+        return np.asarray(-(self.material.kappa + 1.0) / (2.0 * np.pi * self.material.shear_modulus)) * (
+            c - 0.5 * np.cos(angle)
+        )
+
+    def _across(self, angle: FloatArray) -> FloatArray:
+        """u_t / radius of the same pressures."""
+        if self.along_normals:
+            return self._circumferential(angle)
+        _, s = self._sums(angle)
+        kappa, shear = self.material.kappa, self.material.shear_modulus
+        return np.asarray(-((kappa - 1.0) * s - 0.5 * (kappa + 1.0) * np.sin(angle)) / (2.0 * np.pi * shear))
 
     def _sums(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the sums of cos(n angle)/n and of sin(n angle)/n over odd n."""
         return 0.5 * np.log(1.0 / np.tan(0.5 * np.abs(angle))), 0.25 * np.pi * np.sign(angle)
 
     def _radial(self, angle: FloatArray) -> FloatArray:
-        """u_r / radius of unit line pressures at an angle and opposite to it."""
+        """u_r / radius of pressures along the normals."""
         c, s = self._sums(angle)
         along, across = np.cos(angle) * c, np.sin(angle) * s
         kappa, shear = self.material.kappa, self.material.shear_modulus
@@ -130,7 +152,7 @@ class DiscBetweenPlates:
         return np.asarray(-total / (2.0 * np.pi * shear))
 
     def _circumferential(self, angle: FloatArray) -> FloatArray:
-        """u_t / radius of the same pressures."""
+        """u_t / radius of the same."""
         c, s = self._sums(angle)
         along, across = np.cos(angle) * s, np.sin(angle) * c
         kappa, shear = self.material.kappa, self.material.shear_modulus

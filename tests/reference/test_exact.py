@@ -21,14 +21,15 @@ WAVE = WavyObstacle(0.0172614981, 0.01, wavelength=1.0, height=1.5, material=BLO
 )
 def test_the_disc_has_its_tabulated_values(half_angle: float, load: float, peak: float, approach: float) -> None:
     # found independently, by a spectral method in another basis; agreement to the digits given
-    disc = DiscBetweenPlates(1.0, approach, PLATE)
+    disc = DiscBetweenPlates(1.0, approach, PLATE, along_normals=True)
     assert disc.half_angle == pytest.approx(half_angle, rel=4e-5)
     assert disc.load() == pytest.approx(load, rel=3e-4)
     assert float(disc.pressure(np.zeros(1))[0]) == pytest.approx(peak, rel=4e-5)
 
 
-def test_a_small_contact_of_the_disc_is_hertzian() -> None:
-    disc = DiscBetweenPlates(2.0, 2e-6, PLATE)
+@pytest.mark.parametrize("along_normals", [False, True])
+def test_a_small_contact_of_the_disc_is_hertzian(along_normals: bool) -> None:
+    disc = DiscBetweenPlates(2.0, 2e-6, PLATE, along_normals=along_normals)
     half_width = 2.0 * disc.half_angle  # about 1e-3: corrections are of the first order in the half-angle, 5e-4
     assert disc.load() == pytest.approx(np.pi * half_width**2 / (4.0 * 2.0), rel=3e-4)
     x = np.linspace(-1.2, 1.2, 41)
@@ -79,15 +80,24 @@ def test_the_tangential_displacement_of_the_block_belongs_to_its_pressure(plane:
     np.testing.assert_allclose(strain[chosen], expected[chosen], atol=2e-3 * np.abs(expected).max())
 
 
-def test_energies_are_half_the_work_of_the_load() -> None:
-    disc = DiscBetweenPlates(1.0, 0.016, PLATE, n_terms=9)
+@pytest.mark.parametrize("along_normals", [False, True])
+def test_energies_are_half_the_work_of_the_load(along_normals: bool) -> None:
+    disc = DiscBetweenPlates(1.0, 0.016, PLATE, n_terms=9, along_normals=along_normals)
     # pushing a little further costs the load times the way, on two plates; gaps along normals n make the way 1 / n_y
+    way = 1.0 + 0.25 * disc.half_angle**2 if along_normals else 1.0
     ahead, behind = (
         dataclasses.replace(disc, approach=0.016 + step).reference().answer.energy for step in (1e-5, -1e-5)
     )
-    assert 4.0 * (ahead - behind) / 2e-5 == pytest.approx(
-        2.0 * disc.load() * (1.0 + 0.25 * disc.half_angle**2), rel=1e-4
-    )
+    assert 4.0 * (ahead - behind) / 2e-5 == pytest.approx(2.0 * disc.load() * way, rel=1e-4)
+
+
+@pytest.mark.parametrize("half_angle", [0.05, 0.1, 0.3])
+def test_directions_of_contact_make_a_difference_of_the_order_of_the_half_angle(half_angle: float) -> None:
+    own, _ = DiscBetweenPlates(1.0, 0.01, PLATE)._solved(half_angle)
+    other, _ = DiscBetweenPlates(1.0, 0.01, PLATE, along_normals=True)._solved(half_angle)
+    middle = np.zeros(1)
+    assert own.at(middle)[0] == pytest.approx(other.at(middle)[0], rel=0.4 * half_angle)
+    assert own.at(middle)[0] != pytest.approx(other.at(middle)[0], rel=0.02 * half_angle)
 
 
 def test_own_errors_are_told_and_small() -> None:
