@@ -188,17 +188,13 @@ class GalerkinMap:
         rest = self._tractions_without_pressures(displacement.ravel())
         if self.material.is_incompressible or self.mesh.is_exterior:
             return rest.reshape(-1, 2)
-        # the pressure by the work on the dilatation x, whose forces are those of a unit tension over beta
-        beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)
-        of_dilatation = self._tractions_without_pressures(dilatation)
+        # the pressure by the work on the dilatation, whose forces are the flux over the compressibility
         everywhere, centre = np.arange(self.mesh.n_elements), self.mesh.centre
         arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
         flux = self._fluxes[:, 0]
-        tension = (flux @ displacement.ravel() / beta - arms @ rest) / (
-            flux @ dilatation - beta * (arms @ of_dilatation)
-        )
-        total = rest - beta * tension * of_dilatation + tension * self._pressures[:, 0]
-        return np.asarray(total).reshape(-1, 2)
+        work = flux @ displacement.ravel() / self.material.plane_compressibility
+        tension = (work - arms @ rest) / (flux @ dilatation_of(self.displacement_space))
+        return np.asarray(rest + tension * self._pressures[:, 0]).reshape(-1, 2)
 
     def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
         """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""

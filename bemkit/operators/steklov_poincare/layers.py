@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -75,14 +75,14 @@ def assemble_layers(
     displacements, tractions : BoundarySpace
     material : Material
     pressures : (n_traction_dofs, n_pressures) array
-        Uniform pressures as traction dofs hold them, on which V is not inverted.
+        Uniform pressures as traction dofs hold them; V is not inverted on those of an incompressible body.
     fluxes : (n_dofs, n_pressures) array
         What displacements change the volume by where these pressures act.
 
     Returns
     -------
     Layers
-        Of a compressible body with the exact pressure, see `_under_dilatation`.
+        Of a compressible body with the part of the uniform pressure, see `_of_uniform_pressure`.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     v, k, w = single_layer(t, t, material), double_layer(u, t, material), hypersingular(u, u, material)
@@ -93,26 +93,29 @@ def assemble_layers(
         double_layer=Entries.full(t.n_dofs, u.n_dofs),
         hypersingular=Entries.full(u.n_dofs, u.n_dofs),
     )
-    weighted = mass(t, t).matrix() @ pressures
-    kernel = np.column_stack([weighted, _unit_vectors(vanishing_dofs(t))])
+    is_compressible = bool(fluxes.shape[1]) and not material.is_incompressible
+    annihilated = mass(t, t).matrix() @ pressures[:, : 0 if is_compressible else None]
+    kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
     factor = Cholesky(_without_kernel(v.matrix(), kernel), "the single layer operator")
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     identity = mass(u, t).matrix()
     motions = resting_motions(mesh, dof_points(u))
-    idle = np.column_stack([identity @ motions, weighted])
-    resultant, _ = np.linalg.qr(factor.solve_lower(idle))
+    resultants = identity @ motions
     strain = 0.5 * identity
     del identity
     strain += k.matrix()
     del k
     # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
+    strain = _without(strain, at_rest)
     hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
+    dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
+    idle = np.column_stack([resultants, annihilated, strain @ dilatation])
+    resultant, _ = np.linalg.qr(factor.solve_lower(idle))
+    if is_compressible:
+        hyper = hyper + _of_uniform_pressure(hyper, dilatation, _without(fluxes.T, at_rest).T, material)
     work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
-    layers = Layers(factor, resultant, _without(strain, at_rest), hyper, work)
-    if material.is_incompressible or not fluxes.shape[1]:
-        return layers
-    return _under_dilatation(layers, dilatation_of(u)[:, None], _without(fluxes.T, at_rest).T, material)
+    return Layers(factor, resultant, strain, hyper, work)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:
@@ -120,26 +123,29 @@ def dilatation_of(space: BoundarySpace) -> FloatArray:
     return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
 
 
-def _under_dilatation(layers: Layers, dilatation: FloatArray, flux: FloatArray, material: Material) -> Layers:
-    """Return a map whose tractions also hold the exact normals n, times any pressure.
+def _of_uniform_pressure(
+    hypersingular: FloatArray, dilatation: FloatArray, flux: FloatArray, material: Material
+) -> FloatArray:
+    """Return what the exact normals n add to S, if they stand among the tractions for their interpolant.
 
     Curved elements hold normals only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as V n
     does, would resist every change of volume of a nearly incompressible body. With the dilatation x, whose tractions
-    are n / beta, beta = (1 - 2 nu) / (2 mu), the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
-    S + q q^T for the wider space, q = (f - beta S x) / sqrt(beta x (f - beta S x)), f the flux of displacements.
+    are n / beta, beta = (1 - 2 nu) / (2 mu), the identities are V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x.
+    On the other tractions t with <V n, t> = 0, which (1/2 + K) x causes none of, this is q q^T with
+    q = (f - beta W x) / sqrt(beta x (f - beta W x)), and then S x = f / beta.
 
     Parameters
     ----------
-    layers : Layers
-        Without uniform pressure.
+    hypersingular : (n_dofs, n_dofs) array
+        W.
     dilatation, flux : (n_dofs, 1) arrays
-        x, and f.
+        x, and the flux f of displacements.
     material : Material
     """
     beta = material.plane_compressibility
-    rest = flux - beta * layers.apply(dilatation)
-    hyper = layers.hypersingular + rest @ rest.T / (beta * np.vdot(dilatation, rest))
-    return replace(layers, hypersingular=hyper, work=layers.work + Work(right_hand_sides=1))
+    rest = flux - beta * (hypersingular @ dilatation)
+    stiffness: FloatArray = rest @ rest.T / (beta * np.vdot(dilatation, rest))
+    return stiffness
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
