@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
     from bemkit.contact.obstacle import PolygonalObstacle as PolygonalObstacle
+    from bemkit.errors import BemkitError as BemkitError
+    from bemkit.errors import InputError as InputError
+    from bemkit.errors import NoResultError as NoResultError
     from bemkit.expression import Expression as Expression
     from bemkit.geometry.discretise import discretise as discretise
     from bemkit.geometry.grading import Algebraic as Algebraic
@@ -99,6 +102,7 @@ _HOME = {
     "cascade": ("run_cascade",),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle", "PolygonalObstacle"),
+    "errors": ("BemkitError", "InputError", "NoResultError"),
     "expression": ("Expression",),
     "geometry.discretise": ("discretise",),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit import __version__
-from bemkit.complaint import bad_input
+from bemkit.complaint import complaint, concerning
+from bemkit.errors import BemkitError, NoResultError
 from bemkit.stability.command import stability
 from bemkit.study.command import study
 
@@ -47,6 +48,9 @@ def main(arguments: list[str] | None = None) -> None:
         hint = f" (see {context.command_path} --help)" if context is not None else ""
         _complain(" ".join(error.format_message().split()) + hint)
         code = BAD_INPUT
+    except BemkitError as error:
+        _complain(" ".join(complaint(error).split()))
+        code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is half written")
         code = INTERRUPTED
@@ -103,12 +107,11 @@ def run(
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     from bemkit.outputs import Outputs
 
-    with bad_input():
-        wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
-        wanted.check()
-        chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
+    wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
+    wanted.check()
+    chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
     is_live = not quiet and sys.stderr.isatty()
-    with bad_input(scene):
+    with concerning(scene):
         solution = _solve(chosen, cascade=cascade, is_live=is_live)
         if explain:
             from bemkit.explain import with_memory
@@ -116,8 +119,7 @@ def run(
             solution = with_memory(solution, lambda: _solve(chosen, cascade=cascade, is_live=False))
     solution = replace(solution, plan=solution.plan.with_outputs(wanted.wishes))
     begin = time.perf_counter()
-    with bad_input():
-        wanted.write(solution)
+    wanted.write(solution)
     output_seconds = time.perf_counter() - begin
     if not quiet and not wanted.uses_stdout:
         from bemkit.report import print_summary
@@ -146,11 +148,10 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    with bad_input():
-        wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
-        wanted.check()
-        solution = read_result(result)
-        wanted.write(solution)
+    wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
+    wanted.check()
+    solution = read_result(result)
+    wanted.write(solution)
     if shows_scene:
         click.echo(scene_to_toml(solution.scene), nl=False)
     elif wanted == Outputs():
@@ -180,9 +181,8 @@ def plan(scene: str, elements: int | None, discretisation: str | None, is_json: 
     from bemkit.plan import make_plan, this_machine
     from bemkit.scene_symmetry import find_symmetry
 
-    with bad_input():
-        chosen = _load(scene, elements, discretisation)
-    with bad_input(scene):
+    chosen = _load(scene, elements, discretisation)
+    with concerning(scene):
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None
         made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
     if is_json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
 import uuid
@@ -10,8 +9,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bemkit.errors import BemkitError
 
-class OutputFileError(OSError):
+
+class OutputFileError(BemkitError, OSError):
     """A file that cannot be written; one line with its name and the remedy."""
 
 
@@ -84,23 +85,25 @@ def replacing(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def check_room(folder: Path, n_bytes: int) -> None:
+def check_room(target: Path, n_bytes: int) -> None:
     """Find out whether a large file fits on the disk, for libraries that do not survive when it runs full.
 
     Parameters
     ----------
-    folder : Path
+    target : Path
     n_bytes : int
         Size of the file.
 
     Raises
     ------
-    OSError
-        If there is less room; `replacing` turns it into an `OutputFileError`.
+    OutputFileError
+        If there is less room.
     """
-    free = shutil.disk_usage(folder).free
+    free = shutil.disk_usage(target.parent).free
     if free < n_bytes:
-        raise OSError(errno.ENOSPC, f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free")
+        raise OutputFileError(
+            f"{_shown(target)}: {n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free: choose another place"
+        )
 
 
 def _flush(path: Path) -> None:

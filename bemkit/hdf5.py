@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.files import replacing
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _MAX_ENTRIES_PER_GROUP = 1000
 _SEAL = "sha256"
 
 
-class ResultFileError(ValueError):
+class ResultFileError(InputError):
     """A result file that cannot be read; one line with its name and the remedy."""
 
 

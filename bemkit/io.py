@@ -28,6 +28,7 @@ import numpy as np
 
 import bemkit
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
 from bemkit.files import OutputFileError, check_target
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
@@ -216,7 +217,7 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
     boundary = BoundaryFields(*(reader.floats(f"boundary/{name}") for name in _BOUNDARY))
     if len(boundary.centres) != mesh.n_elements:
-        raise ValueError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
+        raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return Solution(
         scene=scene,
         mesh=mesh,

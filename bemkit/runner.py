@@ -16,6 +16,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact_warnings import contact_warnings
 from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.energy import with_energy_checked
+from bemkit.errors import InputError
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
@@ -34,11 +35,11 @@ from bemkit.totals import with_totals
 from bemkit.warm_start import state_on
 
 
-class UnsolvableSceneError(ValueError):
+class UnsolvableSceneError(InputError):
     """The scene has no solution; the message says why."""
 
 
-class LoadHistoryError(ValueError):
+class LoadHistoryError(InputError):
     """A load history where only a single load makes sense."""
 
 
@@ -116,7 +117,7 @@ def run_history(
     """
     steps = [step for scene in scenes for step in load_steps(scene)]
     if not steps:
-        raise ValueError("scenes is empty: give at least one scene")
+        raise InputError("scenes is empty: give at least one scene")
     clock = StageClock.start()
     mesh = steps[0].build_mesh() if mesh is None else mesh
     plan = make_plan(scenes[0], mesh, steps=steps)

@@ -11,6 +11,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, cast
 
+from bemkit.errors import InputError
 from bemkit.expression import closest
 from bemkit.kinds import SOLVERS
 from bemkit.mesh_options import MeshOptions
@@ -29,7 +30,7 @@ _SCENE_KEYS = (
 _PART_KEYS = ("sides", "where", "condition")
 
 
-class SceneError(ValueError):
+class SceneError(InputError):
     """A scene that cannot be read, understood or written; one line with file, key, value and remedy."""
 
 

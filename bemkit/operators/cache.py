@@ -23,6 +23,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.errors import InputError
 from bemkit.files import check_room, check_target, replacing
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, local_coefficients
@@ -48,7 +49,7 @@ CachedOperator: TypeAlias = SingleLayer | DoubleLayer | Hypersingular | Mass | G
 _logger = logging.getLogger(__name__)
 
 
-class CacheError(ValueError):
+class CacheError(InputError):
     """A cache file that cannot be used; one line with its name and the remedy."""
 
 
@@ -84,8 +85,8 @@ def save(path: str | Path, operator: CachedOperator) -> None:
 
     target = check_target(Path(path), "bemkit operator cache", _is_own)
     arrays = _computed(operator)
+    check_room(target, sum(array.nbytes for array in arrays.values()) + _OVERHEAD)
     with replacing(target) as temporary:
-        check_room(target.parent, sum(array.nbytes for array in arrays.values()) + _OVERHEAD)
         with h5py.File(str(temporary), "w-", userblock_size=_USER_BLOCK) as file:
             marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": bemkit.__version__}
             write_attributes(file, {**marks, "checksum": _checksum(arrays), **fingerprints(operator)})

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from bemkit.errors import InputError
 from bemkit.operators.memory import physical_memory
 from bemkit.plan.make import Plan
 
 
-class TooLargeError(ValueError):
+class TooLargeError(InputError):
     """A scene that does not fit into memory."""
 
 

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.complaint import bad_input
-
 if TYPE_CHECKING:
     from bemkit.scene import Scene
     from bemkit.stability.cases import Axis
@@ -69,12 +67,11 @@ def stability(
     uses_stdout = "-" in (csv_file, markdown)
     if csv_file == markdown == "-":
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
-    with bad_input():
-        _check_outputs(output, csv_file, markdown)
-        chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
-        axes = find_axes(all_axes(), names)
-        rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
-        _write(axes, rows, csv_file, markdown, folder)
+    _check_outputs(output, csv_file, markdown)
+    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+    axes = find_axes(all_axes(), names)
+    rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
+    _write(axes, rows, csv_file, markdown, folder)
     if not quiet and not uses_stdout:
         from bemkit.stability.report import print_verdicts
 
@@ -95,8 +92,7 @@ def _try_random(count: int, seed: int, first: int, jobs: int | None, folder: str
     from bemkit.stability.trial_session import TrialSession, print_trials
 
     is_live = not quiet and sys.stderr.isatty()
-    with bad_input():
-        trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
+    trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
     if not quiet:
         print_trials(trials)
     return int(any(trial.is_failure for trial in trials))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
 from bemkit.kinds import DISCRETISATIONS, SOLVERS
 from bemkit.mesh_options import MeshOptions
@@ -17,7 +18,7 @@ ACCURACIES = (1e-2, 1e-3, 1e-4)
 MOST_ELEMENTS = 500
 
 
-class StudyError(ValueError):
+class StudyError(InputError):
     """A study that cannot begin or cannot go on."""
 
 
@@ -134,7 +135,7 @@ class Run:
         """Its word, or the name of its class if it has none."""
         try:
             return SOLVERS.kind_of(self.scene.solver)
-        except ValueError:
+        except InputError:
             return type(self.scene.solver).__name__
 
     @property
@@ -182,7 +183,7 @@ def all_runs(
             for solver in solvers
             for size in sequence.sizes
         )
-    except ValueError as error:  # of the mesh options or the scene, which name the number
+    except InputError as error:  # of the mesh options or the scene, which name the number
         raise StudyError(str(error)) from error
     if not runs:
         raise StudyError(
