@@ -6,8 +6,6 @@ interrupted.
 
 from __future__ import annotations
 
-import errno
-import os
 import sys
 import time
 from dataclasses import replace
@@ -19,7 +17,9 @@ import click
 from bemkit import __version__
 from bemkit.complaint import complaint, concerning
 from bemkit.errors import BemkitError, NoResultError
+from bemkit.printable import printable
 from bemkit.stability.command import stability
+from bemkit.streams import PipeClosedError, guarded_streams, print_data
 from bemkit.study.command import study
 
 if TYPE_CHECKING:
@@ -37,19 +37,28 @@ def main(arguments: list[str] | None = None) -> None:
     arguments : list of str, optional
         By default those of the process.
     """
+    with guarded_streams():
+        code = _run_to_end(arguments)
+    sys.exit(code)
+
+
+def _run_to_end(arguments: list[str] | None) -> int:
+    """Run the command line and return its exit code; the one place where errors end."""
     try:
         code = commands.main(args=arguments, prog_name="bemkit", standalone_mode=False)
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message())
+        print(error.format_message())
         code = BAD_INPUT
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context is not None else ""
-        _complain(" ".join(error.format_message().split()) + hint)
+        _complain(error.format_message() + hint)
         code = BAD_INPUT
+    except PipeClosedError:  # the reader, such as head, has seen enough
+        code = PIPE_CLOSED
     except BemkitError as error:
-        _complain(" ".join(complaint(error).split()))
+        _complain(complaint(error))
         code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is half written")
@@ -57,16 +66,7 @@ def main(arguments: list[str] | None = None) -> None:
     except MemoryError:
         _complain("not enough memory: use fewer elements (--elements N)")
         code = BAD_INPUT
-    except BrokenPipeError:  # the reader, such as head, has seen enough
-        _drop_stdout()
-        code = PIPE_CLOSED
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EIO):
-            raise
-        _drop_stdout()  # files have their own checks, so this is the stream that the shell redirected
-        _complain(f"standard output: cannot be written ({error.strerror}): send it to another place")
-        code = BAD_INPUT
-    sys.exit(code if isinstance(code, int) else 0)
+    return code if isinstance(code, int) else 0
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -153,7 +153,7 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
     solution = read_result(result)
     wanted.write(solution)
     if shows_scene:
-        click.echo(scene_to_toml(solution.scene), nl=False)
+        print_data(scene_to_toml(solution.scene))
     elif wanted == Outputs():
         from bemkit.report import print_summary
 
@@ -168,7 +168,7 @@ def scenes() -> None:
     titles = shipped_scenes()
     width = max(map(len, titles))
     for name, title in titles.items():
-        click.echo(f"{name:<{width}}  {title}")
+        print(f"{name:<{width}}  {title}")
 
 
 @commands.command()
@@ -188,7 +188,7 @@ def plan(scene: str, elements: int | None, discretisation: str | None, is_json: 
     if is_json:
         import json
 
-        click.echo(json.dumps(made.as_dict(this_machine()), indent=2))
+        print(json.dumps(made.as_dict(this_machine()), indent=2))
     else:
         from bemkit.report import print_plan
 
@@ -234,10 +234,5 @@ def _path(name: str | None) -> Path | None:
     return None if name is None else Path(name)
 
 
-def _drop_stdout() -> None:
-    """Send what is still in the buffer of standard output nowhere, or the interpreter would fail on it at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _complain(message: str) -> None:
-    click.echo(f"bemkit: error: {message}", err=True)
+    print(f"bemkit: error: {printable(' '.join(message.split()))}", file=sys.stderr)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bemkit.errors import BemkitError
+from bemkit.printable import shown_path
 
 
 class OutputFileError(BemkitError, OSError):
@@ -42,15 +43,17 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
         folder = target.parent
         exists, is_file = target.exists(), target.is_file()
     except (OSError, ValueError) as error:
-        raise OutputFileError(f"{_shown(path)}: not a usable file name ({error}): choose another") from error
+        raise OutputFileError(f"{shown_path(path)}: not a usable file name ({error}): choose another") from error
     if not folder.is_dir():
-        raise OutputFileError(f"{_shown(path)}: the folder {_shown(folder)} does not exist: create it first")
+        raise OutputFileError(f"{shown_path(path)}: the folder {shown_path(folder)} does not exist: create it first")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputFileError(f"{_shown(path)}: no permission to write in {_shown(folder)}: choose another folder")
+        raise OutputFileError(
+            f"{shown_path(path)}: no permission to write in {shown_path(folder)}: choose another folder"
+        )
     if exists and not is_file:
-        raise OutputFileError(f"{_shown(path)}: exists and is not a file: choose another name")
+        raise OutputFileError(f"{shown_path(path)}: exists and is not a file: choose another name")
     if exists and not is_own(target):
-        raise OutputFileError(f"{_shown(path)}: exists and is not a {kind}: choose another name or delete it first")
+        raise OutputFileError(f"{shown_path(path)}: exists and is not a {kind}: choose another name or delete it first")
     return target
 
 
@@ -80,7 +83,7 @@ def replacing(target: Path) -> Iterator[Path]:
         os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputFileError(f"{_shown(target)}: cannot be written ({reason}): choose another place") from error
+        raise OutputFileError(f"{shown_path(target)}: cannot be written ({reason}): choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -101,9 +104,8 @@ def check_room(target: Path, n_bytes: int) -> None:
     """
     free = shutil.disk_usage(target.parent).free
     if free < n_bytes:
-        raise OutputFileError(
-            f"{_shown(target)}: {n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free: choose another place"
-        )
+        sizes = f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free"
+        raise OutputFileError(f"{shown_path(target)}: {sizes}: choose another place")
 
 
 def _flush(path: Path) -> None:
@@ -113,7 +115,3 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _shown(path: Path) -> str:
-    return "".join(character if character.isprintable() else "?" for character in str(path))[:200]

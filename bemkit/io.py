@@ -3,7 +3,7 @@
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
 stranger runs no code. The layout, version 1:
 
-    /                attributes format = "bemkit-result", schema_version, and sha256: a checksum of all the rest
+    /                attributes format = "bemkit-result" and schema_version
     /scene           text, the scene as TOML
     /provenance, /summary, /certificate, /timings, /memory     attributes
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
@@ -136,7 +136,6 @@ def read_result(path: str | Path) -> Solution:
             solution = _read_solution(reader, scene)
         except (ValueError, KeyError, OverflowError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
-        reader.check_seal()
     return solution
 
 

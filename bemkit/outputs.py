@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from bemkit.files import OutputFileError, check_target, replacing
 from bemkit.plan import Wishes
 from bemkit.solution import Solution
+from bemkit.streams import print_data
 from bemkit.tables import CSV_STARTS, to_json, write_csv
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ def check_text(place: str | None, kind: str, start: str) -> None:
 def write_text(place: str, text: str) -> None:
     """Write a text to a file, all or nothing, or to standard output if the place is ``"-"``."""
     if place == STDOUT:
-        sys.stdout.write(text)
+        print_data(text)
         return
     with replacing(Path(place).resolve()) as temporary:
         temporary.write_text(text, encoding="utf-8")

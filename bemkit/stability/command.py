@@ -113,7 +113,7 @@ def _computed(
 
     def announce(axis: Axis, value: float) -> None:
         if not is_quiet and sys.stderr.isatty():
-            click.echo(f"\r\x1b[K{axis.name} {value:.6g}", nl=False, err=True)
+            print(f"\r\x1b[K{axis.name} {value:.6g}", end="", file=sys.stderr)
 
     for row in sweep(scene, axes, finished=known, begins=announce):
         rows.append(row)
@@ -123,7 +123,7 @@ def _computed(
         axis = next(axis for axis in axes if axis.name == row.axis)
         if shows_tables and row.value == axis.values[-1]:
             if sys.stderr.isatty():
-                click.echo("\r\x1b[K", nl=False, err=True)
+                print("\r\x1b[K", end="", file=sys.stderr)
             print_axis(axis, [other for other in rows if other.axis == axis.name])
     return rows
 

@@ -16,7 +16,7 @@ from bemkit import outputs as outputs_module
 from bemkit.cli import commands
 from bemkit.complaint import complaint
 from bemkit.errors import BemkitError
-from bemkit.hdf5 import ResultFileError
+from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES
 from bemkit.study import sweep as sweep_module
 from bemkit.study.files import FILE, to_csv
@@ -197,6 +197,7 @@ def test_a_label_that_is_missing_is_noticed(tmp_path: Path) -> None:
 
     with h5py.File(path, "r+") as file:
         del file["grading"]
+    seal(path, MARK)
     with pytest.raises(ResultFileError, match=r"grading is missing: the file is damaged"):
         FILE.read(path)
 
