@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from bemkit.operators.stress import von_mises as von_mises
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
+    from bemkit.runner import FailedRun as FailedRun
     from bemkit.runner import run as run
     from bemkit.runner import run_all as run_all
     from bemkit.runner import run_history as run_history
@@ -128,7 +129,7 @@ _HOME = {
     "operators.stress": ("principal_stresses", "von_mises"),
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
-    "runner": ("run", "run_all", "run_history", "run_probe"),
+    "runner": ("FailedRun", "run", "run_all", "run_history", "run_probe"),
     "scene": (
         "Clamped",
         "ConstantCollocation",

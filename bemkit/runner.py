@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact_warnings import contact_warnings
 from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.energy import with_energy_checked
-from bemkit.errors import InputError
+from bemkit.errors import BemkitError, InputError
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
@@ -280,6 +280,11 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     plan = make_plan(scene, mesh)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
+    with blas_threads_for(plan.sizes.n_displacements):
+        return _probed(scene, mesh, plan, n_starts, clock)
+
+
+def _probed(scene: Scene, mesh: BoundaryMesh, plan: Plan, n_starts: int, clock: StageClock) -> tuple[Solution, ...]:
     with assembly_time() as assembly:
         model = build_model(scene, mesh, plan=plan)
     clock = clock.closed_build(assembly)
@@ -292,7 +297,27 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     return tuple(_solution(model, result, plan, clock) for result in found if result.is_converged)
 
 
-def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution]:
+@dataclass(frozen=True)
+class FailedRun:
+    """Stands in a list of solutions for a scene that has none.
+
+    Parameters
+    ----------
+    scene : Scene
+    error : BemkitError
+        What `run` raised; its message names the remedy.
+    """
+
+    scene: Scene
+    error: BemkitError
+
+    @property
+    def is_converged(self) -> bool:
+        """False, as of a solution that is none."""
+        return False
+
+
+def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution | FailedRun]:
     """Solve several scenes, on any `concurrent.futures.Executor` if one is given.
 
     Parameters
@@ -304,10 +329,17 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
 
     Returns
     -------
-    list of Solution
-        In the order of the scenes.
+    list of Solution or FailedRun
+        In the order of the scenes. A scene that is refused, such as one that nothing holds, is a `FailedRun`.
     """
-    return list(map(run, scenes)) if executor is None else list(executor.map(run, scenes))
+    return list(map(_attempt, scenes)) if executor is None else list(executor.map(_attempt, scenes))
+
+
+def _attempt(scene: Scene) -> Solution | FailedRun:
+    try:
+        return run(scene)
+    except BemkitError as error:
+        return FailedRun(scene, error.with_traceback(None))  # whose frames hold matrices
 
 
 def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:
