@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from bemkit.adaptive import run_adaptive
 from bemkit.errors import InputError
+from bemkit.plan import check_elements
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
@@ -54,6 +55,7 @@ def run_cascade(
         raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
     if scene.mesh.accuracy is not None:
         return run_adaptive(scene, callback=callback)
+    check_elements(scene)
     counts = [scene.mesh.n_elements]
     while counts[-1] // 2 >= coarsest:
         counts.append(counts[-1] // 2)

@@ -178,11 +178,12 @@ def scenes() -> None:
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
 def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.plan import make_plan, this_machine
+    from bemkit.plan import check_elements, make_plan, this_machine
     from bemkit.scene_symmetry import find_symmetry
 
     chosen = _load(scene, elements, discretisation)
     with concerning(scene):
+        check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None
         made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
     if is_json:

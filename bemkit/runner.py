@@ -25,7 +25,7 @@ from bemkit.history import load_steps
 from bemkit.model import Model, build_model
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.operators.threads import blas_threads_for
-from bemkit.plan import Plan, Stage, check_memory, make_plan
+from bemkit.plan import Plan, Stage, check_elements, check_memory, make_plan
 from bemkit.scene import NoContactError, Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
 from bemkit.solution_warnings import find_warnings
@@ -119,7 +119,9 @@ def run_history(
     if not steps:
         raise InputError("scenes is empty: give at least one scene")
     clock = StageClock.start()
-    mesh = steps[0].build_mesh() if mesh is None else mesh
+    if mesh is None:
+        check_elements(steps[0])
+        mesh = steps[0].build_mesh()
     plan = make_plan(scenes[0], mesh, steps=steps)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
@@ -211,6 +213,10 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
     clock = clock.closed(Stage.RECOVER)
+    if result.is_converged and not (
+        np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction).all()
+    ):
+        result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
     solution = Solution(
         scene=model.scene,
         mesh=model.mesh,
@@ -276,7 +282,9 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     if len(scene.load_factors) > 1:
         raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
     clock = StageClock.start()
-    mesh = scene.build_mesh() if mesh is None else mesh
+    if mesh is None:
+        check_elements(scene)
+        mesh = scene.build_mesh()
     plan = make_plan(scene, mesh)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
