@@ -105,10 +105,11 @@ def run(
     quiet: bool,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
+    from bemkit.files import reserved
     from bemkit.outputs import Outputs
 
     wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
-    wanted.check()
+    click.get_current_context().with_resource(reserved(wanted.check()))
     chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):

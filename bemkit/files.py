@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import glob
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from bemkit.errors import BemkitError
+from bemkit.locks import FileLock, HeldElsewhereError
 from bemkit.printable import shown_path
 
 
@@ -68,24 +71,81 @@ def replacing(target: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        A file that does not exist yet. It is removed again if the body of the ``with`` statement raises anything,
-        an interrupt included; the target is then untouched.
+        An empty file. It is removed again if the body of the ``with`` statement raises anything, an interrupt
+        included; the target is then untouched. What a process that was killed in here left behind is removed by the
+        next one: the system has dropped its lock on the temporary file.
 
     Raises
     ------
     OutputFileError
         If the system refuses, for example because the disk is full.
     """
-    temporary = target.with_name(f".{target.name[:100]}.{uuid.uuid4().hex}.tmp")
+    _remove_leftovers(target)
+    temporary = target.with_name(_hidden(target, f"{uuid.uuid4().hex}.tmp"))
     try:
-        yield temporary
-        _flush(temporary)
-        os.replace(temporary, target)
+        with contextlib.closing(FileLock(temporary, waits=True)):
+            yield temporary
+            _flush(temporary)
+            os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
         raise OutputFileError(f"{shown_path(target)}: cannot be written ({reason}): choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def reserved(targets: Iterable[Path]) -> Iterator[None]:
+    """Keep files for this process while it computes what it will write to them.
+
+    Parameters
+    ----------
+    targets : iterable of Path
+        From `check_target`.
+
+    Raises
+    ------
+    OutputFileError
+        If another process has reserved one of them, or the system refuses.
+    """
+    with contextlib.ExitStack() as stack:
+        for target in targets:
+            stack.enter_context(_reserved(target))
+        yield
+
+
+@contextmanager
+def _reserved(target: Path) -> Iterator[None]:
+    path = target.with_name(_hidden(target, "lock"))
+    try:
+        lock = FileLock(path)
+    except HeldElsewhereError as error:
+        raise OutputFileError(
+            f"{shown_path(target)}: another process is computing what it will write there: wait for it to end, or "
+            "choose another name"
+        ) from error
+    except OSError as error:
+        raise OutputFileError(f"{shown_path(target)}: cannot be written ({error.strerror}): choose another") from error
+    with contextlib.closing(lock):
+        _remove_leftovers(target)
+        try:
+            yield
+        finally:
+            if path.stat().st_size == 0:  # otherwise it is no lock of ours
+                path.unlink()
+
+
+def _hidden(target: Path, ending: str) -> str:
+    return f".{target.name[:100]}.{ending}"
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove temporary files of the target that no living process holds."""
+    name = glob.escape(_hidden(target, ""))
+    for path in target.parent.glob(f"{name}{'[0-9a-f]' * 32}.tmp"):
+        with contextlib.suppress(OSError), contextlib.closing(FileLock(path, may_create=False)) as lock:
+            if lock.is_sure:
+                path.unlink()
 
 
 def check_room(target: Path, n_bytes: int) -> None:

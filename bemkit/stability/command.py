@@ -60,6 +60,7 @@ def stability(
         _refuse(sweeps, "goes with a sweep of one scene: leave it out, or --random")
         return _try_random(count, seed or 0, first or 0, jobs, failures, quiet=quiet)
     _refuse(trials, "goes with random scenes: add --random, such as --random 200")
+    from bemkit.files import reserved
     from bemkit.scenefile import load_scene, with_overrides
     from bemkit.stability.axes import all_axes
     from bemkit.stability.cases import find_axes
@@ -67,7 +68,7 @@ def stability(
     uses_stdout = "-" in (csv_file, markdown)
     if csv_file == markdown == "-":
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
-    _check_outputs(output, csv_file, markdown)
+    click.get_current_context().with_resource(reserved(_check_outputs(output, csv_file, markdown)))
     chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
     axes = find_axes(all_axes(), names)
     rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
@@ -128,16 +129,17 @@ def _computed(
     return rows
 
 
-def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> None:
+def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> list[Path]:
+    """Find out, before any work is done, whether everything can be written; return the files to be reserved."""
     from bemkit.outputs import check_text
     from bemkit.stability.files import CSV_START, FILE, MARKDOWN_START
 
     if output is not None and Path(output).is_file():
         FILE.read(output)  # says more about a broken file than that it stands in the way
-    if output is not None:
-        FILE.check_target(output)
+    targets = [] if output is None else [FILE.check_target(output)]
     check_text(csv_file, "CSV file of stability rows", CSV_START)
     check_text(markdown, "Markdown file of stability tables", MARKDOWN_START)
+    return targets
 
 
 def _write(

@@ -68,6 +68,7 @@ def errors(
     Errors are measured against a closed form or a reference solution, or with --over-resolve against a fine solution.
     The exit code is 1 if a run did not converge.
     """
+    from bemkit.files import reserved
     from bemkit.outputs import STDOUT
     from bemkit.study.session import Outputs, Session
     from bemkit.study.wishes import DEFAULT_MEASURES, Lists, read_measures, read_wishes
@@ -75,7 +76,7 @@ def errors(
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
     outputs = Outputs(output, csv_file, folder, read_measures(measures or DEFAULT_MEASURES))
-    outputs.check()
+    click.get_current_context().with_resource(reserved(outputs.check()))
     wishes = read_wishes(
         scene,
         Lists(elements, accuracies, discretisation, meshes, solver),
