@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from bemkit.outputs import check_figures, check_text, save_figure, write_text
@@ -16,7 +14,7 @@ from bemkit.study.rows import Row
 from bemkit.study.runs import Run
 from bemkit.study.sweep import timed_rows, untimed_rows
 from bemkit.study.wishes import Wishes
-from bemkit.study.workers import end_with_parent
+from bemkit.workers import worker_processes
 
 FIGURE = "error-against-run-time.png"
 _DOTS_PER_INCH = 110  # sharp at the width of a page, and a small file
@@ -128,12 +126,8 @@ class Session:
         if repeat is not None:
             yield from timed_rows(runs, reference, repeat=repeat, finished=finished, begins=begins)
             return
-        # spawned processes do not inherit threads that hold locks
-        executor = ProcessPoolExecutor(self.jobs, mp_context=get_context("spawn"), initializer=end_with_parent)
-        try:
+        with worker_processes(self.jobs) as executor:
             yield from untimed_rows(runs, reference, executor, finished=finished)
-        finally:
-            executor.shutdown(cancel_futures=True)
 
 
 @contextmanager
