@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
     from bemkit.contact.obstacle import PolygonalObstacle as PolygonalObstacle
+    from bemkit.errors import BemkitError as BemkitError
+    from bemkit.errors import InputError as InputError
+    from bemkit.errors import NoResultError as NoResultError
     from bemkit.expression import Expression as Expression
     from bemkit.geometry.discretise import discretise as discretise
     from bemkit.geometry.grading import Algebraic as Algebraic
@@ -67,6 +70,7 @@ if TYPE_CHECKING:
     from bemkit.operators.stress import von_mises as von_mises
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
+    from bemkit.runner import FailedRun as FailedRun
     from bemkit.runner import run as run
     from bemkit.runner import run_all as run_all
     from bemkit.runner import run_history as run_history
@@ -99,6 +103,7 @@ _HOME = {
     "cascade": ("run_cascade",),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle", "PolygonalObstacle"),
+    "errors": ("BemkitError", "InputError", "NoResultError"),
     "expression": ("Expression",),
     "geometry.discretise": ("discretise",),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
@@ -124,7 +129,7 @@ _HOME = {
     "operators.stress": ("principal_stresses", "von_mises"),
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
-    "runner": ("run", "run_all", "run_history", "run_probe"),
+    "runner": ("FailedRun", "run", "run_all", "run_history", "run_probe"),
     "scene": (
         "Clamped",
         "ConstantCollocation",

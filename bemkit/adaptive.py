@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.partition import SPREAD, Partition, better_partition
@@ -64,7 +65,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     """
     options = scene.mesh
     if options.accuracy is None:
-        raise ValueError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
+        raise InputError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
     begin = time.perf_counter()
     contact = [part.name for part in scene.contact_parts]
     partition = options.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
@@ -121,7 +122,7 @@ def _wish(solution: Solution) -> FloatArray:
     """
     errors = solution.element_errors
     if errors is None:
-        raise ValueError("collocation has no error estimate: choose a Galerkin discretisation")
+        raise InputError("collocation has no error estimate: choose a Galerkin discretisation")
     return np.asarray(errors ** (1.0 / (_rate(solution) + 1)))
 
 

@@ -13,12 +13,18 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.obstacle import measure_contact
+from bemkit.errors import InputError
+from bemkit.geometry.magnitude import LARGEST, SMALLEST
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators.nodal import Support
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.nodes import integrate_traction
 from bemkit.scene import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Scene, Traction
+
+
+class OutOfRangeError(InputError):
+    """Stiffness, loads and lengths from which numbers too large or too small for floating point would follow."""
 
 
 @dataclass(frozen=True)
@@ -47,9 +53,26 @@ class Units:
         """Unit of displacements and gaps [m]."""
         return self.stress / self.modulus * self.length
 
+    def check_range(self) -> None:
+        """Refuse units whose squares and products, such as energies, overflow or vanish."""
+        _check_scale("stiffness", self.modulus)
+        _check_scale("stress", self.stress)
+        strain = self.stress / self.modulus
+        _check_scale("strain", strain)
+        _check_scale("displacement", strain * self.length)
+        _check_scale("root of the energy", float(np.sqrt(self.stress) * np.sqrt(strain)) * self.length)
+
     def to_physical(self, points: FloatArray) -> FloatArray:
         """Return dimensionless points [-] in metres."""
         return self.centre + self.length * points
+
+
+def _check_scale(name: str, scale: float) -> None:
+    if not SMALLEST <= scale <= LARGEST:
+        raise OutOfRangeError(
+            f"the {name} is about {scale:.1e}, and its square is no number any more: choose units in which stiffness, "
+            f"stresses, strains, displacements and the roots of energies lie between {SMALLEST:g} and {LARGEST:g}"
+        )
 
 
 def parts_on(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, FloatArray]]:
@@ -59,7 +82,13 @@ def parts_on(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, Flo
 
 
 def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
-    """Choose the units by the largest load, prescribed displacement or interference."""
+    """Choose the units by the largest load, prescribed displacement or interference.
+
+    Raises
+    ------
+    OutOfRangeError
+        If results in these units could overflow or vanish.
+    """
     modulus, length = scene.material.plane_modulus, mesh.diameter
     stresses = [0.0]
     gaps = [0.0]
@@ -77,7 +106,9 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
             stresses.append(float(np.maximum(-gap, 0.0).max()) / length * modulus)
             gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
     stress = max(stresses) or max(gaps) / length * modulus or modulus
-    return Units(mesh.centre, length, modulus, stress)
+    units = Units(mesh.centre, length, modulus, stress)
+    units.check_range()
+    return units
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:

@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from bemkit.adaptive import run_adaptive
+from bemkit.errors import InputError
+from bemkit.plan import check_elements
 from bemkit.runner import run
 from bemkit.scene import Scene
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
 
 
-class CascadeError(ValueError):
+class CascadeError(InputError):
     """A scene that cannot be solved on one mesh after the other."""
 
 
@@ -46,13 +48,14 @@ def run_cascade(
         If `coarsest` is too small for any mesh, or for the reasons of `bemkit.run`.
     """
     if coarsest < 3:
-        raise ValueError(f"coarsest = {coarsest}: give at least 3 elements")
+        raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
     if not scene.contact_parts:
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if len(scene.load_factors) > 1:
         raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
     if scene.mesh.accuracy is not None:
         return run_adaptive(scene, callback=callback)
+    check_elements(scene)
     counts = [scene.mesh.n_elements]
     while counts[-1] // 2 >= coarsest:
         counts.append(counts[-1] // 2)

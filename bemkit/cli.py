@@ -6,8 +6,6 @@ interrupted.
 
 from __future__ import annotations
 
-import errno
-import os
 import sys
 import time
 from dataclasses import replace
@@ -17,8 +15,11 @@ from typing import TYPE_CHECKING
 import click
 
 from bemkit import __version__
-from bemkit.complaint import bad_input
+from bemkit.complaint import complaint, concerning
+from bemkit.errors import BemkitError, NoResultError
+from bemkit.printable import printable
 from bemkit.stability.command import stability
+from bemkit.streams import PipeClosedError, guarded_streams, print_data
 from bemkit.study.command import study
 
 if TYPE_CHECKING:
@@ -36,33 +37,36 @@ def main(arguments: list[str] | None = None) -> None:
     arguments : list of str, optional
         By default those of the process.
     """
+    with guarded_streams():
+        code = _run_to_end(arguments)
+    sys.exit(code)
+
+
+def _run_to_end(arguments: list[str] | None) -> int:
+    """Run the command line and return its exit code; the one place where errors end."""
     try:
         code = commands.main(args=arguments, prog_name="bemkit", standalone_mode=False)
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message())
+        print(error.format_message())
         code = BAD_INPUT
     except click.ClickException as error:
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context is not None else ""
-        _complain(" ".join(error.format_message().split()) + hint)
+        _complain(error.format_message() + hint)
         code = BAD_INPUT
+    except PipeClosedError:  # the reader, such as head, has seen enough
+        code = PIPE_CLOSED
+    except BemkitError as error:
+        _complain(complaint(error))
+        code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is half written")
         code = INTERRUPTED
     except MemoryError:
         _complain("not enough memory: use fewer elements (--elements N)")
         code = BAD_INPUT
-    except BrokenPipeError:  # the reader, such as head, has seen enough
-        _drop_stdout()
-        code = PIPE_CLOSED
-    except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EIO):
-            raise
-        _drop_stdout()  # files have their own checks, so this is the stream that the shell redirected
-        _complain(f"standard output: cannot be written ({error.strerror}): send it to another place")
-        code = BAD_INPUT
-    sys.exit(code if isinstance(code, int) else 0)
+    return code if isinstance(code, int) else 0
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -101,14 +105,14 @@ def run(
     quiet: bool,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
+    from bemkit.files import reserved
     from bemkit.outputs import Outputs
 
-    with bad_input():
-        wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
-        wanted.check()
-        chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
+    wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
+    click.get_current_context().with_resource(reserved(wanted.check()))
+    chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
     is_live = not quiet and sys.stderr.isatty()
-    with bad_input(scene):
+    with concerning(scene):
         solution = _solve(chosen, cascade=cascade, is_live=is_live)
         if explain:
             from bemkit.explain import with_memory
@@ -116,8 +120,7 @@ def run(
             solution = with_memory(solution, lambda: _solve(chosen, cascade=cascade, is_live=False))
     solution = replace(solution, plan=solution.plan.with_outputs(wanted.wishes))
     begin = time.perf_counter()
-    with bad_input():
-        wanted.write(solution)
+    wanted.write(solution)
     output_seconds = time.perf_counter() - begin
     if not quiet and not wanted.uses_stdout:
         from bemkit.report import print_summary
@@ -146,13 +149,12 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    with bad_input():
-        wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
-        wanted.check()
-        solution = read_result(result)
-        wanted.write(solution)
+    wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
+    wanted.check()
+    solution = read_result(result)
+    wanted.write(solution)
     if shows_scene:
-        click.echo(scene_to_toml(solution.scene), nl=False)
+        print_data(scene_to_toml(solution.scene))
     elif wanted == Outputs():
         from bemkit.report import print_summary
 
@@ -167,7 +169,7 @@ def scenes() -> None:
     titles = shipped_scenes()
     width = max(map(len, titles))
     for name, title in titles.items():
-        click.echo(f"{name:<{width}}  {title}")
+        print(f"{name:<{width}}  {title}")
 
 
 @commands.command()
@@ -177,18 +179,18 @@ def scenes() -> None:
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
 def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.plan import make_plan, this_machine
+    from bemkit.plan import check_elements, make_plan, this_machine
     from bemkit.scene_symmetry import find_symmetry
 
-    with bad_input():
-        chosen = _load(scene, elements, discretisation)
-    with bad_input(scene):
+    chosen = _load(scene, elements, discretisation)
+    with concerning(scene):
+        check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None
         made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
     if is_json:
         import json
 
-        click.echo(json.dumps(made.as_dict(this_machine()), indent=2))
+        print(json.dumps(made.as_dict(this_machine()), indent=2))
     else:
         from bemkit.report import print_plan
 
@@ -234,10 +236,5 @@ def _path(name: str | None) -> Path | None:
     return None if name is None else Path(name)
 
 
-def _drop_stdout() -> None:
-    """Send what is still in the buffer of standard output nowhere, or the interpreter would fail on it at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _complain(message: str) -> None:
-    click.echo(f"bemkit: error: {message}", err=True)
+    print(f"bemkit: error: {printable(' '.join(message.split()))}", file=sys.stderr)

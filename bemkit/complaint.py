@@ -1,30 +1,23 @@
-"""Errors that bemkit names, turned into the one line that the command line prints."""
+"""What the command line says of an error that bemkit names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-import click
+from bemkit.errors import BemkitError
 
 
 @contextmanager
-def bad_input(prefix: str = "") -> Iterator[None]:
-    """Turn the errors that bemkit itself names into one line; anything else is a defect and keeps its traceback.
-
-    Parameters
-    ----------
-    prefix : str
-        What the line begins with, such as the name of the scene.
-
-    Raises
-    ------
-    click.ClickException
-    """
+def concerning(name: str) -> Iterator[None]:
+    """Let the complaint about an error in this context begin with a name, such as that of the scene."""
     try:
         yield
-    except (ValueError, OSError) as error:
-        if type(error).__module__.partition(".")[0] != "bemkit":
-            raise
-        message = f"{prefix}: {error}" if prefix else str(error)
-        raise click.ClickException(message) from error
+    except BemkitError as error:
+        error.add_note(name)
+        raise
+
+
+def complaint(error: BemkitError) -> str:
+    """Return the names that an error concerns, the outermost first, and its message."""
+    return ": ".join([*reversed(getattr(error, "__notes__", [])), str(error)])

@@ -10,6 +10,7 @@ from bemkit.arrays import FloatArray
 from bemkit.boundary_data import Units, find_units, nodal_forces, supports_on
 from bemkit.contact.body import ContactState
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, dof_points
 from bemkit.model import check_position, check_same_body, elastic_map, physical_fields
@@ -29,7 +30,7 @@ _STRAIGHT = 1e-9
 """A free motion that turns by less than this does not turn."""
 
 
-class FreeBodyError(ValueError):
+class FreeBodyError(InputError):
     """Supports that leave the body free to move, where no contact could hold it."""
 
 

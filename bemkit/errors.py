@@ -1,4 +1,4 @@
-"""The base of all errors that bemkit raises on purpose."""
+"""The base classes of all errors that bemkit raises on purpose."""
 
 
 class BemkitError(Exception):
@@ -7,3 +7,11 @@ class BemkitError(Exception):
     Every error class of the package derives from it, most of them from a built-in class such as ``ValueError`` as
     well. The command line prints errors of this class as one line; anything else is a defect and keeps its traceback.
     """
+
+
+class InputError(BemkitError, ValueError):
+    """A value that bemkit was given and cannot work with."""
+
+
+class NoResultError(BemkitError, RuntimeError):
+    """A calculation that ended without a result: the input is well posed, but the method did not get there."""

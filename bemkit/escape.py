@@ -56,10 +56,21 @@ def _rigid_motion(model: Model, escape: UnsolvableLoad) -> tuple[FloatArray, flo
     spin = frame[:, :, 1] * points[:, None, 0] - frame[:, :, 0] * points[:, None, 1]
     matrix = np.concatenate([frame, spin[:, :, None]], axis=2).reshape(-1, 3)
     moves = model.body.moves.ravel()  # where a support holds the tangent, that component says nothing
-    # full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle
-    velocity = escape.motion * [0.0, 1.0] if escape.is_sliding else escape.motion
-    motion = np.linalg.lstsq(matrix[moves], velocity.ravel()[moves], rcond=1e-9)[0]
+    motion = np.linalg.lstsq(matrix[moves], escape.motion.ravel()[moves], rcond=1e-9)[0]
+    if escape.is_sliding:
+        motion = _along_obstacle(matrix[::2][~np.isnan(escape.lift) & model.body.moves[:, 0]], motion)
     return motion[:2], float(motion[2])
+
+
+def _along_obstacle(normal: FloatArray, motion: FloatArray) -> FloatArray:
+    """Return the part of a motion (3,) that does not lift the nodes whose normal components are (n, 3) @ motion.
+
+    Full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle. Where it
+    cannot, as on a curved one, the motion is returned as it is.
+    """
+    lift = np.linalg.lstsq(normal, normal @ motion, rcond=1e-9)[0]
+    along = motion - lift
+    return along if np.abs(along).max() > _STRAIGHT * np.abs(motion).max() else motion
 
 
 def _direction(shift: FloatArray) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.errors import InputError
 
 MAX_LENGTH = 2000
 MAX_DEPTH = 100
@@ -83,7 +84,7 @@ _REMEDIES: Mapping[type[ast.AST], str] = MappingProxyType(
 _ALLOWED = "use numbers, x, y, pi, e, + - * / **, comparisons, and, or, not, and functions such as sqrt or where"
 
 
-class ExpressionError(ValueError):
+class ExpressionError(InputError):
     """A formula that cannot be used; the message names the formula, the offending piece and the remedy."""
 
 
@@ -192,12 +193,12 @@ def check_field(value: object, name: str) -> None:
     """
     if isinstance(value, Expression):
         if value.is_condition:
-            raise ValueError(f"{name} = '{value.text}' is a condition (true or false); give a formula for a number")
+            raise InputError(f"{name} = '{value.text}' is a condition (true or false); give a formula for a number")
     elif isinstance(value, int | float | np.number) and not isinstance(value, bool):
         if not math.isfinite(value):
-            raise ValueError(f"{name} = {value} is not finite; give a finite number")
+            raise InputError(f"{name} = {value} is not finite; give a finite number")
     elif not callable(value):
-        raise ValueError(f"{name} = {value!r} is not a number; give a number, a formula in x and y, or a function")
+        raise InputError(f"{name} = {value!r} is not a number; give a number, a formula in x and y, or a function")
 
 
 def closest(word: str, names: "tuple[str, ...] | list[str]") -> str:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-import errno
+import contextlib
+import glob
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bemkit.errors import BemkitError
+from bemkit.locks import FileLock, HeldElsewhereError
+from bemkit.printable import shown_path
 
-class OutputFileError(OSError):
+
+class OutputFileError(BemkitError, OSError):
     """A file that cannot be written; one line with its name and the remedy."""
 
 
@@ -41,15 +46,17 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
         folder = target.parent
         exists, is_file = target.exists(), target.is_file()
     except (OSError, ValueError) as error:
-        raise OutputFileError(f"{_shown(path)}: not a usable file name ({error}): choose another") from error
+        raise OutputFileError(f"{shown_path(path)}: not a usable file name ({error}): choose another") from error
     if not folder.is_dir():
-        raise OutputFileError(f"{_shown(path)}: the folder {_shown(folder)} does not exist: create it first")
+        raise OutputFileError(f"{shown_path(path)}: the folder {shown_path(folder)} does not exist: create it first")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputFileError(f"{_shown(path)}: no permission to write in {_shown(folder)}: choose another folder")
+        raise OutputFileError(
+            f"{shown_path(path)}: no permission to write in {shown_path(folder)}: choose another folder"
+        )
     if exists and not is_file:
-        raise OutputFileError(f"{_shown(path)}: exists and is not a file: choose another name")
+        raise OutputFileError(f"{shown_path(path)}: exists and is not a file: choose another name")
     if exists and not is_own(target):
-        raise OutputFileError(f"{_shown(path)}: exists and is not a {kind}: choose another name or delete it first")
+        raise OutputFileError(f"{shown_path(path)}: exists and is not a {kind}: choose another name or delete it first")
     return target
 
 
@@ -64,43 +71,101 @@ def replacing(target: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        A file that does not exist yet. It is removed again if the body of the ``with`` statement raises anything,
-        an interrupt included; the target is then untouched.
+        An empty file. It is removed again if the body of the ``with`` statement raises anything, an interrupt
+        included; the target is then untouched. What a process that was killed in here left behind is removed by the
+        next one: the system has dropped its lock on the temporary file.
 
     Raises
     ------
     OutputFileError
         If the system refuses, for example because the disk is full.
     """
-    temporary = target.with_name(f".{target.name[:100]}.{uuid.uuid4().hex}.tmp")
+    _remove_leftovers(target)
+    temporary = target.with_name(_hidden(target, f"{uuid.uuid4().hex}.tmp"))
     try:
-        yield temporary
-        _flush(temporary)
-        os.replace(temporary, target)
+        with contextlib.closing(FileLock(temporary, waits=True)):
+            yield temporary
+            _flush(temporary)
+            os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OutputFileError(f"{_shown(target)}: cannot be written ({reason}): choose another place") from error
+        raise OutputFileError(f"{shown_path(target)}: cannot be written ({reason}): choose another place") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def check_room(folder: Path, n_bytes: int) -> None:
+@contextmanager
+def reserved(targets: Iterable[Path]) -> Iterator[None]:
+    """Keep files for this process while it computes what it will write to them.
+
+    Parameters
+    ----------
+    targets : iterable of Path
+        From `check_target`.
+
+    Raises
+    ------
+    OutputFileError
+        If another process has reserved one of them, or the system refuses.
+    """
+    with contextlib.ExitStack() as stack:
+        for target in targets:
+            stack.enter_context(_reserved(target))
+        yield
+
+
+@contextmanager
+def _reserved(target: Path) -> Iterator[None]:
+    path = target.with_name(_hidden(target, "lock"))
+    try:
+        lock = FileLock(path)
+    except HeldElsewhereError as error:
+        raise OutputFileError(
+            f"{shown_path(target)}: another process is computing what it will write there: wait for it to end, or "
+            "choose another name"
+        ) from error
+    except OSError as error:
+        raise OutputFileError(f"{shown_path(target)}: cannot be written ({error.strerror}): choose another") from error
+    with contextlib.closing(lock):
+        _remove_leftovers(target)
+        try:
+            yield
+        finally:
+            if path.stat().st_size == 0:  # otherwise it is no lock of ours
+                path.unlink()
+
+
+def _hidden(target: Path, ending: str) -> str:
+    return f".{target.name[:100]}.{ending}"
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove temporary files of the target that no living process holds."""
+    name = glob.escape(_hidden(target, ""))
+    for path in target.parent.glob(f"{name}{'[0-9a-f]' * 32}.tmp"):
+        with contextlib.suppress(OSError), contextlib.closing(FileLock(path, may_create=False)) as lock:
+            if lock.is_sure:
+                path.unlink()
+
+
+def check_room(target: Path, n_bytes: int) -> None:
     """Find out whether a large file fits on the disk, for libraries that do not survive when it runs full.
 
     Parameters
     ----------
-    folder : Path
+    target : Path
     n_bytes : int
         Size of the file.
 
     Raises
     ------
-    OSError
-        If there is less room; `replacing` turns it into an `OutputFileError`.
+    OutputFileError
+        If there is less room.
     """
-    free = shutil.disk_usage(folder).free
+    free = shutil.disk_usage(target.parent).free
     if free < n_bytes:
-        raise OSError(errno.ENOSPC, f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free")
+        sizes = f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free"
+        raise OutputFileError(f"{shown_path(target)}: {sizes}: choose another place")
 
 
 def _flush(path: Path) -> None:
@@ -110,7 +175,3 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _shown(path: Path) -> str:
-    return "".join(character if character.isprintable() else "?" for character in str(path))[:200]

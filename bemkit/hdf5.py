@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import BufferedRandom, BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,17 +13,23 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.files import replacing
+from bemkit.printable import printable, shown_path
 
 if TYPE_CHECKING:
     import h5py
 
 _MAX_TEXT = 10_000
 _MAX_ENTRIES_PER_GROUP = 1000
-_SEAL = "sha256"
+_HDF5 = b"\x89HDF"
+USER_BLOCK = 512
+"""Bytes before the HDF5 content, which HDF5 programs pass over."""
+MARK = b"bemkit result or rows\n"
+"""First line of the user block; the second is the SHA-256 of the HDF5 content in hexadecimal digits."""
 
 
-class ResultFileError(ValueError):
+class ResultFileError(InputError):
     """A result file that cannot be read; one line with its name and the remedy."""
 
 
@@ -74,13 +81,34 @@ def created(target: Path) -> Iterator[h5py.File]:
     import h5py
 
     with replacing(target) as temporary:
-        with h5py.File(temporary.name, "w", driver="core", backing_store=False) as file:
+        with h5py.File(temporary.name, "w", driver="core", backing_store=False, userblock_size=USER_BLOCK) as file:
             yield file
             file.flush()
-            file.attrs[_SEAL] = Reader("the new file", file.id.get_filesize(), file).checksum()
-            file.flush()
             image = file.id.get_file_image()
-        temporary.write_bytes(image)
+        temporary.write_bytes(bytes(USER_BLOCK) + image)  # the image begins after the user block
+        seal(temporary, MARK)
+
+
+def seal(path: Path, mark: bytes) -> None:
+    """Write the checksum of the HDF5 content of a file into the block before it.
+
+    Parameters
+    ----------
+    path : Path
+        A file with a user block.
+    mark : bytes
+        First line of the block, by which such files are known.
+    """
+    with path.open("r+b") as stream:
+        stream.write(_user_block(stream, mark))
+
+
+def _user_block(stream: BufferedReader | BufferedRandom, mark: bytes) -> bytes:
+    """Return what the block before the HDF5 content must be, and go back to the beginning of the file."""
+    stream.seek(USER_BLOCK)
+    digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    stream.seek(0)
+    return (mark + digest.encode()).ljust(USER_BLOCK, b"\0")
 
 
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
@@ -93,7 +121,7 @@ def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
 
 
 @contextmanager
-def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
+def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> Iterator[Reader]:
     """Open an HDF5 file for careful reading.
 
     Parameters
@@ -101,6 +129,8 @@ def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
     path : Path
     made_by : str
         The command that writes such files, for messages.
+    mark : bytes
+        First line of the user block.
 
     Yields
     ------
@@ -109,17 +139,23 @@ def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
     Raises
     ------
     ResultFileError
-        If the file is missing, unreadable, or not HDF5.
+        If the file is missing, unreadable, not one of bemkit, or not as it was written.
+
+    Notes
+    -----
+    The HDF5 library may crash or never come back on a damaged file, or be busy for long with a huge one. It is handed
+    nothing but content that matches its checksum.
     """
     import h5py
 
-    name = "".join(character if character.isprintable() else "?" for character in str(path))[:200]
+    name = shown_path(path)
     try:
         size = path.stat().st_size if path.is_file() else None
         if size is None:
             problem = "not a file" if path.exists() else "no such file"
             raise ResultFileError(f"{name}: {problem}: give a file written by '{made_by}'")
-        file = h5py.File(str(path), "r")
+        _check_seal(path, mark, made_by)
+        file = h5py.File(str(path), "r", locking=False)  # files are replaced as a whole, never changed
     except (OSError, ValueError) as error:
         if isinstance(error, ResultFileError):
             raise
@@ -127,6 +163,19 @@ def opened(path: Path, made_by: str = "bemkit run -o") -> Iterator[Reader]:
         raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by '{made_by}'") from error
     with file:
         yield Reader(name, size, file)
+
+
+def _check_seal(path: Path, mark: bytes, made_by: str) -> None:
+    name = shown_path(path)
+    with path.open("rb") as stream:
+        block = stream.read(USER_BLOCK)
+        if not block.startswith(mark):
+            kind = "an HDF5 file, but not of bemkit" if block.startswith(_HDF5) else "not an HDF5 file, or a broken one"
+            raise ResultFileError(f"{name}: {kind}: give a file written by '{made_by}'")
+        if block != _user_block(stream, mark):
+            raise ResultFileError(
+                f"{name}: its content does not match its checksum: the file is damaged, run its scene again"
+            )
 
 
 class Reader:
@@ -170,10 +219,7 @@ class Reader:
             values = dict(attributes.items())
         except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
             raise self.error(f"attributes of {group} cannot be read") from error
-        return {
-            name: value[:_MAX_TEXT] if isinstance(value, str) else value.item() if hasattr(value, "item") else value
-            for name, value in values.items()
-        }
+        return {name: _plain(value) for name, value in values.items()}
 
     def has(self, path: str) -> bool:
         """Whether there is something at a path."""
@@ -210,45 +256,12 @@ class Reader:
         columns: dict[str, Any] = {}
         for name in texts:
             stored = self._array(f"{group}/{name}", "S")
-            columns[name] = [self._decoded(f"{group}/{name}", item) for item in stored.ravel().tolist()]
+            columns[name] = [printable(self._decoded(f"{group}/{name}", item)) for item in stored.ravel().tolist()]
         columns |= {name: self.floats(f"{group}/{name}") for name in floats}
         columns |= {name: self.integers(f"{group}/{name}") for name in integers}
         if len({len(column) for column in columns.values()}) > 1:
             raise self.error(f"the columns of {group} differ in length")
         return columns
-
-    def check_seal(self) -> None:
-        """Compare the content of the file with the checksum that `created` stored.
-
-        Raises
-        ------
-        ResultFileError
-            If they differ: a bit has changed somewhere.
-        """
-        if self.attributes("/").get(_SEAL) != self.checksum():
-            raise self.error("its content does not match its checksum")
-
-    def checksum(self) -> str:
-        """Return the SHA-256 of all names, attributes and arrays of the file in hexadecimal digits."""
-        import h5py
-
-        names: list[str] = ["/"]
-        try:
-            self._file.visit(names.append)
-            groups = [name for name in names if isinstance(self._file[name], h5py.Group)]
-        except (OSError, RuntimeError, KeyError, ValueError) as error:
-            raise self.error("its list of contents cannot be read") from error
-        total = hashlib.sha256()
-        for name in sorted(names):
-            total.update(name.encode("utf-8", "surrogateescape"))
-            if name in groups:
-                attributes = {key: value for key, value in self.attributes(name).items() if key != _SEAL}
-                total.update(repr(sorted(attributes.items())).encode("utf-8", "surrogateescape"))
-            else:
-                stored = self._array(name, None)
-                total.update(f"{stored.dtype.str}{stored.shape}".encode())
-                total.update(stored.tobytes())
-        return total.hexdigest()
 
     def _decoded(self, path: str, stored: bytes) -> str:
         try:
@@ -302,3 +315,10 @@ class Reader:
         except (OSError, RuntimeError, KeyError) as error:
             raise self.error(f"{path} cannot be read") from error
         return found
+
+
+def _plain(value: Any) -> Any:
+    """Return an attribute as a printable text or a number of Python."""
+    if isinstance(value, str):
+        return printable(value[:_MAX_TEXT])
+    return value.item() if hasattr(value, "item") else value

@@ -3,7 +3,7 @@
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
 stranger runs no code. The layout, version 1:
 
-    /                attributes format = "bemkit-result", schema_version, and sha256: a checksum of all the rest
+    /                attributes format = "bemkit-result" and schema_version
     /scene           text, the scene as TOML
     /provenance, /summary, /certificate, /timings, /memory     attributes
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
@@ -28,6 +28,7 @@ import numpy as np
 
 import bemkit
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
 from bemkit.files import OutputFileError, check_target
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
@@ -135,7 +136,6 @@ def read_result(path: str | Path) -> Solution:
             solution = _read_solution(reader, scene)
         except (ValueError, KeyError, OverflowError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
-        reader.check_seal()
     return solution
 
 
@@ -216,7 +216,7 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
     boundary = BoundaryFields(*(reader.floats(f"boundary/{name}") for name in _BOUNDARY))
     if len(boundary.centres) != mesh.n_elements:
-        raise ValueError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
+        raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return Solution(
         scene=scene,
         mesh=mesh,

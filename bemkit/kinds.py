@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 
+from bemkit.errors import InputError
 from bemkit.expression import closest, shorten
 
 
@@ -43,7 +44,7 @@ class Family:
         if kind in installed:
             return self._load(installed[kind])
         known = [*self.built_in, *installed]
-        raise ValueError(
+        raise InputError(
             f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{closest(kind, known)}"
         )
 
@@ -63,7 +64,7 @@ class Family:
             if kind not in self.built_in and self._load(point) is type(value):
                 return kind
         hint = f"register it under the entry-point group '{self.group}'" if self.group else "use a built-in one"
-        raise ValueError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
+        raise InputError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
 
     def _installed(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=self.group)} if self.group else {}
@@ -72,9 +73,9 @@ class Family:
         try:
             loaded = point.load()
         except (ImportError, AttributeError) as error:
-            raise ValueError(f"{self.role} '{point.name}' ({point.value}) cannot be loaded: {error}") from error
+            raise InputError(f"{self.role} '{point.name}' ({point.value}) cannot be loaded: {error}") from error
         if not (isinstance(loaded, type) and is_dataclass(loaded)):
-            raise ValueError(f"{self.role} '{point.name}' ({point.value}) is not a dataclass: make it one")
+            raise InputError(f"{self.role} '{point.name}' ({point.value}) is not a dataclass: make it one")
         return loaded
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
+from bemkit.errors import InputError
 from bemkit.geometry.discretise import discretise
 from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
@@ -61,26 +62,26 @@ class MeshOptions:
             self._check_without_accuracy()
             return
         if self.elements is not None:
-            raise ValueError(
+            raise InputError(
                 f"elements is {self.elements} and accuracy is {self.accuracy}: give one of them, the other follows"
             )
         if self.grading != Uniform() or self.density:
-            raise ValueError(f"accuracy is {self.accuracy}: leave out grading and density, they follow the solution")
+            raise InputError(f"accuracy is {self.accuracy}: leave out grading and density, they follow the solution")
         if not 0.0 < self.accuracy < 1.0:
-            raise ValueError(f"accuracy is {self.accuracy}: give a relative error between 0 and 1, such as 1e-3")
+            raise InputError(f"accuracy is {self.accuracy}: give a relative error between 0 and 1, such as 1e-3")
         if self.most_elements is not None and not FIRST_ELEMENTS <= self.most_elements <= 1_000_000:
-            raise ValueError(f"most_elements is {self.most_elements}: give a number from {FIRST_ELEMENTS} to 1000000")
+            raise InputError(f"most_elements is {self.most_elements}: give a number from {FIRST_ELEMENTS} to 1000000")
         if self.most_seconds is not None and not self.most_seconds > 0.0:
-            raise ValueError(f"most_seconds is {self.most_seconds}: give a positive time")
+            raise InputError(f"most_seconds is {self.most_seconds}: give a positive time")
 
     def _check_without_accuracy(self) -> None:
         for name in ("most_elements", "most_seconds"):
             if getattr(self, name) is not None:
-                raise ValueError(f"{name} is {getattr(self, name)}: it limits an accuracy, which is not given")
+                raise InputError(f"{name} is {getattr(self, name)}: it limits an accuracy, which is not given")
         if self.elements is None:
             object.__setattr__(self, "elements", DEFAULT_ELEMENTS)
         elif not 3 <= self.elements <= 1_000_000:
-            raise ValueError(f"elements is {self.elements}: give a number from 3 to 1000000")
+            raise InputError(f"elements is {self.elements}: give a number from 3 to 1000000")
 
     @property
     def n_elements(self) -> int:

@@ -19,6 +19,7 @@ from bemkit.contact.condensation import CondensedBody, ContactNodes, condense
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact_data import ContactData, find_contact
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import dof_points
@@ -35,7 +36,7 @@ _FARTHEST = 1e7
 """Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
 
 
-class TooFarError(ValueError):
+class TooFarError(InputError):
     """A body whose coordinates are so large that they no longer hold its shape."""
 
 
@@ -249,11 +250,11 @@ def check_same_body(scene: Scene, other: Scene) -> None:
     """Refuse another scene whose matrices would be others."""
     for name in ("shape", "material", "symmetry", "discretisation"):
         if getattr(scene, name) != getattr(other, name):
-            raise ValueError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
+            raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
     for part, changed in zip_longest(scene.parts, other.parts):
         if part is None or changed is None or _layout(part) != _layout(changed):
             name = (part or changed).name
-            raise ValueError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
+            raise InputError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
 
 
 def _layout(part: Part) -> tuple[object, ...]:

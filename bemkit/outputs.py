@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from bemkit.files import OutputFileError, check_target, replacing
 from bemkit.plan import Wishes
 from bemkit.solution import Solution
+from bemkit.streams import print_data
 from bemkit.tables import CSV_STARTS, to_json, write_csv
 
 if TYPE_CHECKING:
@@ -53,8 +53,13 @@ class Outputs:
         """What of this a plan knows."""
         return Wishes(result_file=self.result is not None, figures=self.plots is not None)
 
-    def check(self) -> None:
+    def check(self) -> list[Path]:
         """Find out, before any work is done, whether everything can be written.
+
+        Returns
+        -------
+        list of Path
+            The files, to be reserved.
 
         Raises
         ------
@@ -64,7 +69,7 @@ class Outputs:
         """
         if self.result == Path(STDOUT):
             raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
-        targets: list[str | Path] = [STDOUT for text in (self.json, self.csv) if text == STDOUT]
+        targets: list[Path] = []
         if self.result is not None:
             from bemkit.io import check_result_target
 
@@ -73,11 +78,12 @@ class Outputs:
             targets.append(check_target(Path(str(self.json)), "JSON file", _is_json))
         if self.csv not in (None, STDOUT):
             targets.append(check_target(Path(str(self.csv)), f"CSV file of the {self.table} table", self._is_csv))
-        if len(set(targets)) < len(targets):
+        if len(set(targets)) < len(targets) or self.json == self.csv == STDOUT:
             shown = ", ".join(str(place) for place in (self.result, self.json, self.csv) if place is not None)
             raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
         if self.plots is not None:
             check_figures(self.plots, "deformation.png")
+        return targets
 
     def write(self, solution: Solution) -> None:
         """Write everything that is wanted.
@@ -186,7 +192,7 @@ def check_text(place: str | None, kind: str, start: str) -> None:
 def write_text(place: str, text: str) -> None:
     """Write a text to a file, all or nothing, or to standard output if the place is ``"-"``."""
     if place == STDOUT:
-        sys.stdout.write(text)
+        print_data(text)
         return
     with replacing(Path(place).resolve()) as temporary:
         temporary.write_text(text, encoding="utf-8")

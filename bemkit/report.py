@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.errors import InputError
 from bemkit.kinds import DISCRETISATIONS, SOLVERS
 from bemkit.plan import Machine, Plan
 from bemkit.solution import Solution
@@ -172,7 +173,7 @@ def _nan_first(value: float) -> float:
 def _solver_name(solution: Solution) -> str:
     try:
         return SOLVERS.kind_of(solution.scene.solver)
-    except ValueError:  # a class of one's own
+    except InputError:  # a class of one's own
         return type(solution.scene.solver).__name__
 
 

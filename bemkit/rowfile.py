@@ -94,7 +94,6 @@ class RowFile(Generic[Row]):
                 self.row(**{name: types[name](value) for name, value in zip(columns, values, strict=True)})
                 for values in zip(*columns.values(), strict=True)
             )
-            reader.check_seal()
         return labels, rows
 
     def finished(self, path: str | Path, labels: Mapping[str, str]) -> tuple[Row, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact_warnings import contact_warnings
 from bemkit.elasticity import ElasticModel, build_elastic_model
 from bemkit.energy import with_energy_checked
+from bemkit.errors import BemkitError, InputError
 from bemkit.escape import describe_escape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import dof_points
@@ -24,7 +25,7 @@ from bemkit.history import load_steps
 from bemkit.model import Model, build_model
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.operators.threads import blas_threads_for
-from bemkit.plan import Plan, Stage, check_memory, make_plan
+from bemkit.plan import Plan, Stage, check_elements, check_memory, make_plan
 from bemkit.scene import NoContactError, Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
 from bemkit.solution_warnings import find_warnings
@@ -34,11 +35,11 @@ from bemkit.totals import with_totals
 from bemkit.warm_start import state_on
 
 
-class UnsolvableSceneError(ValueError):
+class UnsolvableSceneError(InputError):
     """The scene has no solution; the message says why."""
 
 
-class LoadHistoryError(ValueError):
+class LoadHistoryError(InputError):
     """A load history where only a single load makes sense."""
 
 
@@ -116,9 +117,11 @@ def run_history(
     """
     steps = [step for scene in scenes for step in load_steps(scene)]
     if not steps:
-        raise ValueError("scenes is empty: give at least one scene")
+        raise InputError("scenes is empty: give at least one scene")
     clock = StageClock.start()
-    mesh = steps[0].build_mesh() if mesh is None else mesh
+    if mesh is None:
+        check_elements(steps[0])
+        mesh = steps[0].build_mesh()
     plan = make_plan(scenes[0], mesh, steps=steps)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
@@ -210,6 +213,10 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
     points = dof_points(model.elastic.displacement_space, model.mesh)
     fields = BoundaryFields(points, displacement, model.mesh.centres.copy(), traction)
     clock = clock.closed(Stage.RECOVER)
+    if result.is_converged and not (
+        np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction).all()
+    ):
+        result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
     solution = Solution(
         scene=model.scene,
         mesh=model.mesh,
@@ -275,10 +282,17 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     if len(scene.load_factors) > 1:
         raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
     clock = StageClock.start()
-    mesh = scene.build_mesh() if mesh is None else mesh
+    if mesh is None:
+        check_elements(scene)
+        mesh = scene.build_mesh()
     plan = make_plan(scene, mesh)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
+    with blas_threads_for(plan.sizes.n_displacements):
+        return _probed(scene, mesh, plan, n_starts, clock)
+
+
+def _probed(scene: Scene, mesh: BoundaryMesh, plan: Plan, n_starts: int, clock: StageClock) -> tuple[Solution, ...]:
     with assembly_time() as assembly:
         model = build_model(scene, mesh, plan=plan)
     clock = clock.closed_build(assembly)
@@ -291,7 +305,27 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     return tuple(_solution(model, result, plan, clock) for result in found if result.is_converged)
 
 
-def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution]:
+@dataclass(frozen=True)
+class FailedRun:
+    """Stands in a list of solutions for a scene that has none.
+
+    Parameters
+    ----------
+    scene : Scene
+    error : BemkitError
+        What `run` raised; its message names the remedy.
+    """
+
+    scene: Scene
+    error: BemkitError
+
+    @property
+    def is_converged(self) -> bool:
+        """False, as of a solution that is none."""
+        return False
+
+
+def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution | FailedRun]:
     """Solve several scenes, on any `concurrent.futures.Executor` if one is given.
 
     Parameters
@@ -303,10 +337,17 @@ def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[S
 
     Returns
     -------
-    list of Solution
-        In the order of the scenes.
+    list of Solution or FailedRun
+        In the order of the scenes. A scene that is refused, such as one that nothing holds, is a `FailedRun`.
     """
-    return list(map(run, scenes)) if executor is None else list(executor.map(run, scenes))
+    return list(map(_attempt, scenes)) if executor is None else list(executor.map(_attempt, scenes))
+
+
+def _attempt(scene: Scene) -> Solution | FailedRun:
+    try:
+        return run(scene)
+    except BemkitError as error:
+        return FailedRun(scene, error.with_traceback(None))  # whose frames hold matrices
 
 
 def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:

@@ -22,6 +22,7 @@ from bemkit.discretisations import ConstantCollocation as ConstantCollocation
 from bemkit.discretisations import Discretisation as Discretisation
 from bemkit.discretisations import LinearGalerkin as LinearGalerkin
 from bemkit.discretisations import QuadraticGalerkin as QuadraticGalerkin
+from bemkit.errors import InputError
 from bemkit.expression import Expression, ScalarField, check_field, closest, evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
@@ -41,7 +42,7 @@ LARGEST_KRYLOV_ERROR = 1e-4
 """Largest relative error of conjugate gradients: energies and forces on the contact boundary err by its square."""
 
 
-class NoContactError(ValueError):
+class NoContactError(InputError):
     """A question about contact, asked of a scene without any."""
 
 
@@ -74,7 +75,7 @@ class PrescribedDisplacement:
 
     def __post_init__(self) -> None:
         if self.x is None and self.y is None:
-            raise ValueError("neither x nor y is given: give at least one displacement component, such as y = -0.01")
+            raise InputError("neither x nor y is given: give at least one displacement component, such as y = -0.01")
         for name in ("x", "y"):
             if getattr(self, name) is not None:
                 check_field(getattr(self, name), name)
@@ -195,9 +196,9 @@ class Part:
 
     def __post_init__(self) -> None:
         if not self.name or not self.name.isprintable():
-            raise ValueError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
+            raise InputError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
         if isinstance(self.where, Expression) and not self.where.is_condition:
-            raise ValueError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
+            raise InputError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
 
     @property
     def selection(self) -> Selection:
@@ -261,14 +262,14 @@ class Scene:
 
     def __post_init__(self) -> None:
         if not self.title or not self.title.isprintable():
-            raise ValueError(f"title is {self.title!r}: give one line of printable text")
+            raise InputError(f"title is {self.title!r}: give one line of printable text")
         repeated = [name for name, count in Counter(part.name for part in self.parts).items() if count > 1]
         if repeated:
-            raise ValueError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
+            raise InputError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
         if not self.contact_parts:
             self._check_without_contact()
         if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
-            raise ValueError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
         if isinstance(self.linear_solver, Krylov):
             self._check_krylov(self.linear_solver)
         if self.mesh.accuracy is not None:
@@ -278,38 +279,38 @@ class Scene:
             for side in part.sides:
                 if side not in names:
                     listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-                    raise ValueError(
+                    raise InputError(
                         f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
                     )
 
     def _check_without_contact(self) -> None:
         for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
             if getattr(self, name) != default:
-                raise ValueError(
+                raise InputError(
                     f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
                     "part the condition 'contact' with an obstacle"
                 )
 
     def _check_krylov(self, solver: Krylov) -> None:
         if isinstance(self.discretisation, ConstantCollocation):
-            raise ValueError(
+            raise InputError(
                 f"linear_solver is {solver}, which needs symmetric equations, and those of collocation are not: choose "
                 "the discretisation 'linear' or 'quadratic', or leave the linear solver out"
             )
         if (error := solver.error_at(self.material)) > LARGEST_KRYLOV_ERROR:
-            raise ValueError(
+            raise InputError(
                 f"linear_solver is {solver} at the Poisson ratio {self.material.poisson_ratio}, where its rtol leaves "
                 f"errors of {error:.0e}: choose 'direct', or leave the linear solver out"
             )
 
     def _check_accuracy(self, accuracy: float) -> None:
         if isinstance(self.discretisation, ConstantCollocation):
-            raise ValueError(
+            raise InputError(
                 f"mesh.accuracy is {accuracy}: collocation has no error estimate: choose the discretisation "
                 "'quadratic' or 'linear', or give elements"
             )
         if len(self.load_factors) > 1:
-            raise ValueError(
+            raise InputError(
                 f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
                 "belongs to one mesh: give elements"
             )

@@ -12,6 +12,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.obstacle import measure_contact
+from bemkit.errors import InputError
 from bemkit.geometry.division import divide
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
@@ -86,7 +87,7 @@ def find_symmetry(scene: Scene) -> Symmetry | None:
         samples = _samples(whole.mesh)
         x, y = whole.mesh.centre.tolist()
         has_x, has_y = (whole.difference(line, samples) is None for line in (Symmetry(x=x), Symmetry(y=y)))
-    except ValueError:  # the model says better what is wrong
+    except InputError:  # the model says better what is wrong
         return None
     return Symmetry(x if has_x else None, y if has_y else None) if has_x or has_y else None
 

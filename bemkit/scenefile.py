@@ -11,9 +11,11 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, cast
 
+from bemkit.errors import InputError
 from bemkit.expression import closest
 from bemkit.kinds import SOLVERS
 from bemkit.mesh_options import MeshOptions
+from bemkit.printable import printable
 from bemkit.scene import Discretisation, Scene
 from bemkit.shipped import shipped_files
 from bemkit.solvers.base import ContactSolver
@@ -29,7 +31,7 @@ _SCENE_KEYS = (
 _PART_KEYS = ("sides", "where", "condition")
 
 
-class SceneError(ValueError):
+class SceneError(InputError):
     """A scene that cannot be read, understood or written; one line with file, key, value and remedy."""
 
 
@@ -51,7 +53,7 @@ def load_scene(source: str | Path) -> Scene:
         If there is no such file or scene, or its content is not a valid scene.
     """
     shipped = shipped_files()
-    name = _one_line(str(source))[:200] or "''"
+    name = printable(str(source))[:200] or "''"
     file: Traversable = shipped[str(source)] if str(source) in shipped else Path(source)
     try:
         with file.open("rb") as stream:
@@ -92,15 +94,15 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
         If the text is not TOML, or not a valid scene.
     """
     try:
-        table = tomllib.loads(text)
+        table = tomllib.loads(text.removeprefix("\ufeff"))  # the byte order mark that some editors write
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{name}: not valid TOML: {_one_line(str(error))}") from None
+        raise SceneError(f"{name}: not valid TOML: {printable(str(error))}") from None
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
         raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
     try:
         return structure(table, Scene)
     except StructureError as error:
-        raise SceneError(f"{name}: {_one_line(str(error))}") from error
+        raise SceneError(f"{name}: {printable(str(error))}") from error
 
 
 def scene_to_toml(scene: Scene) -> str:
@@ -178,7 +180,7 @@ def with_overrides(
         if rho is not None:
             scene = replace(scene, solver=_with_rho(scene.solver, rho))
     except (StructureError, ValueError) as error:
-        raise SceneError(_one_line(str(error))) from error
+        raise SceneError(printable(str(error))) from error
     return scene
 
 
@@ -191,7 +193,3 @@ def _with_rho(solver: Any, rho: float) -> Any:
 
 def _ordered(table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
     return {key: table[key] for key in keys if table.get(key, "") != ""}
-
-
-def _one_line(text: str) -> str:
-    return "".join(character if character.isprintable() else " " for character in text)

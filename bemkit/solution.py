@@ -16,6 +16,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
 from bemkit.estimate import squared_errors
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.work import Work
@@ -77,11 +78,11 @@ class ContactTable:
     def __post_init__(self) -> None:
         for name, column in self.columns().items():
             if column.shape != (len(self.part),):
-                raise ValueError(f"{name} has the shape {column.shape}: give ({len(self.part)},), one entry per node")
+                raise InputError(f"{name} has the shape {column.shape}: give ({len(self.part)},), one entry per node")
             read_only(column)
         wrong = np.flatnonzero(~np.isin(self.status, [int(status) for status in NodeStatus]))
         if wrong.size:
-            raise ValueError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
+            raise InputError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
 
     @classmethod
     def empty(cls) -> ContactTable:
@@ -133,7 +134,7 @@ class BoundaryFields:
             for name in (place, value):
                 array = getattr(self, name)
                 if array.shape != shape:
-                    raise ValueError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
+                    raise InputError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
                 read_only(array)
 
 

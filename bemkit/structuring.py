@@ -21,6 +21,7 @@ from cattrs.gen import make_dict_structure_fn
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
+from bemkit.errors import BemkitError, InputError
 from bemkit.expression import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
@@ -56,15 +57,15 @@ _MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
 )
 
 
-class StructureError(ValueError):
+class StructureError(InputError):
     """A table that does not describe the wanted object; the message is ``key: value: remedy``."""
 
 
-class UnstructureError(ValueError):
+class UnstructureError(InputError):
     """An object that cannot be written as a table."""
 
 
-class _LocatedError(Exception):
+class _LocatedError(BemkitError):
     """An error met below a key."""
 
     def __init__(self, key: str, cause: Exception) -> None:
@@ -155,7 +156,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         return table
     try:
         kind = family.kind_of(value)
-    except ValueError as error:
+    except InputError as error:
         raise UnstructureError(f"{path}: {error}") from error
     return {"kind": kind, **table} if table else kind
 
@@ -211,25 +212,25 @@ def _is_class(wanted: Any, parent: type) -> bool:
 
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{_show(value)} is not a number: give a number such as 0.5")
+        raise InputError(f"{_show(value)} is not a number: give a number such as 0.5")
     try:
         number = float(value)
     except OverflowError:
         number = math.nan
     if math.isnan(number):
-        raise ValueError(f"{_show(value)} is not a usable number: give a number such as 0.5")
+        raise InputError(f"{_show(value)} is not a usable number: give a number such as 0.5")
     return number
 
 
 def _integer(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise ValueError(f"{_show(value)} is not a whole number: give one such as 320")
+        raise InputError(f"{_show(value)} is not a whole number: give one such as 320")
     return value
 
 
 def _exactly(value: object, wanted: type[T], description: str) -> T:
     if not isinstance(value, wanted):
-        raise ValueError(f"{_show(value)} does not fit: give {description}")
+        raise InputError(f"{_show(value)} does not fit: give {description}")
     return value
 
 
@@ -244,7 +245,7 @@ def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
     if len(inner) == 2 and inner[1] is Ellipsis:
         inner = (inner[0],) * len(items)
     if len(items) != len(inner):
-        raise ValueError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
+        raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
     return tuple(
         _at(f"[{index}]", converter.structure, item, kind)
         for index, (item, kind) in enumerate(zip(items, inner, strict=True))
@@ -261,7 +262,7 @@ def _enum(value: object, wanted: type[Enum]) -> Enum:
     for member in wanted:
         if member.value == value:
             return member
-    raise ValueError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
+    raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
 
 
 def _options(wanted: Any) -> tuple[Any, ...]:
@@ -280,7 +281,7 @@ def _one_of(converter: Converter, value: object, wanted: Any) -> Any:
     for option in options:
         if _fits(value, option):
             return converter.structure(value, option)
-    raise ValueError(f"{_show(value)} does not fit: give {' or '.join(_name(option) for option in options)}")
+    raise InputError(f"{_show(value)} does not fit: give {' or '.join(_name(option) for option in options)}")
 
 
 def _fits(value: object, option: Any) -> bool:
@@ -324,7 +325,7 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
         value = {"kind": value}
     table = _exactly(value, dict, f"a {family.role} as a word or as a table with its kind")
     if "kind" not in table:
-        raise ValueError(f"kind is missing: add kind = one of {', '.join(family.built_in)}")
+        raise InputError(f"kind is missing: add kind = one of {', '.join(family.built_in)}")
     kind = _at("kind", _exactly, table["kind"], str, "a text")
     found = _at("kind", family.find, kind)
     return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
@@ -338,7 +339,7 @@ def _parts(converter: Converter, value: object) -> tuple[Part, ...]:
 def _part(converter: Converter, name: str, value: object) -> Part:
     table = _exactly(value, dict, "a table with sides and condition")
     if "name" in table:
-        raise ValueError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
+        raise InputError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
     return converter.structure({"name": name, **table}, Part)
 
 

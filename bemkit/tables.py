@@ -14,6 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
 from bemkit.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -45,7 +46,7 @@ def write_csv(solution: Solution, table: str, stream: IO[str]) -> None:
         If there is no table of that name.
     """
     if table not in TABLES:
-        raise ValueError(f"table is {table!r}: give one of {', '.join(TABLES)}")
+        raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     columns = _columns(solution, table)
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)

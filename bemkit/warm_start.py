@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.contact.body import ContactState
+from bemkit.errors import InputError
 from bemkit.model import Model
 from bemkit.solution import Solution
 
@@ -40,7 +41,7 @@ def state_on(model: Model, solution: Solution) -> ContactState:
     for part in dict.fromkeys(parts):
         known = np.flatnonzero([name == part for name in table.part])
         if not known.size:
-            raise ValueError(f"the start has no contact part {part!r}: it has {', '.join(dict.fromkeys(table.part))}")
+            raise InputError(f"the start has no contact part {part!r}: it has {', '.join(dict.fromkeys(table.part))}")
         own = np.flatnonzero([name == part for name in parts])
         known = known[np.argsort(table.s[known])]
         for name, scale in scales.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import pytest
 
@@ -98,3 +99,41 @@ def test_a_free_disc_finds_its_rest_on_friction_alone() -> None:
     motions = model.body.rigid_motions().reshape(3, -1)
     # curved elements would otherwise leave 1e-6 of the stiffness on rigid motions
     assert abs(model.body.dense.stiffness @ motions.T).max() <= 1e-12 * abs(model.body.dense.stiffness).max()
+
+
+def foot(push: float, law: bk.FrictionLaw, centre: tuple[float, float]) -> bk.Scene:
+    """A column of which one or two nodes at a corner of the foot see a round obstacle."""
+    return bk.Scene(
+        title="column",
+        shape=bk.Rectangle(1.0, 2.0),
+        material=bk.Material(3700.0, 0.3),
+        discretisation=bk.ConstantCollocation(),
+        mesh=bk.MeshOptions(elements=24),
+        law=law,
+        parts=(
+            bk.Part("foot", bk.Contact(bk.Circle(centre, 0.4)), sides=("bottom",)),
+            bk.Part("load", bk.Traction(y=-1.0), sides=("top",)),
+            bk.Part("push", bk.Traction(x=push), sides=("left",)),
+        ),
+    )
+
+
+@pytest.mark.parametrize("law", [bk.Frictionless(), bk.Coulomb(0.3), bk.Tresca(0.01), bk.Coulomb(50.0)], ids=repr)
+@pytest.mark.parametrize("push", [-1.0, 0.0, 0.001, 1.0])
+@pytest.mark.parametrize("centre", [(1.2, -0.4), (-0.2, -0.4), (0.5, -0.4), (0.97, -0.4)])
+def test_a_body_on_a_single_node_has_a_named_escape(
+    push: float, law: bk.FrictionLaw, centre: tuple[float, float]
+) -> None:
+    caught = None
+    try:
+        bk.run(foot(push, law, centre))
+    except UnsolvableSceneError as error:
+        caught = error
+    if centre != (0.5, -0.4):  # where the foot stands in the middle it may hold
+        assert re.match(r"the load (turns|pushes|slides) the body .* with \S+ N", str(caught))
+
+
+def test_a_body_that_turns_about_the_only_node_that_touches() -> None:
+    # the resultant 1 of the top acts 0.375 beside the node at x = 7/8, and the push 0.002 at the height 1 against it
+    text = complaint(foot(0.001, bk.Coulomb(0.3), (1.2, -0.4)))
+    assert text.startswith("the load turns the body anticlockwise about (0.875, 0) with 0.373 N m/m")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
 import pytest
 
-from bemkit.files import OutputFileError, check_target, replacing
+from bemkit import locks
+from bemkit.files import OutputFileError, check_target, replacing, reserved
+from bemkit.locks import FileLock, HeldElsewhereError
 
 
 def yes(path: Path) -> bool:
@@ -83,3 +86,72 @@ def test_a_link_is_followed_not_replaced(tmp_path: Path) -> None:
         temporary.write_text("new", "utf-8")
     assert link.is_symlink()
     assert target.read_text("utf-8") == "new"
+
+
+def test_a_reserved_file_is_refused_to_others(tmp_path: Path) -> None:
+    target, other = tmp_path / "a.h5", tmp_path / "b.h5"
+    with reserved([target, other]):
+        with pytest.raises(OutputFileError, match=r"a\.h5: another process is computing .*: wait for it to end"):
+            with reserved([target]):
+                pass
+        with replacing(target) as temporary:  # what its holder writes in the meantime
+            temporary.write_text("row 1", "utf-8")
+    with reserved([target]):
+        pass
+    assert os.listdir(tmp_path) == ["a.h5"]
+
+
+def test_a_folder_that_takes_no_lock_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / ".a.h5.lock").mkdir()
+    with (
+        pytest.raises(OutputFileError, match=r"a\.h5: cannot be written \(Is a directory\)"),
+        reserved([tmp_path / "a.h5"]),
+    ):
+        pass
+
+
+def test_a_file_of_others_with_the_name_of_the_lock_stays(tmp_path: Path) -> None:
+    mine = tmp_path / ".a.h5.lock"
+    mine.write_text("mine", "utf-8")
+    with reserved([tmp_path / "a.h5"]):
+        pass
+    assert mine.read_text("utf-8") == "mine"
+
+
+def test_leftovers_of_the_dead_are_removed_and_files_of_the_living_stay(tmp_path: Path) -> None:
+    dead, living, other = (tmp_path / f".a.h5.{k * 32}.tmp" for k in "012")
+    other = tmp_path / f".b.h5.{'2' * 32}.tmp"
+    for path in (dead, living, other):
+        path.write_text("half", "utf-8")
+    with contextlib.closing(FileLock(living)):
+        with replacing(tmp_path / "a.h5") as temporary:
+            temporary.write_text("whole", "utf-8")
+        assert sorted(os.listdir(tmp_path)) == sorted([living.name, other.name, "a.h5"])
+    with reserved([tmp_path / "a.h5"]):
+        assert not living.exists()
+
+
+def test_a_lock_on_a_removed_file_is_taken_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its holder removes the file after another process has opened it and before that locks it."""
+    path = tmp_path / "lock"
+    lock = locks._lock
+
+    def slowly(descriptor: int, waits: bool) -> bool:
+        monkeypatch.undo()
+        path.unlink()
+        return lock(descriptor, waits)
+
+    monkeypatch.setattr(locks, "_lock", slowly)
+    with contextlib.closing(FileLock(path)):
+        assert path.exists()
+        with pytest.raises(HeldElsewhereError, match="another process holds the lock"):
+            FileLock(path)
+
+
+def test_without_locks_nothing_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    perhaps_living = tmp_path / f".a.h5.{'0' * 32}.tmp"
+    perhaps_living.write_text("half", "utf-8")
+    monkeypatch.setattr(locks, "fcntl", None)
+    with reserved([tmp_path / "a.h5"]), replacing(tmp_path / "a.h5"):
+        pass
+    assert sorted(os.listdir(tmp_path)) == [perhaps_living.name, "a.h5"]

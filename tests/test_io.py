@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import os
+import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import h5py
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 import bemkit.io
-from bemkit.hdf5 import Reader
+from bemkit.hdf5 import MARK, Reader, seal
 from bemkit.io import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.runner import run
 from bemkit.scene import Part, Traction
@@ -156,6 +157,63 @@ def test_no_damage_to_a_single_byte_raises_anything_else(file: Path) -> None:
             read_result(file)
 
 
+def assert_same_or_named(file: Path, content: bytes, places: Iterable[int], expected: Solution) -> None:
+    """Flip one bit of each byte at the places; what is read is the same, or an error with a name."""
+    for place in places:
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << (place % 8)
+        file.write_bytes(damaged)
+        try:
+            assert_same(expected, read_result(file))
+        except ResultFileError as error:
+            assert str(error).isprintable()  # noqa: PT017 - either outcome is right
+
+
+def test_any_flipped_bit_leaves_the_same_data_or_is_named(file: Path) -> None:
+    content, expected = file.read_bytes(), read_result(file)
+    places = np.random.default_rng(11).choice(len(content), 500, replace=False)
+    assert_same_or_named(file, content, [*range(100), *places.tolist()], expected)
+
+
+@pytest.mark.slow
+def test_a_flipped_bit_in_any_byte_is_the_same_data_or_is_named(file: Path) -> None:
+    content, expected = file.read_bytes(), read_result(file)
+    assert_same_or_named(file, content, range(len(content)), expected)
+
+
+def test_a_bit_that_drives_the_hdf5_library_into_an_endless_loop_is_named(file: Path) -> None:
+    # without the checksum before the content, several bytes of its list of groups do so
+    content = bytearray(file.read_bytes())
+    content[512 + 2631 :] = bytes(len(content) - 512 - 2631)
+    file.write_bytes(content)
+    with pytest.raises(ResultFileError, match="does not match its checksum"):
+        read_result(file)
+
+
+def test_foreign_files_of_any_depth_and_size_are_refused_at_once(tmp_path: Path) -> None:
+    deep, wide = tmp_path / "deep.h5", tmp_path / "wide.h5"
+    with h5py.File(deep, "w") as stored:
+        group = stored
+        for _ in range(3000):
+            group = group.create_group("a")
+    with h5py.File(wide, "w", libver="latest") as stored:
+        stored.create_dataset("huge", shape=(10**9,), dtype="f8")
+        for k in range(3000):
+            stored.create_group(f"g{k}")
+    for path in (deep, wide):
+        begin = time.perf_counter()
+        with pytest.raises(ResultFileError, match="an HDF5 file, but not of bemkit: give a file written by"):
+            read_result(path)
+        with pytest.raises(OutputFileError, match="exists and is not a bemkit result"):
+            bemkit.io.check_result_target(path)
+        assert time.perf_counter() - begin < 1.0  # takes less than a millisecond
+
+
+def test_escape_codes_of_strangers_are_not_handed_on(file: Path, solution: Solution) -> None:
+    write_result(file, dataclasses.replace(solution, message="\x1b[31mred\u202e", timings={"total": 1.0}))
+    assert read_result(file).message == "?[31mred?"
+
+
 def replaced(name: str, **arguments: object) -> Callable[[h5py.File], None]:
     def change(stored: h5py.File) -> None:
         del stored[name]
@@ -242,6 +300,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 def test_wrong_and_hostile_files_are_refused(file: Path, change: Callable[[h5py.File], None], message: str) -> None:
     with h5py.File(file, "a") as stored:
         change(stored)
+    seal(file, MARK)  # as an attacker would
     with pytest.raises(ResultFileError, match=message) as caught:
         read_result(file)
     assert str(caught.value).isprintable()

@@ -125,6 +125,24 @@ def test_several_scenes_can_run_on_an_executor() -> None:
     assert parallel[0].force_tangential != pytest.approx(parallel[1].force_tangential)
 
 
+def test_an_impossible_scene_among_others_fails_alone() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    block = dataclasses.replace(scene(), mesh=bk.MeshOptions(40))
+    lifted = dataclasses.replace(block, parts=(*block.parts[:2], bk.Part("top", bk.Traction(y=0.05), sides=("top",))))
+    stopped = dataclasses.replace(block, discretisation=bk.LinearGalerkin(), linear_solver=bk.Krylov(max_steps=1))
+    with ThreadPoolExecutor(2) as pool:
+        for found in (bk.run_all([block, lifted, stopped, block]), bk.run_all([block, lifted, stopped, block], pool)):
+            assert [each.is_converged for each in found] == [True, False, False, True]
+            first, second = found[1:3]
+            assert isinstance(first, bk.FailedRun)
+            assert isinstance(second, bk.FailedRun)
+            assert first.scene == lifted
+            assert "the load" in str(first.error)
+            assert isinstance(second.error, bk.NoResultError)
+            assert "conjugate gradients stopped after 1 of 1 steps" in str(second.error)
+
+
 def test_a_body_that_nothing_holds_is_an_error_with_a_remedy() -> None:
     block = scene()
     lifted = (*block.parts[:2], bk.Part("top", bk.Traction(y=0.05), sides=("top",)))

@@ -15,7 +15,7 @@ PACKAGE = Path(bemkit.__file__).parent
 
 # imports point up only: a module may import those of its own layer and of earlier ones
 LAYERS = [
-    {"arrays", "complaint", "errors", "expression", "files", "hdf5"},
+    {"arrays", "complaint", "errors", "expression", "files", "hdf5", "locks", "printable", "streams", "workers"},
     {"geometry"},
     {"operators"},
     {"contact"},

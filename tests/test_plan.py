@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import tracemalloc
 
 import pytest
 
 import bemkit as bk
 import bemkit.plan.memory
+from bemkit.cli import main
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.linear import DefiniteOperator, Factor, Krylov, LinearSolver
 from bemkit.operators.material import Material
-from bemkit.plan import Machine, Plan, Stage, TooLargeError, Wishes, check_memory, make_plan, this_machine
+from bemkit.plan import (
+    Machine,
+    Plan,
+    Stage,
+    TooLargeError,
+    Wishes,
+    check_elements,
+    check_memory,
+    make_plan,
+    this_machine,
+)
 from bemkit.scene import Clamped, Condition, Contact, MeshOptions, Part, PrescribedDisplacement, Roller, Scene
 from bemkit.scenefile import load_scene, with_overrides
 
@@ -215,3 +227,34 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.Mon
         check_memory(plan)
     with pytest.raises(TooLargeError, match="use at most 160 elements"):
         bk.run(load_scene("paper-1"))
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_a_million_elements_are_refused_before_the_mesh_is_made(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    built: list[int | None] = []
+    build_mesh = bk.Scene.build_mesh
+
+    def watched(scene: bk.Scene) -> bk.BoundaryMesh:
+        built.append(scene.mesh.elements)
+        return build_mesh(scene)
+
+    monkeypatch.setattr(bk.Scene, "build_mesh", watched)
+    with pytest.raises(SystemExit, match="2"):
+        main([command, "paper-1", "--elements", "1000000"])
+    message = r"1000000 elements need about \S+ GB, this computer has \S+ GB: use at most \d+ elements"
+    assert re.search(message, capsys.readouterr().err)
+    assert max(filter(None, built)) <= 2000
+
+
+def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = bk.load_scene("paper-1")
+    large = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=12_000))
+    needed = make_plan(large, large.build_mesh()).memory
+    # the parts that grow more slowly than the square are a few thousandths
+    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 1.01 * needed)
+    check_elements(large)
+    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 0.99 * needed)
+    with pytest.raises(TooLargeError, match=r"use at most 119.. elements"):
+        check_elements(large)

@@ -36,8 +36,10 @@ class UnsolvableLoad:
 
     @property
     def is_sliding(self) -> bool:
-        """Whether the body stays in touch everywhere, so that only friction could have held it."""
-        return not np.isnan(self.lift).all() and float(np.nanmax(self.lift)) <= 1e-6
+        """Whether the body slides and stays in touch everywhere, so that only friction could have held it."""
+        touches = ~np.isnan(self.lift)
+        slip = float(np.abs(self.motion[touches, 1]).max(initial=0.0))
+        return slip > 1e-6 and float(self.lift[touches].max()) <= 1e-6
 
     @property
     def description(self) -> str:

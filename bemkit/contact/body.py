@@ -7,9 +7,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions
+from bemkit.errors import BemkitError, InputError
 
 
-class SingularResponse(ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller
+class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller
     """The conditions at the contact nodes leave the body free to move, or contradict each other."""
 
 
@@ -36,7 +37,7 @@ class ContactState:
         for name in ("displacement", "traction"):
             array = getattr(self, name)
             if array.ndim != 2 or array.shape != (len(self.displacement), 2):
-                raise ValueError(f"{name} has the shape {array.shape}; give ({len(self.displacement)}, 2)")
+                raise InputError(f"{name} has the shape {array.shape}; give ({len(self.displacement)}, 2)")
 
     @property
     def u_n(self) -> FloatArray:

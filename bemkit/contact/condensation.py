@@ -15,6 +15,7 @@ from bemkit.contact.nodes import ContactNodes as ContactNodes
 from bemkit.contact.nodes import contact_conditions as contact_conditions
 from bemkit.contact.nodes import free_motions, held_nodes
 from bemkit.contact.unknowns import Unknowns, find_free_tangents, find_tangents, find_unknowns
+from bemkit.errors import InputError
 from bemkit.geometry.space import dof_points
 from bemkit.operators.balance import resultant_imbalance, round_off_of
 from bemkit.operators.nodal import NodalConditions, Support
@@ -23,7 +24,7 @@ from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.work import Work
 
 
-class NoContactNodesError(ValueError):
+class NoContactNodesError(InputError):
     """A contact boundary whose nodes are all held by supports."""
 
 

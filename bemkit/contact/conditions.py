@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +38,11 @@ class LinearConditions:
     def __post_init__(self) -> None:
         n_contact = len(self.value)
         if self.value.shape != (n_contact, 2):
-            raise ValueError(f"value has the shape {self.value.shape}; give (n_contact, 2)")
+            raise InputError(f"value has the shape {self.value.shape}; give (n_contact, 2)")
         for name in ("on_displacement", "on_traction"):
             shape = getattr(self, name).shape
             if shape != (n_contact, 2, 2):
-                raise ValueError(f"{name} has the shape {shape}; value has {n_contact} nodes, give {(n_contact, 2, 2)}")
+                raise InputError(f"{name} has the shape {shape}; value has {n_contact} nodes, give {(n_contact, 2, 2)}")
 
     @property
     def n_contact(self) -> int:

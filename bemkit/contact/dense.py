@@ -8,6 +8,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
+from bemkit.errors import InputError
 from bemkit.operators.balance import FORGIVEN
 
 _SMALLEST_RCOND = 1e-13
@@ -78,15 +79,15 @@ class DenseBody:
         for name, shape in shapes.items():
             array = np.array(motions if name == "motions" else getattr(self, name), dtype=float)
             if array.shape != shape:
-                raise ValueError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
+                raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
             if not np.isfinite(array).all():
-                raise ValueError(f"{name} contains {array[~np.isfinite(array)][0]}; give finite numbers")
+                raise InputError(f"{name} contains {array[~np.isfinite(array)][0]}; give finite numbers")
             read_only(array)
             object.__setattr__(self, name, array)
         if n_contact == 0:
-            raise ValueError("weights is empty; a body needs at least one contact node")
+            raise InputError("weights is empty; a body needs at least one contact node")
         if self.weights.min() <= 0.0:
-            raise ValueError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
+            raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
 
     @property
     def n_contact(self) -> int:
@@ -239,7 +240,7 @@ class DenseBody:
         asks_more |= (on_traction[:, 1, 0] != 0.0) | (on_traction[:, 1, 1] == 0.0) | (conditions.value[:, 1] != 0.0)
         if np.any(asks_more & self.tangent_is_free):
             node = int(np.argmax(asks_more & self.tangent_is_free))
-            raise ValueError(
+            raise InputError(
                 f"contact node {node} is without friction, and its tangential displacement is eliminated: give "
                 "sigma_t = 0 as the second condition there, or ask ContactProblem.respond, which does"
             )

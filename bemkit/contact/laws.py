@@ -17,13 +17,14 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
+from bemkit.errors import InputError
 from bemkit.expression import ScalarField, check_field, evaluate_field
 
 Coefficient: TypeAlias = ScalarField | FloatArray
 """A number, a formula or function of x and y, or one number per contact node."""
 
 
-class LawError(ValueError):
+class LawError(InputError):
     """A friction law failed or returned what no bound can be; the message names the law."""
 
 
@@ -254,7 +255,7 @@ class CohesiveCoulomb(_EqualByCoefficients, FrictionLaw):
             object.__setattr__(self, name, _coefficient(name, getattr(self, name)))
         object.__setattr__(self, "cap", _coefficient("cap", self.cap, may_be_infinite=True))
         if not (callable(self.cap) or callable(self.cohesion)) and np.any(self.cap < np.asarray(self.cohesion)):
-            raise ValueError(
+            raise InputError(
                 f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
                 "the cap bounds cohesion and friction together, so give cap >= cohesion"
             )
@@ -331,11 +332,11 @@ def _coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False
         return value
     array = np.array(value, dtype=float)
     if array.ndim > 1:
-        raise ValueError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
+        raise InputError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
     is_wrong = np.isnan(array) | (array < 0.0) | (False if may_be_infinite else np.isinf(array))
     if np.any(is_wrong):
         where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
-        raise ValueError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
+        raise InputError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
     if array.ndim == 0:
         return float(array)
     read_only(array)
@@ -345,7 +346,7 @@ def _coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False
 def _numbers(name: str, value: Coefficient) -> float | FloatArray:
     """Return a coefficient that is known in numbers."""
     if callable(value):
-        raise ValueError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
+        raise InputError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
     return value
 
 
@@ -384,5 +385,5 @@ def _compared(law: Any) -> tuple[object, ...]:
 
 def _check_scale(stress_scale: float) -> float:
     if not (np.isfinite(stress_scale) and stress_scale > 0.0):
-        raise ValueError(f"stress_scale = {stress_scale:g}; give a positive finite stress")
+        raise InputError(f"stress_scale = {stress_scale:g}; give a positive finite stress")
     return stress_scale

@@ -13,6 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.errors import InputError
 from bemkit.expression import ScalarField, check_field, evaluate_field
 
 FACING = 1e-12
@@ -113,7 +114,7 @@ class HalfPlane:
         _check_pair("point", self.point)
         _check_pair("normal", self.normal)
         if math.hypot(*self.normal) == 0.0:
-            raise ValueError("normal is (0, 0): give the direction from the obstacle towards the body, such as (0, 1)")
+            raise InputError("normal is (0, 0): give the direction from the obstacle towards the body, such as (0, 1)")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the surface; see `Obstacle.gap`."""
@@ -214,11 +215,11 @@ class PolygonalObstacle:
 
     def __post_init__(self) -> None:
         if len(self.vertices) < 3:
-            raise ValueError(f"vertices has {len(self.vertices)} points: give at least three")
+            raise InputError(f"vertices has {len(self.vertices)} points: give at least three")
         for number, vertex in enumerate(self.vertices):
             _check_pair(f"vertices[{number}]", vertex)
             if tuple(vertex) == tuple(self.vertices[number - 1]):
-                raise ValueError(f"vertices[{number}] is {vertex}, as is the one before it: leave one of them out")
+                raise InputError(f"vertices[{number}] is {vertex}, as is the one before it: leave one of them out")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the nearest side or corner; see `Obstacle.gap`."""
@@ -290,7 +291,7 @@ class Gap:
         for number, component in enumerate(self.direction or ()):
             check_field(component, f"direction[{number}]")
         if self.direction is not None and len(self.direction) != 2:
-            raise ValueError(f"direction has {len(self.direction)} components: give x and y, such as (0, -1)")
+            raise InputError(f"direction has {len(self.direction)} components: give x and y, such as (0, -1)")
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Evaluate the given gap; see `Obstacle.gap`."""
@@ -304,7 +305,7 @@ class Gap:
         length = np.hypot(*towards.T)
         if not length.all():
             x, y = points[int(np.argmin(length))]
-            raise ValueError(f"direction is (0, 0) at ({x:.6g}, {y:.6g}): give the direction into the obstacle")
+            raise InputError(f"direction is (0, 0) at ({x:.6g}, {y:.6g}): give the direction into the obstacle")
         return np.asarray(towards / length[:, None])
 
 
@@ -318,9 +319,9 @@ def _unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
 
 def _check_pair(name: str, pair: tuple[float, float]) -> None:
     if len(pair) != 2 or not all(math.isfinite(component) for component in pair):
-        raise ValueError(f"{name} is {pair}: give two finite numbers")
+        raise InputError(f"{name} is {pair}: give two finite numbers")
 
 
 def _check_radius(radius: float) -> None:
     if not (math.isfinite(radius) and radius > 0.0):
-        raise ValueError(f"radius is {radius}: give a positive, finite length")
+        raise InputError(f"radius is {radius}: give a positive, finite length")

@@ -7,6 +7,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw, RescaledLaw
+from bemkit.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class PartwiseLaw(FrictionLaw):
     def __post_init__(self) -> None:
         numbers = np.sort(np.concatenate(list(self.nodes)))
         if len(self.laws) != len(self.nodes) or not np.array_equal(numbers, np.arange(numbers.size)):
-            raise ValueError(f"nodes = {self.nodes}; give every contact node to exactly one of {len(self.laws)} laws")
+            raise InputError(f"nodes = {self.nodes}; give every contact node to exactly one of {len(self.laws)} laws")
 
     @property
     def is_frictionless(self) -> bool:

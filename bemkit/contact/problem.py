@@ -11,6 +11,7 @@ from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.dense import DenseBody
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.contact.partwise import law_name
+from bemkit.errors import InputError
 
 __all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]
 
@@ -49,11 +50,11 @@ class ContactProblem:
         for name, given in (("gap", self.gap), ("reference_slip", slip)):
             array = np.array(given, dtype=float)
             if array.shape != (n_contact,):
-                raise ValueError(f"{name} has the shape {array.shape}; the body has {n_contact} contact nodes")
+                raise InputError(f"{name} has the shape {array.shape}; the body has {n_contact} contact nodes")
             is_wrong = np.isnan(array) | (np.isneginf(array) if name == "gap" else np.isinf(array))
             if is_wrong.any():
                 node = int(np.argmax(is_wrong))
-                raise ValueError(f"{name} is {array[node]} at contact node {node}; give a number")
+                raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             read_only(array)
             object.__setattr__(self, name, array)
         missing = [member for member in _LAW_MEMBERS if not hasattr(self.law, member)]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 
 
 def positive_part(a: FloatArray) -> FloatArray:
@@ -101,8 +102,8 @@ def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[
 
 def _checked_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
     if x.ndim not in (1, 2):
-        raise ValueError(f"x has {x.ndim} axes; give (n,) components or (n, d) vectors")
+        raise InputError(f"x has {x.ndim} axes; give (n,) components or (n, d) vectors")
     radii = np.broadcast_to(np.asarray(bound, dtype=float), x.shape[:1])
     if np.any(radii < 0.0):
-        raise ValueError(f"bound has the negative value {radii.min():g}; a friction bound is zero or positive")
+        raise InputError(f"bound has the negative value {radii.min():g}; a friction bound is zero or positive")
     return radii

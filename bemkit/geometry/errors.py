@@ -1,9 +1,10 @@
 """Errors of the geometry: a boundary that bounds no body, or a name nobody gave."""
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 
 
-class GeometryError(ValueError):
+class GeometryError(InputError):
     """A curve, shape, selection or mesh that cannot be the boundary of a body."""
 
 

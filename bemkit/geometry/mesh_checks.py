@@ -9,6 +9,7 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
+from bemkit.geometry.magnitude import check_magnitude
 from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, point_on, resolution
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
@@ -33,6 +34,7 @@ def check_chains(nodes: FloatArray, elements: IntArray, symmetry: Symmetry | Non
             raise GeometryError(f"BoundaryMesh: {name} has shape {array.shape}: give an array of shape (n, 2), n >= 2")
     for node in np.flatnonzero(~np.isfinite(nodes).all(axis=1)):
         raise GeometryError(f"BoundaryMesh: node {node} is {format_point(nodes[node])}: coordinates must be finite")
+    check_magnitude(nodes, "BoundaryMesh")
     for element in np.flatnonzero(((elements < 0) | (elements >= len(nodes))).any(axis=1)):
         raise GeometryError(
             f"BoundaryMesh: element {element} joins nodes {elements[element].tolist()}, but there are {len(nodes)} "

@@ -13,6 +13,9 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import cross
+from bemkit.printable import printable
+
+_SURFACES = (".ply", ".stl", ".off", ".obj")
 
 
 def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
@@ -39,8 +42,10 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
     """
     _require_meshio("read_mesh")
     path = Path(path)
+    if path.suffix.lower() in _SURFACES:
+        raise GeometryError(f"read_mesh: {path}: such files hold surfaces alone: export the lines, for example as .msh")
     mesh = _read_quietly(path)
-    points = np.asarray(mesh.points, dtype=float)
+    points = _points(mesh, path)
     if points.shape[1] == 3:
         if np.ptp(points[:, 2]) > 0.0:
             raise GeometryError(
@@ -54,7 +59,7 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
     is_line = np.array([block.type == "line" for block in mesh.cells], dtype=bool)
     if not is_line.any():
         raise GeometryError(f"read_mesh: {path} has no line cells: export the lines of the boundary too")
-    lines = np.concatenate([block.data for block in mesh.cells if block.type == "line"]).astype(np.intp)
+    lines = _lines([block.data for block in mesh.cells if block.type == "line"], len(points), path)
     loops, line_loops = _chain(points, lines, path)
     largest = int(np.argmax([abs(_signed_area(points[loop])) for loop in loops]))
     for k, loop in enumerate(loops):
@@ -65,7 +70,7 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
     order = np.concatenate(line_loops)
     element_of_line = np.empty(len(lines), dtype=np.intp)
     element_of_line[order] = np.arange(len(lines))
-    parts = {name: element_of_line[members] for name, members in _named_lines(mesh, is_line).items()}
+    parts = {name: element_of_line[members] for name, members in _checked_names(mesh, is_line, path).items()}
     following = following_in_loops(np.array([len(loop) for loop in loops]))
     elements = np.column_stack([np.arange(len(lines)), following])
     return BoundaryMesh(points[np.concatenate(loops)], elements, parts, is_exterior=is_exterior)
@@ -121,10 +126,49 @@ def _read_quietly(path: Path) -> Any:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             return meshio.read(path)
     except (Exception, SystemExit) as error:  # its many readers fail in many ways on a damaged file
-        reason = " ".join(said.getvalue().split()) or f"{type(error).__name__}: {error}"
+        reason = printable(" ".join((said.getvalue() or f"{type(error).__name__}: {error}").split()))
         raise GeometryError(
             f"read_mesh: {path} cannot be read ({reason}): give a mesh file of a format that meshio knows"
         ) from error
+
+
+def _points(mesh: Any, path: Path) -> FloatArray:
+    """Return the (n, 2) or (n, 3) finite coordinates of a file."""
+    try:
+        points = np.asarray(mesh.points, dtype=float)
+    except (TypeError, ValueError):
+        points = np.zeros(0)
+    if points.ndim != 2 or not len(points) or points.shape[1] not in (2, 3) or not np.isfinite(points).all():
+        raise _damaged(path, "its points are no finite coordinates in the plane or in space")
+    return points
+
+
+def _lines(blocks: list[Any], n_points: int, path: Path) -> IntArray:
+    """Return the (n, 2) numbers of the points that the lines of a file join."""
+    try:
+        lines = np.concatenate([np.asarray(block).reshape(len(block), 2) for block in blocks])
+    except (TypeError, ValueError):
+        lines = np.zeros(0)
+    if lines.dtype.kind not in "iu" or not lines.size or lines.min() < 0 or lines.max() >= n_points:
+        raise _damaged(path, f"its lines do not join pairs of its {n_points} points")
+    return lines.astype(np.intp)
+
+
+def _checked_names(mesh: Any, is_line: BoolArray, path: Path) -> dict[str, IntArray]:
+    """Return the lines of each group, whose names and numbers make sense; see `_named_lines`."""
+    n_lines = sum(len(block.data) for block, line in zip(mesh.cells, is_line, strict=True) if line)
+    try:
+        named = _named_lines(mesh, is_line)
+    except (IndexError, KeyError, TypeError, ValueError) as error:
+        raise _damaged(path, f"its groups cannot be told ({error})") from error
+    for name, lines in named.items():
+        if not (name.isprintable() and lines.max() < n_lines):
+            raise _damaged(path, f"the group {name!r} has a name that is not printable, or lines that do not exist")
+    return named
+
+
+def _damaged(path: Path, what: str) -> GeometryError:
+    return GeometryError(f"read_mesh: {path} is damaged: {printable(what)}: write it anew")
 
 
 def _named_lines(mesh: Any, is_line: BoolArray) -> dict[str, IntArray]:

@@ -9,10 +9,12 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.curve import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.loops import check_loops
+from bemkit.geometry.magnitude import check_magnitude
 from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
 from bemkit.geometry.vectors import norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
+_N_SEEN = 4  # points of a side that tell its size, also of a closed one
 _LEAST_SPLITS = 4  # 16 pieces, 9 tangents each: a side with fewer than about 30 waves is seen as it is
 
 
@@ -97,6 +99,8 @@ class Outline:
         if not np.isfinite([start, own_end]).all():
             bad = int(np.argmin(np.isfinite(start).all(axis=1) & np.isfinite(own_end).all(axis=1)))
             raise GeometryError(f"Outline: {self._describe(bad)} has an end that is not finite: correct its curve")
+        seen = np.linspace(0.0, 1.0, _N_SEEN)
+        check_magnitude(np.concatenate([side.curve.point(seen) for side in self.sides]), "Outline")
         tolerance = _JOINT_TOLERANCE * np.abs(start).max()
         followers = [name for loop in self.loops for name in [*[side.name for side in loop[1:]], loop[0].name]]
         for k in np.flatnonzero(norms(own_end - end) > tolerance).tolist():

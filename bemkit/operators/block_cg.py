@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import NoResultError
 from bemkit.operators.dense import SingularMatrixError, multiply
 
 BlockMap = Callable[[FloatArray], FloatArray]
@@ -30,7 +31,7 @@ _INDEFINITE = 1e-8
 """Negative eigenvalues of this relative size are no round-off."""
 
 
-class NotConvergedError(RuntimeError):
+class NotConvergedError(NoResultError):
     """An iterative solver that did not reach its tolerance; the message says how far it came and what helps."""
 
 

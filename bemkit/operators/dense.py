@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 from bemkit.operators.work import Factorisation, FactorKind
 
 
@@ -21,7 +22,7 @@ def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(dgemm(1.0, a, b, trans_a=trans_a, trans_b=trans_b))
 
 
-class SingularMatrixError(ValueError):
+class SingularMatrixError(InputError):
     """A matrix that must be regular is not; the message names it."""
 
 

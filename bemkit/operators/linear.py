@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 from bemkit.operators.block_cg import Iterations, block_cg
 from bemkit.operators.dense import Cholesky, multiply
 from bemkit.operators.material import Material
@@ -123,10 +124,10 @@ class Krylov:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rtol < 1.0:
-            raise ValueError(f"rtol is {self.rtol}: give a number between 0 and 1 such as 1e-9")
+            raise InputError(f"rtol is {self.rtol}: give a number between 0 and 1 such as 1e-9")
         for name in ("max_steps", "coarsest"):
             if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}: give a positive whole number")
+                raise InputError(f"{name} is {getattr(self, name)}: give a positive whole number")
 
     def error_at(self, material: Material) -> float:
         """Return the relative error that `rtol` may leave in a solution.

@@ -6,6 +6,8 @@ import enum
 import math
 from dataclasses import dataclass
 
+from bemkit.errors import InputError
+
 
 class Plane(enum.Enum):
     """The two plane states: strain (long bodies) and stress (thin plates)."""
@@ -45,10 +47,10 @@ class Material:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0.0):
             msg = f"youngs_modulus is {self.youngs_modulus}: give a positive, finite number of pascals"
-            raise ValueError(msg)
+            raise InputError(msg)
         if not -1.0 < self.poisson_ratio <= 0.5:
             msg = f"poisson_ratio is {self.poisson_ratio}: it must lie in (-1, 0.5]"
-            raise ValueError(msg)
+            raise InputError(msg)
 
     @property
     def shear_modulus(self) -> float:

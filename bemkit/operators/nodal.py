@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.space import BoundarySpace, dof_points
 from bemkit.operators.rigid import possible_motions, rigid_motions
@@ -23,7 +24,7 @@ from the origin numbers hold the normals along a straight side to about 1e-7; an
 with a million times the load holds nothing."""
 
 
-class ConflictingSupportsError(ValueError):
+class ConflictingSupportsError(InputError):
     """Two boundary parts prescribe different displacements at their common node."""
 
 

@@ -18,6 +18,7 @@ from math import comb
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.errors import InputError
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, local_coefficients
@@ -236,7 +237,7 @@ class InteriorFields:
 def _as_points(points: FloatArray) -> FloatArray:
     points = np.asarray(points, dtype=float)
     if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise ValueError(f"points has the shape {points.shape}: give an (n, 2) array of finite coordinates")
+        raise InputError(f"points has the shape {points.shape}: give an (n, 2) array of finite coordinates")
     return points
 
 
@@ -258,7 +259,7 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
     dofs = np.asarray(dofs, dtype=np.float64)
     shape = (space.n_dofs // 2, 2)
     if dofs.shape != shape or not np.isfinite(dofs).all():
-        raise ValueError(
+        raise InputError(
             f"{name}_dofs has the shape {dofs.shape}{'' if dofs.shape != shape else ' and is not finite'}: "
             f"give {shape} finite numbers, one row for each scalar dof"
         )

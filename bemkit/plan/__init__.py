@@ -11,5 +11,6 @@ from bemkit.plan.machine import this_machine as this_machine
 from bemkit.plan.make import Plan as Plan
 from bemkit.plan.make import make_plan as make_plan
 from bemkit.plan.memory import TooLargeError as TooLargeError
+from bemkit.plan.memory import check_elements as check_elements
 from bemkit.plan.memory import check_memory as check_memory
 from bemkit.plan.sizes import Sizes as Sizes

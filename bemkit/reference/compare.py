@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
@@ -24,7 +25,7 @@ CORNERS = Algebraic(3.0)
 """Grading where meshes cannot follow the solution."""
 
 
-class OverResolutionError(ValueError):
+class OverResolutionError(InputError):
     """A scene for which two fine solutions could not be made."""
 
 

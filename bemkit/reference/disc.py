@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 from bemkit.operators.material import Material
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
@@ -48,7 +49,7 @@ class DiscBetweenPlates:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.approach < 0.25 * self.radius:
-            raise ValueError(
+            raise InputError(
                 f"approach is {self.approach}: give one between 0 and a quarter of the radius, {0.25 * self.radius:g}; "
                 "small strains end long before"
             )

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
 from bemkit.operators.material import Material
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
 from bemkit.reference.values import Answer, Places, Reference, Zone
@@ -43,7 +44,7 @@ def westergaard_half_width(mean_pressure: float, amplitude: float, wavelength: f
     """
     share = mean_pressure * wavelength / (np.pi * plane_modulus * amplitude)
     if not 0.0 < share < 1.0:
-        raise ValueError(
+        raise InputError(
             f"mean_pressure is {mean_pressure}: give one between 0 and {mean_pressure / share:g}, "
             "where the wave is in contact everywhere"
         )

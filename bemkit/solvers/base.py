@@ -12,6 +12,7 @@ from bemkit.contact.admissibility import find_long_travel, find_unsolvable_load
 from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.solvers.floating import FloatingResponse, floating_response
 from bemkit.solvers.newton import consistent_state
@@ -180,7 +181,7 @@ class ContactSolution:
         return self.status is Status.CONVERGED
 
 
-class ContactFailure(RuntimeError):  # noqa: N818 - an outcome of the mathematics, not an error of the program
+class ContactFailure(NoResultError):  # noqa: N818 - an outcome of the mathematics, not an error of the program
     """A solve ended without a certified solution; `solution` holds what it reached."""
 
     def __init__(self, solution: ContactSolution) -> None:
@@ -230,9 +231,9 @@ def solve(
     """
     limit = solver.max_steps if max_steps is None else max_steps
     if limit < 0:
-        raise ValueError(f"max_steps = {limit}; give zero or a positive number")
+        raise InputError(f"max_steps = {limit}; give zero or a positive number")
     if not tolerance >= 0.0:
-        raise ValueError(f"tolerance = {tolerance}; give zero or a positive number")
+        raise InputError(f"tolerance = {tolerance}; give zero or a positive number")
     solution = _Run(problem, solver, limit, tolerance, callback).finish(start)
     if throw and not solution.is_converged:
         raise ContactFailure(solution)

@@ -6,6 +6,7 @@ import numpy as np
 
 from bemkit.contact.laws import Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import InputError
 from bemkit.solvers.base import Iterate, Status, solve
 from bemkit.solvers.options import check_max_steps
 from bemkit.solvers.outer import Progress
@@ -51,7 +52,7 @@ class FixedPoint:
     def __post_init__(self) -> None:
         check_max_steps(self.max_steps)
         if not 0.0 < self.inner_tolerance < 1.0:
-            raise ValueError(f"inner_tolerance = {self.inner_tolerance}; give a number between 0 and 1")
+            raise InputError(f"inner_tolerance = {self.inner_tolerance}; give a number between 0 and 1")
 
     def init(self, problem: ContactProblem, start: ContactState) -> FixedPointIterate:
         """Take the bound from the normal tractions of the start."""

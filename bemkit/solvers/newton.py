@@ -6,6 +6,7 @@ import numpy as np
 
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
 from bemkit.solvers.floating import floating_response
 
@@ -98,9 +99,9 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
         If the sets do not hold the body in any way.
     """
     if len(guess.displacement) != problem.n_contact:
-        raise ValueError(f"start has {len(guess.displacement)} nodes; the problem has {problem.n_contact}")
+        raise InputError(f"start has {len(guess.displacement)} nodes; the problem has {problem.n_contact}")
     if not guess.is_finite:
-        raise ValueError("start contains entries that are not finite; give finite displacements and tractions")
+        raise InputError("start contains entries that are not finite; give finite displacements and tractions")
     rho = problem.body.stiffness_scale
     conditions = ProjectedConditions(problem, rho, rho)
     trial = conditions.evaluate(guess)

@@ -7,6 +7,7 @@ import numpy as np
 from bemkit.arrays import IntArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolution, ContactSolver, solve
 
 
@@ -47,7 +48,7 @@ def probe(
         If `n_starts` is negative.
     """
     if n_starts < 0:
-        raise ValueError(f"n_starts = {n_starts}; give zero or a positive number")
+        raise InputError(f"n_starts = {n_starts}; give zero or a positive number")
     random = np.random.default_rng(seed)
     uniform = [1, 0, 2, 3]
     choices = [np.full(problem.n_contact, status) for status in uniform[:n_starts]]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.scene import Scene
 from bemkit.solution import Solution
@@ -143,5 +144,5 @@ def find_axes(axes: Sequence[Axis], names: Sequence[str]) -> tuple[Axis, ...]:
     return tuple(known[name] for name in names) if names else tuple(axes)
 
 
-class UnknownAxisError(ValueError):
+class UnknownAxisError(InputError):
     """An axis of a name that does not exist; the message lists the names."""

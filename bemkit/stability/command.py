@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.complaint import bad_input
-
 if TYPE_CHECKING:
     from bemkit.scene import Scene
     from bemkit.stability.cases import Axis
@@ -62,6 +60,7 @@ def stability(
         _refuse(sweeps, "goes with a sweep of one scene: leave it out, or --random")
         return _try_random(count, seed or 0, first or 0, jobs, failures, quiet=quiet)
     _refuse(trials, "goes with random scenes: add --random, such as --random 200")
+    from bemkit.files import reserved
     from bemkit.scenefile import load_scene, with_overrides
     from bemkit.stability.axes import all_axes
     from bemkit.stability.cases import find_axes
@@ -69,12 +68,11 @@ def stability(
     uses_stdout = "-" in (csv_file, markdown)
     if csv_file == markdown == "-":
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
-    with bad_input():
-        _check_outputs(output, csv_file, markdown)
-        chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
-        axes = find_axes(all_axes(), names)
-        rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
-        _write(axes, rows, csv_file, markdown, folder)
+    click.get_current_context().with_resource(reserved(_check_outputs(output, csv_file, markdown)))
+    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+    axes = find_axes(all_axes(), names)
+    rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
+    _write(axes, rows, csv_file, markdown, folder)
     if not quiet and not uses_stdout:
         from bemkit.stability.report import print_verdicts
 
@@ -95,8 +93,7 @@ def _try_random(count: int, seed: int, first: int, jobs: int | None, folder: str
     from bemkit.stability.trial_session import TrialSession, print_trials
 
     is_live = not quiet and sys.stderr.isatty()
-    with bad_input():
-        trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
+    trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
     if not quiet:
         print_trials(trials)
     return int(any(trial.is_failure for trial in trials))
@@ -117,7 +114,7 @@ def _computed(
 
     def announce(axis: Axis, value: float) -> None:
         if not is_quiet and sys.stderr.isatty():
-            click.echo(f"\r\x1b[K{axis.name} {value:.6g}", nl=False, err=True)
+            print(f"\r\x1b[K{axis.name} {value:.6g}", end="", file=sys.stderr)
 
     for row in sweep(scene, axes, finished=known, begins=announce):
         rows.append(row)
@@ -127,21 +124,22 @@ def _computed(
         axis = next(axis for axis in axes if axis.name == row.axis)
         if shows_tables and row.value == axis.values[-1]:
             if sys.stderr.isatty():
-                click.echo("\r\x1b[K", nl=False, err=True)
+                print("\r\x1b[K", end="", file=sys.stderr)
             print_axis(axis, [other for other in rows if other.axis == axis.name])
     return rows
 
 
-def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> None:
+def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> list[Path]:
+    """Find out, before any work is done, whether everything can be written; return the files to be reserved."""
     from bemkit.outputs import check_text
     from bemkit.stability.files import CSV_START, FILE, MARKDOWN_START
 
     if output is not None and Path(output).is_file():
         FILE.read(output)  # says more about a broken file than that it stands in the way
-    if output is not None:
-        FILE.check_target(output)
+    targets = [] if output is None else [FILE.check_target(output)]
     check_text(csv_file, "CSV file of stability rows", CSV_START)
     check_text(markdown, "Markdown file of stability tables", MARKDOWN_START)
+    return targets
 
 
 def _write(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.errors import BemkitError, InputError
 from bemkit.model import build_model
 from bemkit.operators.threads import blas_threads_for
 from bemkit.runner import run
@@ -85,7 +86,7 @@ class Row:
     message: str
 
 
-class StabilityError(ValueError):
+class StabilityError(InputError):
     """A sweep that cannot begin."""
 
 
@@ -164,9 +165,7 @@ def attempt(scene: Scene, case: Case | None = None) -> Attempt:
     begin = time.perf_counter()
     try:
         solution = run(scene, mesh=None if case is None else case.mesh(scene))
-    except (ValueError, ArithmeticError) as error:
-        if not type(error).__module__.startswith("bemkit."):
-            raise
+    except BemkitError as error:
         return Attempt(None, str(error), time.perf_counter() - begin)
     return Attempt(solution, solution.message, time.perf_counter() - begin)
 

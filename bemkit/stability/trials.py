@@ -5,18 +5,17 @@ from __future__ import annotations
 import traceback
 import warnings
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from itertools import pairwise
-from multiprocessing import get_context
 
 from bemkit.errors import BemkitError
 from bemkit.runner import run, run_history
 from bemkit.solution import Solution
 from bemkit.stability.evidence import Evidence, examine
 from bemkit.stability.random_scenes import RandomCase, random_case
+from bemkit.workers import worker_processes
 
 
 class Outcome(Enum):
@@ -130,6 +129,5 @@ def try_cases(seed: int, indices: Iterable[int], *, processes: int = 1) -> Itera
     if processes == 1:
         yield from (try_case(seed, index) for index in indices)
         return
-    # spawned processes do not inherit threads that hold locks
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as executor:
+    with worker_processes(processes) as executor:
         yield from executor.map(partial(try_case, seed), indices, chunksize=4)

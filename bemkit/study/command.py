@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from bemkit.complaint import bad_input
+from bemkit.complaint import concerning
 
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
@@ -68,29 +68,28 @@ def errors(
     Errors are measured against a closed form or a reference solution, or with --over-resolve against a fine solution.
     The exit code is 1 if a run did not converge.
     """
+    from bemkit.files import reserved
     from bemkit.outputs import STDOUT
     from bemkit.study.session import Outputs, Session
     from bemkit.study.wishes import DEFAULT_MEASURES, Lists, read_measures, read_wishes
 
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
-    with bad_input():
-        outputs = Outputs(output, csv_file, folder, read_measures(measures or DEFAULT_MEASURES))
-        outputs.check()
-        wishes = read_wishes(
-            scene,
-            Lists(elements, accuracies, discretisation, meshes, solver),
-            exponent=exponent,
-            most_elements=most_elements,
-            over_resolve=over_resolve,
-            repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
-        )
-        is_live, shows_tables = not quiet and sys.stderr.isatty(), not quiet and csv_file != STDOUT
-        session = Session(wishes, outputs, jobs=jobs, is_live=is_live, shows_tables=shows_tables)
-    with bad_input(scene):
+    outputs = Outputs(output, csv_file, folder, read_measures(measures or DEFAULT_MEASURES))
+    click.get_current_context().with_resource(reserved(outputs.check()))
+    wishes = read_wishes(
+        scene,
+        Lists(elements, accuracies, discretisation, meshes, solver),
+        exponent=exponent,
+        most_elements=most_elements,
+        over_resolve=over_resolve,
+        repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
+    )
+    is_live, shows_tables = not quiet and sys.stderr.isatty(), not quiet and csv_file != STDOUT
+    session = Session(wishes, outputs, jobs=jobs, is_live=is_live, shows_tables=shows_tables)
+    with concerning(scene):
         rows = session.run()
-    with bad_input():
-        outputs.write(wishes.scene.title, rows)
+    outputs.write(wishes.scene.title, rows)
     return 0 if all(row.is_certified for row in rows) else NOT_CONVERGED
 
 
@@ -105,14 +104,13 @@ def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> No
 
     if json_file == csv_file == STDOUT:
         raise click.UsageError("--csv - and --json - both print to standard output: give one of them")
-    with bad_input():
-        check_text(json_file, "JSON file", "{")
-        check_text(csv_file, "CSV file of the paper's tables", "table,rho_1")
-        tables = report.compute_with_progress(is_live=not quiet and sys.stderr.isatty())
-        if json_file is not None:
-            write_text(json_file, report.to_json(tables))
-        if csv_file is not None:
-            write_text(csv_file, report.to_csv(tables))
+    check_text(json_file, "JSON file", "{")
+    check_text(csv_file, "CSV file of the paper's tables", "table,rho_1")
+    tables = report.compute_with_progress(is_live=not quiet and sys.stderr.isatty())
+    if json_file is not None:
+        write_text(json_file, report.to_json(tables))
+    if csv_file is not None:
+        write_text(csv_file, report.to_csv(tables))
     if not quiet and STDOUT not in (json_file, csv_file):
         report.print_paper_tables(tables)
 
@@ -129,14 +127,12 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
     from bemkit.scenefile import load_scene, with_overrides
     from bemkit.study import report
 
-    with bad_input():
-        check_text(json_file, "JSON file", "{")
-        chosen = with_overrides(load_scene(scene), elements=elements)
-    with bad_input(scene):
+    check_text(json_file, "JSON file", "{")
+    chosen = with_overrides(load_scene(scene), elements=elements)
+    with concerning(scene):
         found = run_probe(chosen, n_starts=starts)
-    with bad_input():
-        if json_file is not None:
-            write_text(json_file, report.solutions_to_json(found, starts))
+    if json_file is not None:
+        write_text(json_file, report.solutions_to_json(found, starts))
     if json_file != STDOUT:
         report.print_solutions(found, starts)
     return 0 if found else NOT_CONVERGED

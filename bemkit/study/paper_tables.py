@@ -17,6 +17,7 @@ import numpy as np
 from bemkit.arrays import IntArray, read_only
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import NoResultError
 from bemkit.geometry.grading import Uniform
 from bemkit.model import Model, build_model
 from bemkit.operators.threads import blas_threads_for
@@ -40,7 +41,7 @@ _PAPER_TOLERANCE = 1e-8
 """``max|u_k+1 - u_k| <= 1e-8 max|u_k+1|`` on the contact boundary stops the outer iteration."""
 
 
-class PaperTableError(RuntimeError):
+class PaperTableError(NoResultError):
     """A pair of rho for which Algorithm 1 did not stop by the paper's criterion."""
 
 

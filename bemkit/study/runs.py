@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
 from bemkit.kinds import DISCRETISATIONS, SOLVERS
 from bemkit.mesh_options import MeshOptions
@@ -17,7 +18,7 @@ ACCURACIES = (1e-2, 1e-3, 1e-4)
 MOST_ELEMENTS = 500
 
 
-class StudyError(ValueError):
+class StudyError(InputError):
     """A study that cannot begin or cannot go on."""
 
 
@@ -111,31 +112,42 @@ class Run:
         Name of the sequence.
     size : float
         Number of elements, or wished accuracy.
-    scene : Scene
-        Made ready to run.
+    problem : Scene
+        Its own mesh, elements and driver do not matter.
+    element : Discretisation
+    options : MeshOptions
+    driver : ContactSolver
     """
 
     meshes: str
     size: float
-    scene: Scene = field(repr=False)
+    problem: Scene = field(repr=False)
+    element: Discretisation
+    options: MeshOptions
+    driver: ContactSolver
+
+    @property
+    def scene(self) -> Scene:
+        """Made ready to run; InputError if it does not allow the element type or the mesh."""
+        return replace(self.problem, discretisation=self.element, mesh=self.options, solver=self.driver)
 
     @property
     def discretisation(self) -> str:
-        """Its word."""
-        return DISCRETISATIONS.kind_of(self.scene.discretisation)
+        """The word for its elements."""
+        return DISCRETISATIONS.kind_of(self.element)
 
     @property
     def map(self) -> str:
         """Name of the Steklov-Poincare map that belongs to the elements."""
-        return "collocation" if isinstance(self.scene.discretisation, ConstantCollocation) else "Galerkin"
+        return "collocation" if isinstance(self.element, ConstantCollocation) else "Galerkin"
 
     @property
     def solver(self) -> str:
         """Its word, or the name of its class if it has none."""
         try:
-            return SOLVERS.kind_of(self.scene.solver)
-        except ValueError:
-            return type(self.scene.solver).__name__
+            return SOLVERS.kind_of(self.driver)
+        except InputError:
+            return type(self.driver).__name__
 
     @property
     def key(self) -> tuple[str, str, str, float]:
@@ -164,25 +176,21 @@ def all_runs(
     Raises
     ------
     StudyError
-        If nothing is left to run, two runs could not be told apart, the scene has no contact, or it does not allow an
-        element type, a mesh or a driver.
+        If nothing is left to run, two runs could not be told apart, the scene has no contact, or a size is no size of a
+        mesh. What the scene itself does not allow becomes a refused row.
     """
     if not scene.contact_parts:
         raise StudyError("no part of the scene is in contact: errors are measured along the contact boundary")
     try:
         runs = tuple(
-            Run(
-                sequence.name,
-                size,
-                replace(scene, discretisation=element, mesh=sequence.options(scene, size), solver=solver),
-            )
+            Run(sequence.name, size, scene, element, sequence.options(scene, size), solver)
             for element in discretisations
             for sequence in meshes
             if not (isinstance(element, ConstantCollocation) and isinstance(sequence, AdaptiveMeshes))
             for solver in solvers
             for size in sequence.sizes
         )
-    except ValueError as error:  # of the mesh options or the scene, which name the number
+    except InputError as error:  # of the mesh options, which name the number
         raise StudyError(str(error)) from error
     if not runs:
         raise StudyError(

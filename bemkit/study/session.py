@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from bemkit.outputs import check_figures, check_text, save_figure, write_text
@@ -16,6 +14,7 @@ from bemkit.study.rows import Row
 from bemkit.study.runs import Run
 from bemkit.study.sweep import timed_rows, untimed_rows
 from bemkit.study.wishes import Wishes
+from bemkit.workers import worker_processes
 
 FIGURE = "error-against-run-time.png"
 _DOTS_PER_INCH = 110  # sharp at the width of a page, and a small file
@@ -42,15 +41,15 @@ class Outputs:
     folder: str | None
     measures: tuple[str, ...]
 
-    def check(self) -> None:
-        """Find out, before any work is done, whether everything can be written."""
+    def check(self) -> list[Path]:
+        """Find out, before any work is done, whether everything can be written; return the files to be reserved."""
         if self.rows is not None and Path(self.rows).is_file():
             FILE.read(self.rows)  # says more about a broken file than that it stands in the way
-        if self.rows is not None:
-            FILE.check_target(self.rows)
+        targets = [] if self.rows is None else [FILE.check_target(self.rows)]
         check_text(self.csv, "CSV file of an error study", CSV_START)
         if self.folder is not None:
             check_figures(Path(self.folder), FIGURE)
+        return targets
 
     def write(self, title: str, rows: Sequence[Row]) -> None:
         """Write CSV and figure."""
@@ -127,12 +126,8 @@ class Session:
         if repeat is not None:
             yield from timed_rows(runs, reference, repeat=repeat, finished=finished, begins=begins)
             return
-        # spawned processes do not inherit threads that hold locks
-        executor = ProcessPoolExecutor(self.jobs, mp_context=get_context("spawn"))
-        try:
+        with worker_processes(self.jobs) as executor:
             yield from untimed_rows(runs, reference, executor, finished=finished)
-        finally:
-            executor.shutdown(cancel_futures=True)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from bemkit.errors import InputError
 from bemkit.reference.compare import answer_of
 from bemkit.reference.values import MEASURES, Reference, errors_of
 from bemkit.solution import Solution
@@ -113,10 +114,10 @@ def untimed_rows(
 
 def timed_row(run: Run, reference: Reference, repeat: int) -> Row:
     """Run once to warm up and for the errors, then repeatedly for the times, then once for the memory."""
-    found = attempt(run.scene)
+    found = _attempt(run)
     if not found.is_certified:
         return _row(run, found, reference, _UNTIMED)
-    solutions = [again for _ in range(repeat) if (again := attempt(run.scene).solution) is not None]
+    solutions = [again for _ in range(repeat) if (again := _attempt(run).solution) is not None]
     seconds = {stage: float(np.median([each.timings[stage] for each in solutions])) for stage in ("total", *STAGES)}
     measured = {f"seconds_{stage}": seconds[stage] for stage in STAGES}
     return _row(run, found, reference, measured | {"seconds": seconds["total"], "peak_memory": _peak_memory(run)})
@@ -124,14 +125,22 @@ def timed_row(run: Run, reference: Reference, repeat: int) -> Row:
 
 def untimed_row(run: Run, reference: Reference) -> Row:
     """Run once for the errors alone."""
-    return _row(run, attempt(run.scene), reference, _UNTIMED)
+    return _row(run, _attempt(run), reference, _UNTIMED)
+
+
+def _attempt(run: Run) -> Attempt:
+    try:
+        scene = run.scene
+    except InputError as error:
+        return Attempt(None, str(error), 0.0)
+    return attempt(scene)
 
 
 def _peak_memory(run: Run) -> float:
     """Return the largest memory [bytes] that one run holds at a time; tracing it slows the run down."""
     tracemalloc.start()
     try:
-        attempt(run.scene)
+        _attempt(run)
         return float(tracemalloc.get_traced_memory()[1])
     finally:
         tracemalloc.stop()

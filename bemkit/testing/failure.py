@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from bemkit.errors import BemkitError
 
-class CheckFailed(AssertionError):  # noqa: N818 - it reads as what happened, and pytest shows it as a failed test
+
+class CheckFailed(BemkitError, AssertionError):  # noqa: N818 - it reads as what happened, and pytest shows it as a failed test
     """An implementation breaks a promise of its protocol; the message names the promise and by how much."""
 
 

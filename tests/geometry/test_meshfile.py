@@ -1,4 +1,10 @@
+import contextlib
 import importlib.util
+import io
+import random
+import types
+import warnings
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -163,3 +169,99 @@ def test_missing_meshio_says_what_to_install(mesh: BoundaryMesh, tmp_path, monke
     for act in (lambda: read_mesh(tmp_path / "a.msh"), lambda: write_mesh(tmp_path / "a.msh", mesh)):
         with pytest.raises(GeometryError, match=r'meshio is not installed: pip install "bemkit\[mesh\]"'):
             act()
+
+
+FORMATS = ("msh", "vtk", "vtu", "inp", "mesh", "bdf", "su2")
+INSERTED = (b"nan", b"inf", b"-1", b"1e400", b"\n", b" 99999999 ", b"\x1b[31m", b"0", b"\xff")
+
+
+def damaged(content: bytes, chooser: random.Random) -> bytes:
+    """Return a file with some damage: cut, changed, shortened, with something inserted, or lines out of order."""
+    lines, place = content.split(b"\n"), chooser.randrange(len(content))
+    one, other = chooser.randrange(len(lines)), chooser.randrange(len(lines))
+    match chooser.randrange(6):
+        case 0:
+            return content[:place]
+        case 1:
+            return content[:place] + bytes([chooser.randrange(256)]) + content[place + 1 :]
+        case 2:
+            return content[:place] + content[place + chooser.randrange(1, 20) :]
+        case 3:
+            return content[:place] + chooser.choice(INSERTED) + content[place:]
+        case 4:
+            lines[one], lines[other] = lines[other], lines[one]
+        case _:
+            lines.insert(one, lines[other])
+    return b"\n".join(lines)
+
+
+def read_damaged_files(mesh: BoundaryMesh, folder: Path, n_files: int, seed: int) -> None:
+    write_mesh(folder / "body.msh", mesh)
+    stored, chooser = meshio.read(folder / "body.msh"), random.Random(seed)
+    for ending in FORMATS:
+        path = folder / f"file.{ending}"
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            meshio.write(path, stored, **({"file_format": "gmsh22", "binary": False} if ending == "msh" else {}))
+        content = path.read_bytes()
+        for _ in range(n_files):
+            path.write_bytes(damaged(content, chooser))
+            with warnings.catch_warnings(), contextlib.suppress(GeometryError):
+                warnings.simplefilter("ignore")  # of meshio
+                assert isinstance(read_mesh(path), BoundaryMesh)
+
+
+def test_damaged_files_are_read_or_refused(mesh: BoundaryMesh, tmp_path: Path) -> None:
+    read_damaged_files(mesh, tmp_path, 40, seed=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 7))
+def test_thousands_of_damaged_files_are_read_or_refused(mesh: BoundaryMesh, tmp_path: Path, seed: int) -> None:
+    read_damaged_files(mesh, tmp_path, 300, seed)
+
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"points": np.zeros(4)}, "its points are no finite coordinates"),
+        ({"points": np.where(SQUARE > 0.5, np.nan, SQUARE)}, "its points are no finite coordinates"),
+        ({"points": [["a", "b"]]}, "its points are no finite coordinates"),
+        ({"lines": np.array([[0, 1], [1, 9]])}, "its lines do not join pairs of its 4 points"),
+        ({"lines": np.array([[0, -1]])}, "its lines do not join pairs"),
+        ({"lines": np.array([0, 1, 2])}, "its lines do not join pairs"),
+        ({"cell_sets": {"top\x1b[31m": [[0]]}}, r"the group 'top\\x1b\[31m' has a name that is not printable"),
+        ({"cell_sets": {"top": [[7]]}}, "or lines that do not exist"),
+        ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be told"),
+    ],
+)
+def test_contents_that_make_no_sense_are_named(
+    change: dict[str, object], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = {"points": SQUARE, "lines": closed(4), "cell_sets": {}} | change
+    stored = types.SimpleNamespace(
+        points=content["points"],
+        cells=[types.SimpleNamespace(type="line", data=content["lines"])],
+        cell_data={},
+        cell_sets=content["cell_sets"],
+    )
+    monkeypatch.setattr(meshio, "read", lambda path: stored)
+    with pytest.raises(GeometryError, match=rf"x\.msh is damaged: .*{message}.*: write it anew") as caught:
+        read_mesh(tmp_path / "x.msh")
+    assert str(caught.value).isprintable()
+
+
+def test_what_meshio_says_is_printable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def complain(path: Path) -> None:
+        raise ValueError("bad \x1b[31m tag")
+
+    monkeypatch.setattr(meshio, "read", complain)
+    with pytest.raises(GeometryError, match=r"cannot be read \(ValueError: bad \?\[31m tag\)"):
+        read_mesh(tmp_path / "x.msh")
+
+
+def test_surfaces_have_no_boundary_lines(tmp_path: Path) -> None:
+    with pytest.raises(GeometryError, match="such files hold surfaces alone: export the lines"):
+        read_mesh(tmp_path / "x.ply")

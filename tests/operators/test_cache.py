@@ -15,6 +15,7 @@ import pytest
 from bemkit.files import OutputFileError
 from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
 from bemkit.geometry.space import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.hdf5 import seal
 from bemkit.operators import cache
 from bemkit.operators.boundary import double_layer, hypersingular, mass, single_layer
 from bemkit.operators.cache import CachedOperator, DamagedCacheError, MissingCacheError, StaleCacheError
@@ -105,6 +106,7 @@ def test_a_file_of_other_formulas_or_layout_is_stale(tmp_path: Path, monkeypatch
             cache.load(path, galerkin())
     with h5py.File(str(path), "r+") as file:
         file.attrs["schema_version"] = 99
+    seal(path, cache.MARKER)
     with pytest.raises(StaleCacheError, match="has layout version 99, this bemkit reads version 1"):
         cache.load(path, galerkin())
 
@@ -124,7 +126,7 @@ def test_a_truncated_file_is_refused(tmp_path: Path) -> None:
     content = path.read_bytes()
     for length in (600, len(content) // 2, len(content) - 1):
         path.write_bytes(content[:length])
-        with pytest.raises(DamagedCacheError, match=r"damaged|changed since it was written"):
+        with pytest.raises(DamagedCacheError, match="damaged"):
             cache.load(path, galerkin())
 
 
@@ -157,6 +159,7 @@ def test_an_array_of_another_shape_or_none_is_damage(tmp_path: Path) -> None:
             del file["arrays/strained"]
             if damage == "shape":
                 file["arrays/strained"] = np.zeros((3, 3))
+        seal(path, cache.MARKER)
         with pytest.raises(DamagedCacheError, match="the cache file is damaged"):
             cache.load(path, galerkin())
 

@@ -15,7 +15,7 @@ import h5py
 import pytest
 
 import bemkit as bk
-from bemkit.hdf5 import ResultFileError
+from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.io import read_result, write_result
 from bemkit.stability.files import read_rows, write_rows
 from bemkit.stability.sweep import Row
@@ -156,6 +156,7 @@ def test_rows_of_another_version_or_kind_are_refused(tmp_path: Path, result: Pat
     assert read_rows(path) == ("title = 'x'\n", (ROW,))
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = 99
+    seal(path, MARK)
     with pytest.raises(ResultFileError, match="layout version 99, this bemkit reads version 1: use the bemkit that"):
         read_rows(path)
     with pytest.raises(ResultFileError, match="not of 'bemkit stability -o'"):

@@ -6,7 +6,6 @@ import csv
 import dataclasses
 from pathlib import Path
 
-import click
 import matplotlib.image
 import pytest
 from click.testing import CliRunner, Result
@@ -15,7 +14,9 @@ from rich.console import Console
 import bemkit as bk
 from bemkit import outputs as outputs_module
 from bemkit.cli import commands
-from bemkit.hdf5 import ResultFileError
+from bemkit.complaint import complaint
+from bemkit.errors import BemkitError
+from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES
 from bemkit.study import sweep as sweep_module
 from bemkit.study.files import FILE, to_csv
@@ -122,7 +123,8 @@ def test_files_of_others_and_damaged_ones_stay(tmp_path: Path) -> None:
 
 def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:
     result = call("study", "receding-layer", *FEW)
-    message = str(result.exception)
+    assert isinstance(result.exception, BemkitError)
+    message = complaint(result.exception)
     assert "receding-layer: no closed form or reference solution belongs to this scene" in message
     assert "add --over-resolve 600 to measure against a fine solution (600 elements, about " in message
     assert " GB)" in message
@@ -175,10 +177,10 @@ def test_a_run_that_fails_shows_in_the_table_and_the_exit_code(tmp_path: Path) -
     ],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
-    complaint = call(*arguments).exception
-    assert isinstance(complaint, click.ClickException)
-    assert message in str(complaint)
-    assert len(str(complaint).splitlines()) == 1
+    error = call(*arguments).exception
+    assert isinstance(error, BemkitError)
+    assert message in str(error)
+    assert len(str(error).splitlines()) == 1
 
 
 def test_without_matplotlib_there_is_no_figure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -195,6 +197,7 @@ def test_a_label_that_is_missing_is_noticed(tmp_path: Path) -> None:
 
     with h5py.File(path, "r+") as file:
         del file["grading"]
+    seal(path, MARK)
     with pytest.raises(ResultFileError, match=r"grading is missing: the file is damaged"):
         FILE.read(path)
 

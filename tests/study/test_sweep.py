@@ -84,6 +84,16 @@ def test_rows_without_a_solution_say_why_and_claim_nothing() -> None:
         assert all(math.isnan(getattr(row, name)) for name in ("seconds", "peak_memory", *MEASURES))
 
 
+def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> None:
+    iterative = dataclasses.replace(bk.load_scene("paper-1"), discretisation=LINEAR, linear_solver=bk.Krylov())
+    stuck = dataclasses.replace(iterative, linear_solver=bk.Krylov(max_steps=1))
+    runs = all_runs(iterative, [CONSTANT, LINEAR], [uniform((20,))], [NEWTON])
+    rows = list(timed_rows([*runs, *all_runs(stuck, [LINEAR], [uniform((24,))], [NEWTON])], reference(), repeat=1))
+    assert [row.status for row in rows] == ["refused", "converged", "refused"]
+    assert "needs symmetric equations, and those of collocation are not" in rows[0].message
+    assert "conjugate gradients stopped after 1 of 1 steps" in rows[2].message
+
+
 def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
     meshes = AdaptiveMeshes((1e-2, 1e-6), most_elements=100)
     near, far = timed_rows(paper_runs(meshes, elements=(QUADRATIC,)), reference(), repeat=1)

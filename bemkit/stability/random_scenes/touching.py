@@ -10,6 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle, PolygonalObstacle
+from bemkit.errors import InputError
 from bemkit.expression import Expression
 from bemkit.scene import Contact, Part
 from bemkit.stability.random_scenes.bodies import Body, SideSample
@@ -101,7 +102,7 @@ def _plane(lowest: FloatArray, down: FloatArray, distance: float) -> HalfPlane:
 def _shaft(random: np.random.Generator, body: Body) -> Part:
     """Draw a shaft in the round hole of a body, with play or shrunk on it, or a gap all around."""
     if body.hole is None:
-        raise ValueError(f"the shape {body.shape} has no round hole: draw another one")
+        raise InputError(f"the shape {body.shape} has no round hole: draw another one")
     x, y, radius = body.hole
     names = [side.name for side in body.sides if _is_round(side, body.hole)]
     chosen = tuple(names) if chance(random, 0.6) else some_of(random, names)

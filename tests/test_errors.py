@@ -1,0 +1,85 @@
+"""Every error that bemkit raises on purpose has one base class, and the command line one place where errors end."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import importlib
+import pickle
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+import bemkit
+import bemkit.runner
+from bemkit.cli import main
+from bemkit.complaint import complaint, concerning
+from bemkit.errors import BemkitError, InputError, NoResultError
+
+MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
+"""Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
+
+
+def all_modules() -> list[str]:
+    return [
+        module.name for module in pkgutil.walk_packages(bemkit.__path__, "bemkit.") if "__main__" not in module.name
+    ]
+
+
+def error_classes() -> set[type[BaseException]]:
+    values = [value for name in all_modules() for value in vars(importlib.import_module(name)).values()]
+    classes = {value for value in values if isinstance(value, type) and issubclass(value, BaseException)}
+    return {value for value in classes if value.__module__.startswith("bemkit.")}
+
+
+def test_every_error_class_derives_from_the_one_base() -> None:
+    classes = error_classes()
+    assert len(classes) > 30
+    assert {value.__name__ for value in classes if not issubclass(value, BemkitError)} == set()
+
+
+def test_no_module_raises_a_bare_built_in_error() -> None:
+    raised = set()
+    for name in all_modules():
+        file = importlib.import_module(name).__file__
+        assert file is not None
+        for node in ast.walk(ast.parse(Path(file).read_text("utf-8"))):
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and isinstance(node.exc.func, ast.Name):
+                raised.add((name, node.exc.func.id))
+    built_in = {(name, word) for name, word in raised if hasattr(builtins, word)}
+    assert {pair for pair in built_in if pair[1] not in MISTAKES_OF_THE_CALLER} == set()
+
+
+@pytest.mark.parametrize("kind", [InputError, NoResultError])
+def test_errors_cross_the_border_of_a_process(kind: type[BemkitError]) -> None:
+    assert str(pickle.loads(pickle.dumps(kind("rho is -1")))) == "rho is -1"
+
+
+def test_what_an_error_concerns_stands_before_its_message() -> None:
+    with pytest.raises(InputError) as caught, concerning("study"), concerning("paper-1"):
+        raise InputError("rho is -1")
+    assert complaint(caught.value) == "study: paper-1: rho is -1"
+
+
+@pytest.mark.parametrize(("kind", "code"), [(InputError, 2), (BemkitError, 2), (NoResultError, 1)])
+def test_the_command_line_ends_named_errors_in_one_line(
+    kind: type[BemkitError], code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise kind("the mesh is\ntoo coarse")
+
+    monkeypatch.setattr(bemkit.runner, "run", refuse)
+    with pytest.raises(SystemExit) as end:
+        main(["run", "paper-1"])
+    assert end.value.code == code
+    assert capsys.readouterr().err == "bemkit: error: paper-1: the mesh is too coarse\n"
+
+
+def test_the_command_line_leaves_defects_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object, **options: object) -> None:
+        raise ValueError("shapes do not match")  # as numpy says it
+
+    monkeypatch.setattr(bemkit.runner, "run", fail)
+    with pytest.raises(ValueError, match="shapes do not match"):
+        main(["run", "paper-1"])
