@@ -17,7 +17,7 @@ from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.obstacle import Gap
 from bemkit.expression import Expression
 from bemkit.geometry.shapes import Rectangle
-from bemkit.hdf5 import Reader
+from bemkit.hdf5 import MARK, seal
 from bemkit.io import read_result, write_result
 from bemkit.operators.material import Material
 from bemkit.plan import make_plan, this_machine
@@ -60,7 +60,7 @@ def test_a_file_written_before_there_were_warnings_can_be_read(tmp_path: Path, s
     write_result(tmp_path / "r.h5", solution)
     with h5py.File(tmp_path / "r.h5", "r+") as file:
         del file["warnings"], file["plan/warnings"]
-        file.attrs["sha256"] = Reader("old", 10**9, file).checksum()
+    seal(tmp_path / "r.h5", MARK)
     again = read_result(tmp_path / "r.h5")
     assert (again.warnings, again.plan.warnings) == ((), ())
 
