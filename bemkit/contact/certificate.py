@@ -82,9 +82,9 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     Tractions are measured by the largest traction in the state or in the glued state (all nodes held), whichever is
     larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
     Lengths are measured by the displacement which the largest nodal force causes at its node, ``force / E'``, however
-    few nodes or small elements carry it: a far obstacle or a long rigid motion does not loosen the test until it exceeds
-    1e6 times that displacement, where round-off would speak instead. A state without tractions, such as that of a loose
-    body which has given way to an overlap, has no length but its displacement.
+    few nodes or small elements carry it: a far obstacle or a long rigid motion does not loosen the test until it
+    exceeds 1e6 times that displacement, where round-off would speak instead. A state without tractions, such as that of
+    a loose body which has given way to an overlap, has no length but its displacement.
     """
     stress, length = certificate_scales(problem, state)
     clearance = problem.gap - state.u_n

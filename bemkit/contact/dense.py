@@ -54,8 +54,8 @@ class DenseBody:
     free_tangents : FreeTangents, optional
         Nodes without friction whose tangential displacement is no unknown; none by default.
     modulus : float, optional [Pa]
-        E' of the material: force per displacement of one node. By default the median of the diagonal normal stiffnesses,
-        of those that are more than round-off.
+        E' of the material: force per displacement of one node. By default the median of the diagonal normal
+        stiffnesses, of those that are more than round-off.
 
     Raises
     ------
@@ -94,8 +94,8 @@ class DenseBody:
             raise ValueError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
         if self.modulus is None and len(motions) >= n_unknowns:
             raise ValueError(
-                f"{len(motions)} rigid motions leave nothing of a stiffness of {n_unknowns} unknowns but round-off: give "
-                "modulus, the E' of the material"
+                f"{len(motions)} rigid motions leave nothing of a stiffness of {n_unknowns} unknowns but round-off: "
+                "give modulus, the E' of the material"
             )
         if self.modulus is not None and not (math.isfinite(self.modulus) and self.modulus > 0.0):
             raise ValueError(f"modulus = {self.modulus:g}; give the E' of the material, a positive number")

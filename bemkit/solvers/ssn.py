@@ -48,6 +48,8 @@ class NewtonIterate(Iterate):
     phase : Phase
     n_in_phase : int
         Steps taken in this phase.
+    n_sprung : int
+        The last of these that springs held and that kept the sets.
     n_paths : int
         Paths followed so far.
     """
@@ -59,6 +61,7 @@ class NewtonIterate(Iterate):
     visited: frozenset[bytes]
     phase: Phase = Phase.FULL
     n_in_phase: int = 0
+    n_sprung: int = 0
     n_paths: int = 0
 
 
@@ -134,7 +137,7 @@ class SemismoothNewton:
 
     def _full_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         conditions = self._conditions(problem)
-        response = respond(conditions, iterate.trial, iterate.sets)
+        response = respond(conditions, iterate.trial, iterate.sets, iterate.n_sprung)
         trial = conditions.evaluate(response.state)
         sets = conditions.cautious(trial, iterate.sets)
         size = merit(problem, trial)
@@ -149,6 +152,7 @@ class SemismoothNewton:
             best=(size, trial) if size < iterate.best[0] else iterate.best,
             visited=iterate.visited | {sets.key},
             n_in_phase=iterate.n_in_phase + 1,
+            n_sprung=iterate.n_sprung + 1 if response.is_sprung and sets.key == iterate.sets.key else 0,
         )
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
