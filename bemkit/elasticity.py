@@ -14,7 +14,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.space import BoundarySpace, dof_points
 from bemkit.model import check_position, check_same_body, elastic_map, physical_fields
-from bemkit.operators.balance import FORGIVEN, resultant_imbalance, round_off_of
+from bemkit.operators.balance import Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.nodal import NodalConditions, supported, unsupported_motions
 from bemkit.operators.rigid import possible_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -127,11 +127,11 @@ class ElasticModel:
         points = dof_points(self.elastic.displacement_space)
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         balanced = possible_motions(self.elastic.displacement_space.mesh)
-        resultant, moment = resultant_imbalance(points, force, balanced, round_off)
         total = float(np.abs(force).sum()) or 1.0
         missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
-        residual = (np.abs(missing).max(initial=0.0) - min(round_off, FORGIVEN * total)) / total
-        return Certificate(0.0, 0.0, 0.0, 0.0, 0.0, max(resultant, float(residual), 0.0), max(moment, 0.0))
+        residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
+        off = residual.joined(resultant_imbalance(points, force, balanced, round_off))
+        return Certificate(0.0, 0.0, 0.0, 0.0, 0.0, off.force, off.moment, off.round_off)
 
 
 def build_elastic_model(

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.kinds import DISCRETISATIONS, SOLVERS
 from bemkit.plan import Machine, Plan
@@ -111,9 +112,6 @@ def format_seconds(seconds: float) -> str:
 
 
 def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
-    certificate = solution.certificate
-    worst_name = max(certificate.as_dict(), key=lambda name: _nan_first(certificate.as_dict()[name]))
-    worst_name = f" ({worst_name.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
     timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
     colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
     status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
@@ -128,10 +126,17 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
         ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
         *_estimate(solution),
         *_solve(solution),
-        ("certificate", Text(f"worst entry {certificate.worst:.1e}{worst_name}")),
+        ("certificate", Text(_certificate_line(solution.certificate))),
         ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
     ]
     return rows
+
+
+def _certificate_line(certificate: Certificate) -> str:
+    violations = certificate.violations
+    worst = max(violations, key=lambda name: _nan_first(violations[name]))
+    name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
+    return f"worst entry {certificate.worst:.1e}{name}; round-off of the forces up to {certificate.round_off:.1e}"
 
 
 def _symmetry(solution: Solution) -> list[tuple[str, Text]]:

@@ -8,6 +8,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import BemkitError, InputError
+from bemkit.operators.balance import Imbalance
 
 
 class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller
@@ -106,7 +107,11 @@ class LinearBody(Protocol):
 
     @property
     def stiffness_scale(self) -> float:
-        """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho."""
+        """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho.
+
+        It comes from what the body is, E' per weight of a node: of a body on as few nodes as it has free motions
+        nothing else is left.
+        """
         ...
 
     @property
@@ -158,7 +163,7 @@ class LinearBody(Protocol):
         """
         ...
 
-    def imbalance(self, state: ContactState) -> tuple[float, float]:
+    def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far load and contact tractions are from equilibrium.
 
         Parameters
@@ -167,7 +172,7 @@ class LinearBody(Protocol):
 
         Returns
         -------
-        force, moment : float
+        Imbalance
             Relative to the largest force (times the size of the body) at hand.
         """
         ...

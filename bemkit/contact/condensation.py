@@ -17,7 +17,7 @@ from bemkit.contact.nodes import free_motions, held_nodes
 from bemkit.contact.unknowns import Unknowns, find_free_tangents, find_tangents, find_unknowns
 from bemkit.errors import InputError
 from bemkit.geometry.space import dof_points
-from bemkit.operators.balance import resultant_imbalance, round_off_of
+from bemkit.operators.balance import Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.nodal import NodalConditions, Support
 from bemkit.operators.rigid import possible_motions, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -137,20 +137,19 @@ class CondensedBody:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
         return self.condensed.recover(self.unknowns.opened(state.displacement.ravel()[self.unknowns.numbers]))
 
-    def imbalance(self, state: ContactState) -> tuple[float, float]:
+    def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body (loads, contact, reactions) are from equilibrium of forces and moments.
 
-        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. What may
-        be round-off of the forces, which in thin bodies are small differences of large terms, does not count.
+        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. Its
+        round-off is that of the forces, which in thin bodies are small differences of large terms.
         """
         displacement, force = self.recover(state)
-        residual, work = self.dense.imbalance(state)
+        of_contact = self.dense.imbalance(state)
         total = float(np.abs(force).sum())
         if not self.balanced or self._only_moves(displacement, total):
-            return residual, work
+            return of_contact
         round_off = round_off_of(displacement, self.condensed.sensitivity)
-        force_imbalance, moment_imbalance = resultant_imbalance(self.points, force, self.balanced, round_off)
-        return max(residual, force_imbalance), max(work, moment_imbalance)
+        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, round_off))
 
     def _only_moves(self, displacement: FloatArray, total: float) -> bool:
         """Whether the body has moved rigidly, so that its forces are what is left of terms which cancel."""
@@ -206,6 +205,7 @@ def condense(
     stiffness = unknowns.to_open.T @ condensed.stiffness @ unknowns.to_open
     free = find_free_tangents(conditions, contact, is_free, unknowns, condensed)
     motions = free_motions(conditions, contact, space)
-    dense = DenseBody(stiffness, unknowns.load(condensed), contact.weights, motions, free)
+    modulus = elastic.material.plane_modulus
+    dense = DenseBody(stiffness, unknowns.load(condensed), contact.weights, motions, free, modulus)
     points = dof_points(space)
     return CondensedBody(dense, condensed, unknowns, points, conditions, contact, possible_motions(space.mesh))

@@ -11,6 +11,10 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
 
+_FREE = 1e-9
+"""A unit rigid motion that changes no condition by more than this is free of them. Normals leave about 1e-16; one held
+node out of a million gives 1e-3."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearConditions:
@@ -67,6 +71,28 @@ class LinearConditions:
             np.where(rows[:, :, None], other.on_traction, self.on_traction),
             np.where(rows, other.value, self.value),
         )
+
+    def free_motions(self, motions: FloatArray) -> FloatArray:
+        """Return the rigid motions that change no condition: nothing but tractions are prescribed along them.
+
+        Parameters
+        ----------
+        motions : (n_motions, n_contact, 2) array
+            Motions without tractions, linearly independent.
+
+        Returns
+        -------
+        (n_free, n_contact, 2) array
+            An orthonormal basis.
+        """
+        if not len(motions):
+            return motions
+        basis = np.linalg.qr(motions.reshape(len(motions), -1).T)[0].T.reshape(-1, self.n_contact, 2)
+        size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
+        rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
+        felt = np.einsum("nrc,mnc->nrm", rows, basis).reshape(-1, len(basis))
+        _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
+        return np.tensordot(directions[np.count_nonzero(singular > _FREE) :], basis, axes=1)
 
     def held_by_springs(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
         """Return the conditions with weak springs added wherever only tractions are prescribed.

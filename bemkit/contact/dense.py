@@ -1,5 +1,6 @@
 """A body given by its dense stiffness matrix."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,15 +10,14 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
-from bemkit.operators.balance import FORGIVEN
+from bemkit.operators.balance import Imbalance
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
 of a floating body leaves 1e-15 of its free motions; drivers that are refused without need only take a detour."""
 
-_FREE_MOTION = 1e-9
-"""A rigid motion that changes no condition by more than this (of unit motion) is not held by them. Boundary element
-stiffnesses leave about 1e-11 on rigid motions; one held node out of a million gives 1e-3."""
+_LEFT_OVER = 1e-9
+"""Stiffnesses below this share of the largest may be what round-off leaves of none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,15 @@ class DenseBody:
         Rigid motions that only contact holds; none by default.
     free_tangents : FreeTangents, optional
         Nodes without friction whose tangential displacement is no unknown; none by default.
+    modulus : float, optional [Pa]
+        E' of the material: force per displacement of one node. By default the median of the diagonal normal
+        stiffnesses, of those that are more than round-off.
 
     Raises
     ------
     ValueError
-        If shapes do not fit or entries are not finite, or a weight is not positive.
+        If shapes do not fit or entries are not finite, if a weight or the modulus is not positive, or if the modulus is
+        left out where the motions leave nothing of the stiffness to tell it from.
     """
 
     stiffness: FloatArray
@@ -66,6 +70,7 @@ class DenseBody:
     weights: FloatArray
     motions: FloatArray | None = None
     free_tangents: FreeTangents | None = None
+    modulus: float | None = None
 
     def __post_init__(self) -> None:
         n_contact, n_unknowns = self.n_contact, self.n_unknowns
@@ -88,6 +93,13 @@ class DenseBody:
             raise InputError("weights is empty; a body needs at least one contact node")
         if self.weights.min() <= 0.0:
             raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
+        if self.modulus is None and len(motions) >= n_unknowns:
+            raise InputError(
+                f"{len(motions)} rigid motions leave nothing of a stiffness of {n_unknowns} unknowns but round-off: "
+                "give modulus, the E' of the material"
+            )
+        if self.modulus is not None and not (math.isfinite(self.modulus) and self.modulus > 0.0):
+            raise InputError(f"modulus = {self.modulus:g}; give the E' of the material, a positive number")
 
     @property
     def n_contact(self) -> int:
@@ -109,13 +121,13 @@ class DenseBody:
 
     @cached_property
     def stiffness_scale(self) -> float:
-        """Median of the diagonal normal stiffnesses per weight [Pa/m]."""
-        diagonal = np.diagonal(self.stiffness)[self._unknowns % 2 == 0] / self.weights
-        is_stiff = diagonal > 0.0
-        if np.any(is_stiff):
-            return float(np.median(diagonal[is_stiff]))
+        """Modulus per median weight [Pa/m], or the median of the diagonal normal stiffnesses per weight."""
+        if self.modulus is not None:
+            return self.modulus / float(np.median(self.weights))
+        diagonal = np.diagonal(self.stiffness) / self.weights[self._unknowns // 2]
         largest = float(np.abs(self._traction_of_displacement).max())
-        return largest if largest > 0.0 else 1.0
+        stiff = diagonal[(diagonal > _LEFT_OVER * largest) & (self._unknowns % 2 == 0)]
+        return float(np.median(stiff)) if stiff.size else largest or 1.0
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response; one LU factorisation of `n_unknowns`, none if all displacements are given.
@@ -156,15 +168,15 @@ class DenseBody:
         """Return the work of the load on these motions."""
         return self._motions @ self.load
 
-    def imbalance(self, state: ContactState) -> tuple[float, float]:
+    def imbalance(self, state: ContactState) -> Imbalance:
         """Return the largest nodal force out of balance, and the work of load and tractions on rigid motions.
 
         Notes
         -----
         The first number is the residual of ``weights * t = stiffness @ u - load`` (and of free tangents that do not
         follow), so it also detects states that are no response of this body. It is relative to the largest nodal force
-        (term of the sums), the second one to the largest load or contact force, beyond their round-off. Forces that
-        the stiffness makes of a rigid motion, zero but for round-off, count in neither.
+        (term of the sums), the second one to the largest load or contact force. Round-off is what the stiffness makes
+        of the rigid part of the displacements, and that of the sums.
         """
         forces = (self.weights[:, None] * state.traction).ravel()[self._unknowns]
         unknowns = state.displacement.ravel()[self._unknowns]
@@ -172,19 +184,19 @@ class DenseBody:
         stray = self._stray_forces(state, unknowns)
         largest = max(np.abs(forces).max(), np.abs(self.load).max(), np.abs(terms).max(), stray)
         if largest == 0.0:
-            return 0.0, 0.0
-        missing = np.abs(terms.sum(axis=1) - self.load - forces)
-        missing -= np.minimum(self._left_by_motions(unknowns), FORGIVEN * largest)
-        residual = max(missing.max(), stray) / largest
+            return Imbalance(0.0, 0.0)
+        missing = np.abs(terms.sum(axis=1) - self.load - forces).max()
+        left = float(np.max(self._left_by_motions(unknowns), initial=0.0))
+        residual = Imbalance(float(np.maximum(missing, stray) / largest), 0.0, left / float(largest))
         motions = self._motions
         if not len(motions):
-            return float(residual), 0.0
+            return residual
         # Not relative to the stiffness terms: a body on its way to infinity would balance any load by comparison.
         given = max(np.abs(forces).max(), np.abs(self.load).max()) or largest
         defect = self._motion_defect @ np.abs(unknowns)
-        round_off = min(defect + np.finfo(float).eps * np.abs(terms).sum(), FORGIVEN * given)
+        round_off = defect + np.finfo(float).eps * np.abs(terms).sum()
         work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
-        return float(residual), max(float(work - round_off), 0.0) / float(given)
+        return residual.joined(Imbalance(0.0, float(work / given), float(round_off / given)))
 
     def _left_by_motions(self, unknowns: FloatArray) -> FloatArray:
         """Return the forces (n_unknowns,) that round-off of the stiffness makes of the rigid part of displacements."""
@@ -259,6 +271,9 @@ class DenseBody:
 
     def _solved(self, conditions: LinearConditions) -> FloatArray:
         """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the unknowns with every row scaled to one."""
+        # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
+        if len(conditions.free_motions(self.rigid_motions())):
+            raise SingularResponse("the contact conditions leave a rigid motion free")
         matrix = np.matmul(conditions.on_traction, self._traction_of_displacement).reshape(-1, self.n_unknowns)
         right_side = conditions.value + np.matmul(conditions.on_traction, self._free_traction[:, :, None])[:, :, 0]
         matrix, right_side = matrix[self._unknowns], right_side.ravel()[self._unknowns]
@@ -272,7 +287,6 @@ class DenseBody:
         if not row_size.all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
         matrix /= row_size[:, None]
-        self._check_motions_are_held(matrix)
         right_sides = np.stack([right_side / row_size, self._probe], axis=1)
         try:
             solution, probed = np.linalg.solve(matrix, right_sides).T
@@ -290,10 +304,3 @@ class DenseBody:
         """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
         multiples = np.arange(1, self.n_unknowns + 1) * 0.6180339887498949
         return np.asarray(0.5 + np.modf(multiples)[0])
-
-    def _check_motions_are_held(self, matrix: FloatArray) -> None:
-        if not self.rigid_motions().size:
-            return
-        held = float(np.linalg.svd(matrix @ self._orthonormal_motions, compute_uv=False)[-1])
-        if held < _FREE_MOTION:
-            raise SingularResponse(f"the contact conditions leave a rigid motion free (held by {held:.1e})")

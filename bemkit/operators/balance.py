@@ -1,17 +1,52 @@
-"""Whether the forces on a body are in equilibrium, as far as round-off lets one tell."""
+"""Whether the forces on a body are in equilibrium, and as far as round-off lets one tell."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 
-FORGIVEN = 1e-6
-"""Share of the forces up to which an imbalance may be put down to round-off; beyond, too few digits are left. What is
-put down to it is the estimate of `round_off_of`, 1e-12 in all but thin bodies; a strip of 1000 : 1 has an imbalance of
-1e-7 and an estimate of 1e-6. More than that no check of the result would let pass."""
+MOST_ROUND_OFF = 1e-6
+"""Share of the forces up to which an imbalance may be put down to round-off; beyond, too few digits are left. The
+estimate is 1e-12 in all but thin or nearly incompressible bodies; a strip of 1000 : 1 has an imbalance of 1e-7 and an
+estimate of 1e-6. More than that no check of the result would let pass."""
+
+
+@dataclass(frozen=True)
+class Imbalance:
+    """How far forces are from equilibrium, relative to their sizes.
+
+    Parameters
+    ----------
+    force, moment : float
+        As measured.
+    round_off : float
+        How much of that round-off alone may leave. It is cut off at `MOST_ROUND_OFF`.
+    """
+
+    force: float
+    moment: float
+    round_off: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "round_off", min(self.round_off, MOST_ROUND_OFF))
+
+    @property
+    def worst(self) -> float:
+        """The larger of the two measured numbers."""
+        return float(np.maximum(self.force, self.moment))
+
+    def is_below(self, tolerance: float) -> bool:
+        """Whether what is measured exceeds the tolerance by no more than round-off may leave; not if it is ``nan``."""
+        return self.worst <= tolerance + self.round_off
+
+    def joined(self, other: Imbalance) -> Imbalance:
+        """Return the larger of each of the numbers of two measurements."""
+        mine, others = ((of.force, of.moment, of.round_off) for of in (self, other))
+        return Imbalance(*np.maximum(mine, others).tolist())
 
 
 def round_off_of(displacement: FloatArray, sensitivity: FloatArray | None) -> float:
@@ -25,7 +60,7 @@ def round_off_of(displacement: FloatArray, sensitivity: FloatArray | None) -> fl
 
     Returns
     -------
-    float
+    float [N/m]
         Zero if the sensitivity is not known.
     """
     if sensitivity is None:
@@ -35,7 +70,7 @@ def round_off_of(displacement: FloatArray, sensitivity: FloatArray | None) -> fl
 
 def resultant_imbalance(
     points: FloatArray, force: FloatArray, balanced: Collection[int], round_off: float
-) -> tuple[float, float]:
+) -> Imbalance:
     """Return resultant force and moment of all forces on a body, relative to the sum of their sizes.
 
     Parameters
@@ -43,20 +78,19 @@ def resultant_imbalance(
     points, force : (n_nodes, 2) arrays [m], [N/m]
     balanced : collection of int
         Which of the resultants along x and y and the moment (0, 1, 2) have to vanish.
-    round_off : float
-        What does not count, up to a share `FORGIVEN` of the forces.
+    round_off : float [N/m]
+        What may be left of a sum of these forces.
 
     Returns
     -------
-    force, moment : float
-        The moment about the mean point, in units of the size of the body; not positive where only round-off is left.
+    Imbalance
+        The moment about the mean point, in units of the size of the body.
     """
     total = float(np.abs(force).sum())
     if not balanced or total == 0.0:
-        return 0.0, 0.0
+        return Imbalance(0.0, 0.0)
     arm = points - points.mean(axis=0)
     moment = abs(float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])))
     sums = np.append(np.abs(force.sum(axis=0)), moment / float(np.abs(arm).max()))
-    is_balanced = np.isin(np.arange(3), list(balanced))
-    off = np.where(is_balanced, sums - min(round_off, FORGIVEN * total), 0.0) / total
-    return float(off[:2].max()), float(off[2])
+    off = np.where(np.isin(np.arange(3), list(balanced)), sums, 0.0) / total
+    return Imbalance(float(off[:2].max()), float(off[2]), round_off / total)

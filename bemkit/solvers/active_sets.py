@@ -8,6 +8,12 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.projection import (
+    clip_to_bound,
+    clip_to_bound_derivative,
+    positive_part,
+    positive_part_derivative,
+)
 
 
 class NodeStatus(IntEnum):
@@ -60,7 +66,7 @@ class Trial:
     ----------
     state : ContactState
     sets : ActiveSets
-        By the signs of the projected quantities. Ties count as separated and as stick.
+        By the generalised derivatives of the projections. Ties count as separated and as stick.
     bound, slope : (n_contact,) arrays [Pa], [-]
         Friction bound and its derivative at the predicted normal traction.
     predicted_sigma_n : (n_contact,) array [Pa]
@@ -111,18 +117,19 @@ class ProjectedConditions:
         multiplier = state.traction if self.multiplier is None else self.multiplier
         towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
         along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
-        is_closed = towards_obstacle > 0.0
-        predicted_sigma_n = -np.maximum(towards_obstacle, 0.0)
+        is_closed = positive_part_derivative(towards_obstacle) > 0.0
+        predicted_sigma_n = -positive_part(towards_obstacle)
         if self.given_bound is None:
             bound = problem.friction_bound(predicted_sigma_n, is_closed)
             slope = problem.friction_slope(predicted_sigma_n, is_closed)
         else:
             bound, slope = self.given_bound, np.zeros_like(self.given_bound)
-        direction = (along_obstacle > bound).astype(np.intp) - (along_obstacle < -bound)
+        _, direction = clip_to_bound_derivative(along_obstacle, bound)
         residual = state.traction.copy()
         residual[:, 0] -= predicted_sigma_n
-        residual[:, 1] += np.clip(along_obstacle, -bound, bound)
-        return Trial(state, ActiveSets(is_closed, direction), bound, slope, predicted_sigma_n, residual)
+        residual[:, 1] += clip_to_bound(along_obstacle, bound)
+        sets = ActiveSets(is_closed, direction.astype(np.intp))
+        return Trial(state, sets, bound, slope, predicted_sigma_n, residual)
 
     def linearised(self, trial: Trial, sets: ActiveSets) -> LinearConditions:
         """Return the Newton equations at a trial for the given sets (its own, or these made more cautious).

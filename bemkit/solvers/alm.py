@@ -172,19 +172,20 @@ def solve_projected(conditions: ProjectedConditions, start: ContactState, option
     from any start.
     """
     trial = conditions.evaluate(start)
-    sets, linear_solves = trial.sets, 0
+    sets, linear_solves, n_sprung = trial.sets, 0, 0
     for step in range(options.max_steps):
-        response = respond(conditions, trial, sets)
+        response = respond(conditions, trial, sets, n_sprung)
         linear_solves += response.linear_solves
         reached = conditions.evaluate(response.state)
         if _is_solved(conditions, trial, reached, sets, is_sprung=response.is_sprung):
             return InnerResult(response.state, linear_solves, is_solved=True)
         if step < options.full_steps:
-            sets = conditions.cautious(reached, sets)
+            following = conditions.cautious(reached, sets)
         else:
             reached = conditions.evaluate(_descended(conditions, trial, response.state))
-            sets = reached.sets
-        trial = reached
+            following = reached.sets
+        n_sprung = n_sprung + 1 if response.is_sprung and following.key == sets.key else 0
+        trial, sets = reached, following
     return InnerResult(trial.state, linear_solves, is_solved=False)
 
 

@@ -8,13 +8,9 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.contact.problem import ContactState, LinearBody, SingularResponse
 
-_FREE = 1e-9
-"""A unit rigid motion that changes no condition by more than this is free of them. Boundary elements leave about 1e-11
-on rigid motions; one held node out of a million gives 1e-3."""
-
 _BALANCED = 1e-12
-"""Imbalance, beyond what the body puts down to round-off, below which nothing is left that could move it. A certificate
-asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+"""Imbalance, beyond what round-off may leave, below which nothing is left that could move a body. A certificate asks
+for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +65,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     tractions take their place. The result carries them to the last digit; weak springs would leave a little
     everywhere, which a condition such as "friction only where something presses" cannot tell from contact.
     """
-    free = _free_motions(body, conditions)
+    free = conditions.free_motions(body.rigid_motions())
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
     gives_traction[:, 1] &= ~body.tangent_is_free  # whose displacement cannot be held
     if not len(free) or np.count_nonzero(gives_traction) < len(free):
@@ -88,21 +84,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
-    return FloatingResponse(state, free) if max(body.imbalance(state)) <= _BALANCED else None
-
-
-def _free_motions(body: LinearBody, conditions: LinearConditions) -> FloatArray:
-    """Return an orthonormal basis (n_free, n_contact, 2) of the rigid motions that change no condition."""
-    motions = body.rigid_motions()
-    if not len(motions):
-        return motions
-    basis = np.linalg.qr(motions.reshape(len(motions), -1).T)[0].T.reshape(-1, body.n_contact, 2)
-    size = np.abs(conditions.on_displacement).max(axis=2, keepdims=True)
-    rows = conditions.on_displacement / np.where(size > 0.0, size, 1.0)
-    felt = np.einsum("nrc,mnc->mnr", rows, basis).reshape(len(basis), -1)
-    directions, singular, _ = np.linalg.svd(felt)
-    held = np.count_nonzero(singular > _FREE)
-    return np.asarray(np.tensordot(directions[:, held:].T, basis, axes=1))
+    return FloatingResponse(state, free) if body.imbalance(state).is_below(_BALANCED) else None
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:

@@ -13,11 +13,12 @@ from bemkit.contact.conditions import stick
 from bemkit.contact.partwise import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.newton import spring_stiffness
 from bemkit.solvers.options import check_max_steps
 
-_SPRING = 1e-6
-"""Springs on free rigid motions, in units of the mean diagonal of the stiffness; they are carried along from step to
-step and vanish from the solution."""
+_WEAKER = 1e-2
+"""Springs on free rigid motions, in units of those of the other drivers: the body may have to slide far in a few steps,
+at the cost of that many digits."""
 
 _ROUND_OFF = 1e-11
 """Tableau entries smaller than this, relative to the largest of their column, are left-overs of eliminations."""
@@ -71,9 +72,9 @@ class LemkePivoting:
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
         """Pivot from the origin to a solution."""
         stiffness, load, linear_solves = _probed(problem)
-        spring_stiffness, spring_load = _springs(problem, stiffness, iterate.state)
+        springs, spring_load = _springs(problem, iterate.state)
         try:
-            compliance = np.asarray(np.linalg.inv(stiffness + spring_stiffness), dtype=float)
+            compliance = np.asarray(np.linalg.inv(stiffness + springs), dtype=float)
         except np.linalg.LinAlgError:
             return replace(iterate, ended=Status.SINGULAR, message="the body has motions that are not listed as rigid")
         free = compliance @ (load + spring_load)
@@ -200,15 +201,18 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
 
-def _springs(problem: ContactProblem, stiffness: FloatArray, state: ContactState) -> tuple[FloatArray, FloatArray]:
-    """Return stiffness and load of springs on the free rigid motions, without force at the given state."""
-    motions = problem.body.rigid_motions()
+def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and load of springs on the free rigid motions, without force at the given state.
+
+    They are carried along from step to step and vanish from the solution.
+    """
+    motions, n_unknowns = problem.body.rigid_motions(), 2 * problem.n_contact
     if not len(motions):
-        return np.zeros_like(stiffness), np.zeros(len(stiffness))
+        return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
     is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_free], axis=1)
     motions = (motions * is_held).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
-    scale = _SPRING * float(np.diagonal(stiffness).mean())
+    scale = _WEAKER * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
     springs = scale * orthonormal @ orthonormal.T
     return springs, springs @ state.displacement.ravel()
 

@@ -14,6 +14,11 @@ _SPRING = 1e-3
 """Springs that hold an unheld body, in units of its stiffness scale. Small: each further step reduces what the
 springs still carry by about this factor. Not tiny: the response must stay well determined."""
 
+_WEAKER = 0.1
+_WEAKEST = 1e-6
+"""Springs become weaker by the first factor with every step that ends in the sets it began with, so that a small force
+soon carries the body to where other sets hold it; by the second at most."""
+
 
 @dataclass(frozen=True, eq=False)
 class Response:
@@ -33,7 +38,7 @@ class Response:
     is_sprung: bool
 
 
-def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets) -> Response:
+def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, n_sprung: int = 0) -> Response:
     """Solve the linearised conditions.
 
     Parameters
@@ -43,6 +48,8 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets) -> 
         Where to linearise.
     sets : ActiveSets
         Sets of the Newton matrix.
+    n_sprung : int
+        Steps before this one that springs held with the same sets.
 
     Returns
     -------
@@ -63,12 +70,13 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets) -> 
         floating = floating_response(body, linear)
         if floating is not None:
             return Response(floating.nearest(trial.state.displacement), 2, is_sprung=False)
-        springs = linear.held_by_springs(trial.state.displacement, _spring(conditions.problem, trial.state))
+        stiffness = spring_stiffness(conditions.problem, trial.state) * max(_WEAKER**n_sprung, _WEAKEST)
+        springs = linear.held_by_springs(trial.state.displacement, stiffness)
         return Response(conditions.problem.respond(springs), 2, is_sprung=True)
 
 
-def _spring(problem: ContactProblem, state: ContactState) -> float:
-    """Return the stiffness of the springs [Pa/m]: so weak that the body reaches a far obstacle in about one step."""
+def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
+    """Return the stiffness of springs [Pa/m] so weak that the body reaches a far obstacle in about one step."""
     stress, _ = certificate_scales(problem, state)
     nearest = float(np.min(problem.gap - state.u_n))
     stiffness = problem.body.stiffness_scale

@@ -17,6 +17,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.conditions import LinearConditions, separated, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.solvers.active_sets import ActiveSets
 
 
 class _Kind(IntEnum):
@@ -75,8 +76,10 @@ def path_exists(problem: ContactProblem) -> bool:
     return not np.any(jumps & ~np.asarray(problem.law.acts_across_gap))
 
 
-def follow_path(problem: ContactProblem, bound: AffineBound, max_pieces: int | None = None) -> PathEnd:
-    """Return the first solution on the path that starts with all nodes pressed and sticking.
+def follow_path(
+    problem: ContactProblem, bound: AffineBound, start: ActiveSets | None = None, max_pieces: int | None = None
+) -> PathEnd:
+    """Return the first solution on the path that starts with given statuses.
 
     Parameters
     ----------
@@ -91,9 +94,16 @@ def follow_path(problem: ContactProblem, bound: AffineBound, max_pieces: int | N
     PathEnd
         Two linear solves a piece. Tractions and displacements are exact up to round-off.
     """
-    path = _Path(problem, bound)
-    is_closed = np.isfinite(problem.gap)
-    direction = np.zeros(problem.n_contact, dtype=np.intp)
+    if start is None:
+        extras = Extras.everywhere(problem)
+        is_closed, direction = np.isfinite(problem.gap), np.zeros(problem.n_contact, dtype=np.intp)
+    else:
+        try:
+            extras = Extras.covering(problem, bound, start)
+        except SingularResponse as error:
+            return PathEnd(None, 1, 0, f"{error}")
+        is_closed, direction = start.is_closed, start.direction
+    path = _Path(problem, bound, extras)
     limit = 20 * problem.n_contact + 100 if max_pieces is None else max_pieces
     amount, falling, entered = np.inf, -1.0, None
     for n_pieces in range(1, limit + 1):
@@ -116,17 +126,56 @@ def follow_path(problem: ContactProblem, bound: AffineBound, max_pieces: int | N
     return PathEnd(None, 2 * limit, limit, f"the path has more than {limit} pieces")
 
 
+@dataclass(frozen=True, eq=False)
+class Extras:
+    """What is added to a problem so that given statuses solve it, for an amount of one.
+
+    Parameters
+    ----------
+    pressure, friction : (n_contact,) arrays [Pa]
+        Traction along the outward normal on the body, and addition to the friction bound.
+    gap, slip : (n_contact,) arrays [m]
+        Additions to the gap and to the slip origin.
+    """
+
+    pressure: FloatArray
+    friction: FloatArray
+    gap: FloatArray
+    slip: FloatArray
+
+    @classmethod
+    def everywhere(cls, problem: ContactProblem) -> "Extras":
+        """Return pressure and friction at all nodes: with enough of it every node touches and sticks."""
+        stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+        extras, none = stress * _uneven(2 * problem.n_contact), np.zeros(problem.n_contact)
+        return cls(extras[::2], extras[1::2], none, none)
+
+    @classmethod
+    def covering(cls, problem: ContactProblem, bound: AffineBound, sets: ActiveSets) -> "Extras":
+        """Return what makes the inequalities hold that the response to some statuses violates, and nothing else."""
+        none = np.zeros(problem.n_contact)
+        piece = _Path(problem, bound, cls(none, none, none, none)).piece(sets.is_closed, sets.direction)
+        missing = np.where(piece.is_kept, np.maximum(-piece.slack, 0.0), 0.0)
+        missing *= _uneven(missing.size).reshape(missing.shape)
+        pressure = missing[_Kind.PRESSURE]
+        # the extra pressure shall not bring friction with it
+        friction = np.maximum(missing[_Kind.FORWARD], missing[_Kind.BACKWARD]) + bound.slope * pressure
+        return cls(pressure, friction, missing[_Kind.CLEARANCE], -sets.direction * missing[_Kind.SLIP])
+
+
+def _uneven(count: int) -> FloatArray:
+    """Return numbers from 1 to 3/2, as unequal as can be, which keep symmetric nodes from changing at once."""
+    fractions: FloatArray = np.modf(np.arange(1, count + 1) * 0.6180339887498949)[0]
+    return 1.0 + 0.5 * fractions
+
+
 class _Path:
     """The problem with extras."""
 
-    def __init__(self, problem: ContactProblem, bound: AffineBound) -> None:
+    def __init__(self, problem: ContactProblem, bound: AffineBound, extras: Extras) -> None:
         self.problem = problem
         self.bound = bound
-        stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
-        # Unequal extras keep symmetric nodes from changing at once. Golden-ratio fractions are as unequal as can be.
-        spread = np.modf(np.arange(1, 2 * problem.n_contact + 1) * 0.6180339887498949)[0]
-        extras = stress * (1.0 + 0.5 * spread)
-        self.pressure, self.friction = extras[::2], extras[1::2]
+        self.extras = extras
 
     def piece(self, is_closed: BoolArray, direction: IntArray) -> _Piece:
         """Respond to fixed statuses, at amount zero and at amount one."""
@@ -140,27 +189,30 @@ class _Path:
         conditions = conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
 
         # The body carries contact traction plus extra pressure; the conditions speak of contact tractions alone.
-        extra_value = conditions.on_traction[:, :, 0] * self.pressure[:, None]
-        extra_value[:, 1] -= direction * self.friction
+        extras = self.extras
+        extra_value = conditions.on_traction[:, :, 0] * extras.pressure[:, None]
+        extra_value[:, 1] -= direction * extras.friction
+        extra_value += conditions.on_displacement[:, :, 0] * extras.gap[:, None]
+        extra_value += conditions.on_displacement[:, :, 1] * extras.slip[:, None]
         with_extras = LinearConditions(
             conditions.on_displacement, conditions.on_traction, conditions.value + extra_value
         )
         origin, shifted = problem.respond(conditions), problem.respond(with_extras)
         traction_rate = shifted.traction - origin.traction
-        traction_rate[:, 0] -= self.pressure
+        traction_rate[:, 0] -= extras.pressure
         rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
 
         origin_slip = origin.u_t - problem.slip_origin
         room = bound.slope * origin.sigma_n + bound.intercept
-        room_rate = bound.slope * rate.sigma_n + self.friction
+        room_rate = bound.slope * rate.sigma_n + extras.friction
         slack = [-origin.sigma_n, problem.gap - origin.u_n, room + origin.sigma_t, room - origin.sigma_t]
-        slack_rate = [-rate.sigma_n, -rate.u_n, room_rate + rate.sigma_t, room_rate - rate.sigma_t]
+        slack_rate = [-rate.sigma_n, extras.gap - rate.u_n, room_rate + rate.sigma_t, room_rate - rate.sigma_t]
         return _Piece(
             origin,
             rate,
             np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips]),
             np.stack([*slack, direction * origin_slip]),
-            np.stack([*slack_rate, direction * rate.u_t]),
+            np.stack([*slack_rate, direction * (rate.u_t - extras.slip)]),
         )
 
 

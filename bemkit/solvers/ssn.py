@@ -11,8 +11,11 @@ from bemkit.solvers.options import check_count, check_max_steps, check_rho
 from bemkit.solvers.path import AffineBound, follow_path, path_exists
 
 _MOST_PATHS = 5
-"""Paths followed before giving up. One is enough for bounds that are affine in the pressure; for others each path
-starts from the tangent at the end of the last."""
+"""Paths followed to their ends before giving up. One is enough for bounds that are affine in the pressure; for others
+each path starts from the tangent at the end of the last."""
+
+_FEW_PIECES = 20
+"""Pieces of a short path, besides one for eight nodes; the whole path has one or two for each node."""
 
 _SOLVED = 1e-12
 """Relative residual of (15), (16) below which only round-off is left."""
@@ -23,10 +26,20 @@ class Phase(Enum):
 
     FULL = auto()
     """Full Newton steps, as long as the active sets are new ones."""
+    SHORT_PATH = auto()
+    """The path of solutions from the statuses that the full steps have reached, if it is short."""
     DAMPED = auto()
     """Newton steps shortened until the residual falls."""
+    DAMPED_PATH = auto()
+    """The path of solutions from the statuses that these have reached, if it is short."""
     PATH = auto()
     """The whole path of solutions under a decreasing extra pressure."""
+
+    @property
+    def more_patient(self) -> tuple["Phase", ...]:
+        """The phases to try when this one has failed, in order."""
+        phases = tuple(Phase)
+        return phases[phases.index(self) + 1 :]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,8 +61,10 @@ class NewtonIterate(Iterate):
     phase : Phase
     n_in_phase : int
         Steps taken in this phase.
+    n_sprung : int
+        The last of these that springs held and that kept the sets.
     n_paths : int
-        Paths followed so far.
+        Paths followed to their ends so far.
     """
 
     trial: Trial
@@ -59,6 +74,7 @@ class NewtonIterate(Iterate):
     visited: frozenset[bytes]
     phase: Phase = Phase.FULL
     n_in_phase: int = 0
+    n_sprung: int = 0
     n_paths: int = 0
 
 
@@ -84,9 +100,11 @@ class SemismoothNewton:
     -----
     With linear slip rows ``sigma_t - s sign sigma_n = 0`` the equations are piecewise linear for Coulomb's law, so a
     full step that reproduces its active sets has found an exact solution. Full steps suffice nearly always (5 to 10,
-    whatever the friction); a node changes its direction of slip only by way of stick. If the sets return, the
-    residual is made to fall by a line search from the best state so far; if that stalls, the path of solutions is
-    followed, which takes a few linear solves per contact node and arrives where Newton's method cycles.
+    whatever the friction); a node changes its direction of slip only by way of stick. If the sets return, most of them
+    are right: the path of solutions from them to the problem proper, on which one node changes at a time, takes two
+    linear solves for each that is wrong. Should it lead nowhere, the residual is made to fall by a line search from the
+    best state so far; if that stalls, the whole path of solutions is followed, which takes a few linear solves per
+    contact node.
     Sets that do not hold the body are helped by weak springs for that step.
     """
 
@@ -134,7 +152,7 @@ class SemismoothNewton:
 
     def _full_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         conditions = self._conditions(problem)
-        response = respond(conditions, iterate.trial, iterate.sets)
+        response = respond(conditions, iterate.trial, iterate.sets, iterate.n_sprung)
         trial = conditions.evaluate(response.state)
         sets = conditions.cautious(trial, iterate.sets)
         size = merit(problem, trial)
@@ -149,6 +167,7 @@ class SemismoothNewton:
             best=(size, trial) if size < iterate.best[0] else iterate.best,
             visited=iterate.visited | {sets.key},
             n_in_phase=iterate.n_in_phase + 1,
+            n_sprung=iterate.n_sprung + 1 if response.is_sprung and sets.key == iterate.sets.key else 0,
         )
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
@@ -183,30 +202,33 @@ class SemismoothNewton:
 
     def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
-        if iterate.phase is Phase.FULL and self.damped_steps > 0:
-            size, trial = iterate.best
-            return replace(
-                iterate,
-                state=trial.state,
-                trial=trial,
-                sets=trial.sets,
-                merit=size,
-                phase=Phase.DAMPED,
-                n_in_phase=0,
-                message=f"{reason}; line search begins",
-            )
-        if self.follows_path and iterate.n_paths < _MOST_PATHS and path_exists(problem):
-            return replace(iterate, phase=Phase.PATH, n_in_phase=0, message=f"{reason}; the path is followed next")
+        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and path_exists(problem)
+        for phase in iterate.phase.more_patient:
+            if phase is Phase.DAMPED and self.damped_steps > 0:
+                return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
+            if phase is not Phase.DAMPED and may_follow:
+                return replace(iterate, phase=phase, message=f"{reason}; the path is followed next")
         return replace(iterate, ended=status, message=reason)
 
     def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
-        end = follow_path(problem, AffineBound.tangent(problem, iterate.state.sigma_n))
+        bound = AffineBound.tangent(problem, iterate.state.sigma_n)
+        start = None if iterate.phase is Phase.PATH else iterate.sets
+        most_pieces = None if start is None else _FEW_PIECES + problem.n_contact // 8
+        end = follow_path(problem, bound, start, max_pieces=most_pieces)
         linear_solves = iterate.linear_solves + end.linear_solves
         if end.state is None:
-            return replace(iterate, linear_solves=linear_solves, ended=Status.STALLED, message=end.reason)
+            return self._rescued(problem, replace(iterate, linear_solves=linear_solves), Status.STALLED, end.reason)
         return replace(
             self._begun(problem, end.state),
             linear_solves=linear_solves,
             n_paths=iterate.n_paths + 1,
             message=f"path of {end.n_pieces} pieces",
         )
+
+
+def _back_at_best(iterate: NewtonIterate) -> NewtonIterate:
+    """Return the beginning of the line search, where the residual was smallest."""
+    size, trial = iterate.best
+    return replace(
+        iterate, state=trial.state, trial=trial, sets=trial.sets, merit=size, phase=Phase.DAMPED, n_in_phase=0
+    )

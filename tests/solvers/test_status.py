@@ -7,6 +7,7 @@ import pytest
 
 from bemkit.contact.laws import Coulomb, FrictionLaw
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, SingularResponse
+from bemkit.operators.balance import Imbalance
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.solvers.base import ContactFailure, Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -40,7 +41,7 @@ class OnlyClamped:
         return np.zeros(0)
 
     def imbalance(self, state):
-        return 0.0, 0.0
+        return Imbalance(0.0, 0.0)
 
 
 def overflowing_problem():
@@ -53,7 +54,7 @@ class Unbalanced(DenseBody):
     """A body whose forces are never in equilibrium, whatever the contact does."""
 
     def imbalance(self, state):
-        return 1e-6, 0.0
+        return Imbalance(1e-6, 0.0)
 
 
 def unbalanced_problem():

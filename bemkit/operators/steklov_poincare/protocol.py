@@ -9,6 +9,7 @@ from typing import Protocol
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.space import BoundarySpace
 from bemkit.operators.block_cg import Iterations
+from bemkit.operators.material import Material
 from bemkit.operators.nodal import NodalConditions
 from bemkit.operators.work import Work
 
@@ -57,6 +58,10 @@ class CondensedMap:
 
 class SteklovPoincare(Protocol):
     """The elastic body seen from its boundary: weak forces = matrix @ displacements."""
+
+    @property
+    def material(self) -> Material:
+        """The material of the body."""
 
     @property
     def displacement_space(self) -> BoundarySpace:
