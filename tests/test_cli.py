@@ -148,7 +148,7 @@ def test_explain_prints_what_was_planned_and_what_it_took(capsys: pytest.Capture
     for stage in ("mesh", "assemble", "condense", "solve", "recover"):
         assert len(rows[stage]) == 9  # two times and two sizes, each with its unit
     assert rows["element pairs integrated"][-2:] == ["1,600", "1,600"]
-    assert rows["factorisations and their orders"][-4:] == ["LU", "83", "LU", "83"]
+    assert rows["factorisations and their orders"][-4:] == ["LU", "84", "LU", "84"]
     assert "columns of V on the free surface" in rows
     assert call("run", "paper-1", "--elements", "40", "--explain", "--json", "-", "-o", "r.h5") == 0
     shown = capsys.readouterr()

@@ -144,7 +144,9 @@ def test_status(status, problem, driver, options):
 
 
 def test_every_status_has_a_case():
-    assert {case[0] for case in CASES.values()} == set(Status)
+    # `run` alone judges energies and estimates: tests/test_energy.py, tests/adaptive
+    by_run = {Status.NEGATIVE_ENERGY, Status.ACCURACY_NOT_REACHED}
+    assert {case[0] for case in CASES.values()} == set(Status) - by_run
 
 
 @pytest.mark.parametrize(
