@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import InputError
+from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.order import along_boundary
 from bemkit.geometry.partition import SPREAD, Partition, better_partition
@@ -74,7 +74,12 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     while True:
         started = time.perf_counter()
         start = solutions[-1] if solutions and contact else None
-        solution = run(scene, mesh=partition.mesh, start=start, callback=callback)
+        try:
+            solution = run(scene, mesh=partition.mesh, start=start, callback=callback)
+        except BemkitError as error:
+            if not solutions:
+                raise
+            return _ending(solutions, f"{partition.mesh.n_elements} elements cannot be solved ({error})")
         solutions.append(solution)
         now = time.perf_counter()
         if not solution.is_converged:

@@ -165,6 +165,18 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatc
     assert best.linear_solves > failed.linear_solves
 
 
+def test_a_finer_mesh_that_is_refused_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(scene: bk.Scene, *, mesh: bk.BoundaryMesh, start: bk.Solution | None, **others: Any) -> bk.Solution:
+        if start is not None:
+            raise bk.InputError("no memory left")
+        return bk.run(scene, mesh=mesh)
+
+    monkeypatch.setattr(bemkit.adaptive, "run", refusing)
+    (best,) = run_adaptive(paper(1, mesh=bk.MeshOptions(accuracy=1e-3)))
+    assert best.status is bk.Status.ACCURACY_NOT_REACHED
+    assert "elements cannot be solved (no memory left)" in best.message
+
+
 def test_a_failing_solve_ends_the_search() -> None:
     scene = dataclasses.replace(paper(1, mesh=bk.MeshOptions(accuracy=1e-3)), solver=bk.SemismoothNewton(max_steps=1))
     (solution,) = run_adaptive(scene)
