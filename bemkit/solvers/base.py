@@ -273,8 +273,8 @@ class _Run:
                 following = self._freed(following, unheld)
                 history.append(self._record(following, iterate, step=len(history)))
                 iterate = following
-            has_failed = status not in (Status.CONVERGED, Status.MAX_STEPS)
-            if has_failed and (travel := find_long_travel(self.problem)) is not None:
+            # a certificate measures by the travel where that hides the deformation
+            if status is not Status.MAX_STEPS and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
         return self._solution(iterate, status, history)

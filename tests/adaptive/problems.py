@@ -59,7 +59,7 @@ def wavy() -> bk.Scene:
 
 
 def disc(approach: float = 0.0160341) -> bk.Scene:
-    """A quarter of a disc between rigid plates, E' = 1: half-angle 0.1, peak pressure 0.050016."""
+    """A quarter of a disc between rigid plates, E' = 1: half-angle 0.100134, peak pressure 0.050235."""
     floor = bk.Contact(bk.HalfPlane((0.0, approach - 1.0), (0.0, 1.0)))
     return bk.Scene(
         title="disc between plates",

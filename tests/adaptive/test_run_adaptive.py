@@ -13,6 +13,7 @@ import bemkit as bk
 import bemkit.adaptive
 from bemkit.adaptive import _expected_seconds, run_adaptive
 from bemkit.geometry.partition import STEEPEST
+from bemkit.reference import DiscBetweenPlates
 from tests.adaptive.problems import contact_error, disc, paper, reference_values, wavy
 from tests.symmetry.scenes import square
 
@@ -85,8 +86,9 @@ def test_the_wavy_obstacle_has_its_closed_form() -> None:
 
 def test_the_disc_between_plates_has_its_spectral_solution() -> None:
     solution = run_adaptive(dataclasses.replace(disc(), mesh=bk.MeshOptions(accuracy=1e-4)))[-1]
-    assert solution.transitions[-1].s == pytest.approx(0.1, abs=2e-5)
-    assert -solution.contact.sigma_n[0] == pytest.approx(0.050016, rel=1e-4)  # the digits printed
+    exact = DiscBetweenPlates(1.0, 0.0160341, solution.scene.material)
+    assert solution.transitions[-1].s == pytest.approx(exact.half_angle, abs=2e-5)
+    assert -solution.contact.sigma_n[0] == pytest.approx(exact.pressure(np.zeros(1))[0], rel=1e-4)
 
 
 def test_a_stick_zone_of_one_node_is_resolved() -> None:

@@ -16,7 +16,7 @@ from bemkit.stability.trials import Outcome, Trial, judge, try_case, try_cases
 from tests.stability.scenes import FLOOR, block
 
 REMEDY = re.compile(
-    r"\b(give|use|change|hold|raise|make|check|try|start|allow|choose|remove|restrict|list|subtract|move|keep|press)\b"
+    r"\b(give|use|change|hold|raise|make|check|try|start|allow|choose|remove|restrict|list|subtract|move|keep|press|name|take|leave|describe|let|bring|put)\b"
 )
 
 

@@ -13,7 +13,7 @@ from bemkit.history import with_scaled_loads
 from bemkit.mesh_options import MeshOptions
 from bemkit.operators.linear import Automatic, DenseCholesky, Krylov, LinearSolverWish
 from bemkit.operators.material import Material, Plane
-from bemkit.scene import Part, Scene
+from bemkit.scene import LARGEST_KRYLOV_ERROR, Part, Scene
 from bemkit.scenefile import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
@@ -89,7 +89,7 @@ def _scene(random: np.random.Generator, title: str, modulus: float, layout: dict
     mesh, factors = _mesh(random, layout["shape"], discretisation), _load_factors(random)
     if mesh.accuracy is not None:
         factors = (1.0,)
-    solver, linear_solver = _solver(random), _linear_solver(random, discretisation)
+    solver, linear_solver = _solver(random), _linear_solver(random, discretisation, material)
     if not any(part for part in layout["parts"] if "contact" in part.name or part.name == "shaft"):
         layout = {name: value for name, value in layout.items() if name != "law"}
         solver = SemismoothNewton()
@@ -148,9 +148,10 @@ def _solver(random: np.random.Generator) -> ContactSolver:
     return one_by_weight(random, drivers)
 
 
-def _linear_solver(random: np.random.Generator, discretisation: Discretisation) -> LinearSolverWish:
+def _linear_solver(random: np.random.Generator, discretisation: Discretisation, material: Material) -> LinearSolverWish:
     wishes: dict[LinearSolverWish, float] = {Automatic(): 7.0, DenseCholesky(): 1.0, Krylov(): 2.0}
-    if isinstance(discretisation, ConstantCollocation):  # its equations are not symmetric
+    is_too_inexact = Krylov().error_at(material) > LARGEST_KRYLOV_ERROR
+    if isinstance(discretisation, ConstantCollocation) or is_too_inexact:  # scenes refuse both
         del wishes[Krylov()]
     return one_by_weight(random, wishes)
 
