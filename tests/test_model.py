@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.boundary_data import find_units
 
 
 def scene(
@@ -148,3 +149,17 @@ def test_a_body_that_nothing_holds_is_an_error_with_a_remedy() -> None:
     lifted = (*block.parts[:2], bk.Part("top", bk.Traction(y=0.05), sides=("top",)))
     with pytest.raises(ValueError, match=r"the load .* hold"):
         bk.run(dataclasses.replace(block, parts=lifted))
+
+
+def test_the_unit_of_stress_is_that_of_the_largest_overlap():
+    """An overlap of 1e-3 of the body strains it by as much, a thousand times what a small load does; a gap does not."""
+    plain = scene()
+    for gap, expected in ((-1e-3, 1e-3), (1e-3, 1e-5)):
+        floor = bk.Part("floor", bk.Contact(bk.HalfPlane(point=(0.0, -gap))), sides=("bottom",))
+        load = bk.Part("top", bk.Traction(y=-1e-5 * plain.material.plane_modulus), sides=("top",))
+        loaded = dataclasses.replace(plain, parts=(floor, load))
+        mesh = loaded.build_mesh()
+        # lengths in diameters of the unit square
+        units = find_units(loaded, mesh)
+        strain = units.stress / units.modulus
+        assert strain == pytest.approx(expected / mesh.diameter if gap < 0.0 else expected, rel=1e-12)

@@ -112,6 +112,15 @@ def test_nodes_of_different_parts_or_pieces_are_not_neighbours() -> None:
     assert find_transitions(table(status, x=np.array([0.0, 1.0, 9.0, 10.0]))) == ()
 
 
+@pytest.mark.parametrize("weights", [(0.5, 0.5), (1.0, 0.01), (0.2, 3.0)])
+def test_neighbours_are_as_far_apart_as_the_lengths_they_stand_for(weights: tuple[float, float]) -> None:
+    """Centres of constant elements are half the sum of their lengths apart; no other nodes are farther than the sum."""
+    for distance, is_found in ((0.5, True), (1.0, True), (1.001, False), (2.0, False)):
+        x = np.array([0.0, distance * sum(weights)])
+        pair = table([SEPARATED, STICK], x=x, weight=np.array(weights))
+        assert bool(find_transitions(pair)) == is_found
+
+
 def test_tables_check_their_columns() -> None:
     with pytest.raises(ValueError, match=r"gap has the shape \(2,\): give \(3,\)"):
         table([0, 0, 0], gap=np.zeros(2))

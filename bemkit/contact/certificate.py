@@ -1,6 +1,7 @@
 """The certificate: how well a state satisfies contact and friction, in numbers anyone can check."""
 
 from dataclasses import asdict, dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,12 +82,15 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     -----
     Tractions are measured by the largest traction in the state or in the glued state (all nodes held), whichever is
     larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
-    Lengths are measured by the displacement which the largest nodal force causes at its node, ``force / E'``, however
-    few nodes or small elements carry it: a far obstacle or a long rigid motion does not loosen the test until it
-    exceeds 1e6 times that displacement, where round-off would speak instead. A state without tractions, such as that of
-    a loose body which has given way to an overlap, has no length but its displacement.
+    A node to which that would give more than the largest nodal force is measured by this force, so that tractions of
+    tiny elements in a corner excuse nothing. Lengths are measured by the displacement which the largest nodal force
+    causes at its node, ``force / E'``, however few nodes or small elements carry it: a far obstacle or a long rigid
+    motion does not loosen the test until it exceeds 1e6 times that displacement, where round-off would speak instead. A
+    state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
+    displacement.
     """
-    stress, length = certificate_scales(problem, state)
+    largest, force, length = _scales(problem, state)
+    stress = np.minimum(largest, force / problem.body.weights)
     clearance = problem.gap - state.u_n
     slip = state.u_t - problem.slip_origin
     # friction given across the gap is no sign of contact
@@ -109,7 +113,18 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 
 
 def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[float, float]:
-    """Return the traction [Pa] and the length [m] by which `certify` measures; see its notes."""
+    """Return the largest traction [Pa] and the length [m] by which `certify` measures; see its notes."""
+    scales = _scales(problem, state)
+    return scales.stress, scales.length
+
+
+class _Scales(NamedTuple):
+    stress: float
+    force: float
+    length: float
+
+
+def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     weights = problem.body.weights
     modulus = problem.body.stiffness_scale * float(np.median(weights))
     furthest = float(np.abs(state.displacement).max())
@@ -124,12 +139,13 @@ def certificate_scales(problem: ContactProblem, state: ContactState) -> tuple[fl
             max(float((by * present).max()), min(float((by * glued).max()), 1e3 * float((by * at_hand).max())))
             for by in (1.0, weights)
         )
-        return stress, max(force / modulus, 1e-6 * furthest)
+        return _Scales(stress, force, max(force / modulus, 1e-6 * furthest))
     # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
     # by what would hold it or, if even that is nothing, by the gaps.
     gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
-    holding = float((weights * glued).max()) / modulus
-    return float(glued.max()) or 1.0, furthest or holding or float(gaps.max(initial=0.0)) or 1.0
+    force = float((weights * glued).max())
+    length = furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
+    return _Scales(float(glued.max()) or 1.0, force or float(weights.max()), length)
 
 
 def _largest(values: FloatArray) -> float:

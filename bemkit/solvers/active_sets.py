@@ -103,6 +103,8 @@ class ProjectedConditions:
     given_bound : (n_contact,) array [Pa], optional
         Friction bound held fixed (lagged). Without it the bound follows the predicted normal traction, and the
         Newton matrix contains its derivative.
+    friction_share : float
+        Factor of a bound that is not held fixed; less than one in problems on the way to the one proper.
     """
 
     problem: ContactProblem
@@ -110,6 +112,7 @@ class ProjectedConditions:
     rho_t: float
     multiplier: FloatArray | None = None
     given_bound: FloatArray | None = None
+    friction_share: float = 1.0
 
     def evaluate(self, state: ContactState) -> Trial:
         """Return sets and residual at `state`."""
@@ -120,8 +123,8 @@ class ProjectedConditions:
         is_closed = positive_part_derivative(towards_obstacle) > 0.0
         predicted_sigma_n = -positive_part(towards_obstacle)
         if self.given_bound is None:
-            bound = problem.friction_bound(predicted_sigma_n, is_closed)
-            slope = problem.friction_slope(predicted_sigma_n, is_closed)
+            bound = self.friction_share * problem.friction_bound(predicted_sigma_n, is_closed)
+            slope = self.friction_share * problem.friction_slope(predicted_sigma_n, is_closed)
         else:
             bound, slope = self.given_bound, np.zeros_like(self.given_bound)
         _, direction = clip_to_bound_derivative(along_obstacle, bound)

@@ -6,6 +6,9 @@ extras, so the path from there to the problem proper consists of straight pieces
 status, and the amount goes on falling, or rises again for a while where the path folds. Folds are where Newton's method
 and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting, carried out on a body
 instead of a matrix.
+
+The path may also start with any other statuses, those at which Newton's method gives up: then only nodes that violate
+an inequality get extras, of pressure, friction, gap or slip, which make it hold. Few are wrong, so this path is short.
 """
 
 from dataclasses import dataclass
@@ -86,6 +89,9 @@ def follow_path(
     problem : ContactProblem
         Its law is not asked; `bound` stands for it.
     bound : AffineBound
+    start : ActiveSets, optional
+        By default all nodes are closed and stick, from where a path leads to a solution of every body that is held.
+        From statuses near those of a solution it is short, but may lead nowhere.
     max_pieces : int, optional
         By default ``20 n_contact + 100``; about 1.5 pieces a node are usual.
 
@@ -94,23 +100,44 @@ def follow_path(
     PathEnd
         Two linear solves a piece. Tractions and displacements are exact up to round-off.
     """
-    if start is None:
-        extras = Extras.everywhere(problem)
-        is_closed, direction = np.isfinite(problem.gap), np.zeros(problem.n_contact, dtype=np.intp)
-    else:
-        try:
-            extras = Extras.covering(problem, bound, start)
-        except SingularResponse as error:
-            return PathEnd(None, 1, 0, f"{error}")
-        is_closed, direction = start.is_closed, start.direction
-    path = _Path(problem, bound, extras)
+    try:
+        path, is_closed, direction, n_solves = _begun(problem, bound, start)
+    except SingularResponse as error:
+        return PathEnd(None, 2, 0, f"the path begins with a singular response: {error}")
     limit = 20 * problem.n_contact + 100 if max_pieces is None else max_pieces
+    state, n_pieces, reason = _walked(path, is_closed, direction, limit)
+    return PathEnd(state, n_solves + 2 * n_pieces, n_pieces, reason)
+
+
+def _begun(
+    problem: ContactProblem, bound: AffineBound, start: ActiveSets | None
+) -> tuple["_Path", BoolArray, IntArray, int]:
+    """Return a path, its first statuses (closed, direction of slip), and the linear solves that these took."""
+    if start is None:
+        at_rest = np.zeros(problem.n_contact, dtype=np.intp)
+        return _Path(problem, bound, Extras.everywhere(problem)), np.isfinite(problem.gap), at_rest, 0
+    path = _Path(problem, bound, Extras.nothing(problem))
+    is_closed, n_solves = start.is_closed, 0
+    while True:  # until no node slips and is pulled, which extra pressure could not mend without changing the friction
+        piece = path.piece(is_closed, start.direction)
+        n_solves += 2
+        is_pulled = is_closed & (start.direction != 0) & (piece.slack[_Kind.PRESSURE] < 0.0)
+        if not is_pulled.any():
+            extras = Extras.covering(piece, bound, start.direction)
+            return _Path(problem, bound, extras), is_closed, start.direction, n_solves
+        is_closed = is_closed & ~is_pulled
+
+
+def _walked(
+    path: "_Path", is_closed: BoolArray, direction: IntArray, limit: int
+) -> tuple[ContactState | None, int, str]:
+    """Return the end of a path (None if it does not lead to a solution), the number of its pieces, and the reason."""
     amount, falling, entered = np.inf, -1.0, None
     for n_pieces in range(1, limit + 1):
         try:
             piece = path.piece(is_closed, direction)
         except SingularResponse as error:
-            return PathEnd(None, 2 * n_pieces, n_pieces, f"the path meets a singular response: {error}")
+            return None, n_pieces, f"the path meets a singular response: {error}"
         if entered is None:
             amount = _first_amount(piece)
         else:
@@ -118,12 +145,15 @@ def follow_path(
             piece.is_kept[entered] = False  # it has just become active and grows from zero
         step, kind, node = _next_joint(piece, amount, falling)
         if falling < 0.0 and step >= amount:
-            return PathEnd(piece.origin, 2 * n_pieces, n_pieces, "")
+            return piece.origin, n_pieces, ""
         if falling == 0.0 or not np.isfinite(step):
-            return PathEnd(None, 2 * n_pieces, n_pieces, "the path does not return to the problem proper")
+            return None, n_pieces, "the path does not return to the problem proper"
         amount += falling * step
+        if kind is _Kind.CLEARANCE and path.is_free(is_closed)[node]:
+            direction = direction.copy()  # friction sets in against the slip that the open node has come to
+            direction[node] = 1 if path.slip(piece, amount)[node] > 0.0 else -1
         is_closed, direction, entered = _pivoted(is_closed, direction, kind, node)
-    return PathEnd(None, 2 * limit, limit, f"the path has more than {limit} pieces")
+    return None, limit, f"the path has more than {limit} pieces"
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,16 +181,23 @@ class Extras:
         return cls(extras[::2], extras[1::2], none, none)
 
     @classmethod
-    def covering(cls, problem: ContactProblem, bound: AffineBound, sets: ActiveSets) -> "Extras":
-        """Return what makes the inequalities hold that the response to some statuses violates, and nothing else."""
+    def nothing(cls, problem: ContactProblem) -> "Extras":
+        """Return no extras."""
         none = np.zeros(problem.n_contact)
-        piece = _Path(problem, bound, cls(none, none, none, none)).piece(sets.is_closed, sets.direction)
+        return cls(none, none, none, none)
+
+    @classmethod
+    def covering(cls, piece: "_Piece", bound: AffineBound, direction: IntArray) -> "Extras":
+        """Return what makes the inequalities hold that a piece without extras violates, and leaves its response.
+
+        No node of the piece slips and is pulled: there an extra pressure would change the friction.
+        """
         missing = np.where(piece.is_kept, np.maximum(-piece.slack, 0.0), 0.0)
         missing *= _uneven(missing.size).reshape(missing.shape)
         pressure = missing[_Kind.PRESSURE]
-        # the extra pressure shall not bring friction with it
-        friction = np.maximum(missing[_Kind.FORWARD], missing[_Kind.BACKWARD]) + bound.slope * pressure
-        return cls(pressure, friction, missing[_Kind.CLEARANCE], -sets.direction * missing[_Kind.SLIP])
+        friction = np.maximum(missing[_Kind.FORWARD], missing[_Kind.BACKWARD])
+        friction = np.maximum(friction + bound.slope * pressure, 0.0)  # with what the extra pressure brings
+        return cls(pressure, friction, missing[_Kind.CLEARANCE], -direction * missing[_Kind.SLIP])
 
 
 def _uneven(count: int) -> FloatArray:
@@ -177,10 +214,21 @@ class _Path:
         self.bound = bound
         self.extras = extras
 
+    def is_free(self, is_closed: BoolArray) -> BoolArray:
+        """Return (n_contact,) bool: nodes that nothing resists along the tangent, whatever the amount."""
+        has_bound = (self.bound.intercept != 0.0) | (is_closed & (self.bound.slope != 0.0))
+        return np.asarray(~has_bound & (self.extras.friction == 0.0))
+
+    def slip(self, piece: _Piece, amount: float) -> FloatArray:
+        """Return the slip (n_contact,) at an amount of extras [m]."""
+        moved = piece.origin.u_t + amount * piece.rate.u_t
+        return np.asarray(moved - self.problem.slip_origin - amount * self.extras.slip)
+
     def piece(self, is_closed: BoolArray, direction: IntArray) -> _Piece:
         """Respond to fixed statuses, at amount zero and at amount one."""
         problem, bound = self.problem, self.bound
-        slips = direction != 0
+        is_free = self.is_free(is_closed)
+        slips = (direction != 0) | is_free
         sticks = ~slips & ~problem.body.tangent_is_free  # where the tangent is free there is nothing to follow
         conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
@@ -210,7 +258,7 @@ class _Path:
         return _Piece(
             origin,
             rate,
-            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips]),
+            np.stack([is_closed, ~is_closed & np.isfinite(problem.gap), sticks, sticks, slips & ~is_free]),
             np.stack([*slack, direction * origin_slip]),
             np.stack([*slack_rate, direction * (rate.u_t - extras.slip)]),
         )

@@ -14,8 +14,15 @@ _MOST_PATHS = 5
 """Paths followed to their ends before giving up. One is enough for bounds that are affine in the pressure; for others
 each path starts from the tangent at the end of the last."""
 
+_WEAKER = 0.25
+_MOST_WEAKENED = 4
+"""Factor of the friction of each step under weaker friction after the last, and how many there are."""
+
 _FEW_PIECES = 20
 """Pieces of a short path, besides one for eight nodes; the whole path has one or two for each node."""
+
+_FEW_STEPS = 12
+"""Full steps under weaker friction."""
 
 _SOLVED = 1e-12
 """Relative residual of (15), (16) below which only round-off is left."""
@@ -30,8 +37,8 @@ class Phase(Enum):
     """The path of solutions from the statuses that the full steps have reached, if it is short."""
     DAMPED = auto()
     """Newton steps shortened until the residual falls."""
-    DAMPED_PATH = auto()
-    """The path of solutions from the statuses that these have reached, if it is short."""
+    WEAKER_FRICTION = auto()
+    """Full Newton steps under a share of the friction, and the path from there to all of it, if it is short."""
     PATH = auto()
     """The whole path of solutions under a decreasing extra pressure."""
 
@@ -132,6 +139,8 @@ class SemismoothNewton:
             return self._full_step(problem, iterate)
         if iterate.phase is Phase.DAMPED:
             return self._damped_step(problem, iterate)
+        if iterate.phase is Phase.WEAKER_FRICTION:
+            return self._weaker_step(problem, iterate)
         return self._path_step(problem, iterate)
 
     def _conditions(self, problem: ContactProblem) -> ProjectedConditions:
@@ -207,23 +216,61 @@ class SemismoothNewton:
             if phase is Phase.DAMPED and self.damped_steps > 0:
                 return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
             if phase is not Phase.DAMPED and may_follow:
-                return replace(iterate, phase=phase, message=f"{reason}; the path is followed next")
+                return replace(iterate, phase=phase, n_in_phase=0, message=f"{reason}; the path is followed next")
         return replace(iterate, ended=status, message=reason)
 
     def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         bound = AffineBound.tangent(problem, iterate.state.sigma_n)
-        start = None if iterate.phase is Phase.PATH else iterate.sets
-        most_pieces = None if start is None else _FEW_PIECES + problem.n_contact // 8
-        end = follow_path(problem, bound, start, max_pieces=most_pieces)
-        linear_solves = iterate.linear_solves + end.linear_solves
+        if iterate.phase is Phase.PATH:
+            end = follow_path(problem, bound)
+        else:
+            end = follow_path(problem, bound, iterate.sets, max_pieces=_few_pieces(problem))
+        following = replace(iterate, linear_solves=iterate.linear_solves + end.linear_solves)
         if end.state is None:
-            return self._rescued(problem, replace(iterate, linear_solves=linear_solves), Status.STALLED, end.reason)
-        return replace(
-            self._begun(problem, end.state),
-            linear_solves=linear_solves,
-            n_paths=iterate.n_paths + 1,
-            message=f"path of {end.n_pieces} pieces",
+            return self._rescued(problem, following, Status.STALLED, end.reason)
+        return self._restarted(problem, following, end.state, f"path of {end.n_pieces} pieces")
+
+    def _weaker_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
+        share = _WEAKER ** (iterate.n_in_phase + 1)
+        weaker = replace(self._conditions(problem), friction_share=share)
+        trial, sets, linear_solves = _with_full_steps(weaker, problem.glued_state)
+        bound = AffineBound.tangent(problem, trial.state.sigma_n)
+        end = follow_path(problem, bound, sets, max_pieces=_few_pieces(problem))
+        following = replace(
+            iterate,
+            linear_solves=iterate.linear_solves + linear_solves + end.linear_solves,
+            n_in_phase=iterate.n_in_phase + 1,
+            message=f"from {share:.2g} of the friction: {end.reason}",
         )
+        if end.state is not None:
+            words = f"path of {end.n_pieces} pieces from {share:.2g} of the friction"
+            return self._restarted(problem, following, end.state, words)
+        if following.n_in_phase >= _MOST_WEAKENED:
+            return self._rescued(problem, following, Status.STALLED, end.reason)
+        return following
+
+    def _restarted(
+        self, problem: ContactProblem, iterate: NewtonIterate, state: ContactState, message: str
+    ) -> NewtonIterate:
+        """Return the iterate with full steps to come from the end of a path."""
+        begun = self._begun(problem, state)
+        return replace(begun, linear_solves=iterate.linear_solves, n_paths=iterate.n_paths + 1, message=message)
+
+
+def _few_pieces(problem: ContactProblem) -> int:
+    return _FEW_PIECES + problem.n_contact // 8
+
+
+def _with_full_steps(conditions: ProjectedConditions, start: ContactState) -> tuple[Trial, ActiveSets, int]:
+    """Return where full Newton steps lead, as soon as active sets come back, and the linear solves they took."""
+    trial = conditions.evaluate(start)
+    sets, linear_solves, visited = trial.sets, 0, set[bytes]()
+    while sets.key not in visited and len(visited) < _FEW_STEPS:
+        visited.add(sets.key)
+        response = respond(conditions, trial, sets)
+        trial, linear_solves = conditions.evaluate(response.state), linear_solves + response.linear_solves
+        sets = conditions.cautious(trial, sets)
+    return trial, sets, linear_solves
 
 
 def _back_at_best(iterate: NewtonIterate) -> NewtonIterate:

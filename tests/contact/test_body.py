@@ -96,6 +96,9 @@ def test_stiffness_scale_ignores_nodes_without_stiffness():
     assert DenseBody(np.diag([2.0, 9.0, 0.0, 9.0]), np.zeros(4), np.array([0.5, 1.0])).stiffness_scale == 4.0
     assert DenseBody(np.array([[0.0, 3.0], [-3.0, 1.0]]), np.zeros(2), np.ones(1)).stiffness_scale == 3.0
     assert DenseBody(np.zeros((2, 2)), np.zeros(2), np.ones(1)).stiffness_scale == 1.0
+    stretched = np.diag([1e-13, 4.0, -1e-13, 4.0])  # two nodes of a free body: only their distance is resisted
+    assert DenseBody(stretched, np.zeros(4), np.ones(2), np.ones((3, 2, 2))).stiffness_scale == 4.0
+    assert DenseBody(stretched, np.zeros(4), np.array([0.1, 0.5]), modulus=6.0).stiffness_scale == 20.0
 
 
 def test_states_blend():
@@ -114,6 +117,15 @@ def test_states_blend():
         (lambda: DenseBody(np.eye(2), np.zeros(2), np.zeros(1)), "weights has the entry 0"),
         (lambda: DenseBody(np.zeros((0, 0)), np.zeros(0), np.zeros(0)), "weights is empty"),
         (lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), np.ones((1, 2))), r"motions has the shape \(1, 2\)"),
+        (
+            lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), np.ones((2, 1, 2))),
+            "2 rigid motions leave nothing of a",
+        ),
+        (
+            lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), modulus=0.0),
+            "modulus = 0; give the E' of the material",
+        ),
+        (lambda: DenseBody(np.eye(2), np.zeros(2), np.ones(1), modulus=np.inf), "modulus = inf; give the E'"),
         (lambda: ContactState(np.zeros((2, 2)), np.zeros((1, 2))), r"traction has the shape \(1, 2\); give \(2, 2\)"),
         (lambda: ContactState(np.zeros(2), np.zeros((1, 2))), "displacement has the shape"),
         (lambda: LinearConditions(np.zeros((1, 2, 2)), np.zeros((2, 2, 2)), np.zeros((1, 2))), "on_traction has"),

@@ -71,6 +71,7 @@ def test_as_dict_and_worst():
     certificate = Certificate(1.0, 2.0, 3.0, 4.0, 7.0, 5.0, 6.0)
     assert certificate.worst == 7.0
     assert certificate.is_below(7.0)
+    assert not certificate.is_below(6.9)
     assert list(certificate.as_dict()) == [
         "penetration",
         "tension",
@@ -81,6 +82,20 @@ def test_as_dict_and_worst():
         "moment_imbalance",
         "round_off",
     ]
+
+
+def test_round_off_excuses_imbalances_alone_and_is_no_violation():
+    entries = [0.0] * 7
+    for k in range(7):
+        entries[k] = 1e-7
+        certificate = Certificate(*entries, round_off=2e-7)
+        assert certificate.worst == 1e-7
+        assert certificate.is_below(1e-9) == (
+            list(certificate.violations)[k] in ("force_imbalance", "moment_imbalance")
+        )
+        assert not replace(certificate, round_off=0.0).is_below(1e-9)
+        entries[k] = 0.0
+    assert Certificate(*entries, round_off=1e-7).worst == 0.0
 
 
 @pytest.mark.parametrize("length", [1e-12, 1.0, 1e12])

@@ -8,7 +8,7 @@ import pytest
 from bemkit.contact.certificate import certify
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
-from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -156,12 +156,66 @@ def test_the_path_reports_its_ends():
     assert not path_exists(block_problem(CohesiveCoulomb(0.5, 0.1)))
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_a_path_from_nearby_statuses_is_short_and_leads_to_a_solution(seed):
+    """From the statuses of a solution, from these with one node changed, and from all nodes open."""
+    problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=0.5)
+    bound = AffineBound.tangent(problem, np.zeros(problem.n_contact))
+    solution = follow_path(problem, bound).state
+    sets = contact_sets(problem, solution)
+    unchanged = follow_path(problem, bound, sets)
+    assert unchanged.n_pieces == 1
+    assert np.allclose(unchanged.state.displacement, solution.displacement)
+    node = seed % problem.n_contact
+    is_closed, direction = sets.is_closed.copy(), sets.direction.copy()
+    is_closed[node] = not is_closed[node]
+    direction[node] = 0
+    end = follow_path(problem, bound, ActiveSets(is_closed, direction))
+    if end.state is not None:  # there is no promise of an end
+        assert_solves(problem, end.state, 0.5)
+        assert end.n_pieces <= 20
+    opened = follow_path(problem, bound, ActiveSets(np.zeros_like(is_closed), np.zeros_like(direction)))
+    if opened.state is not None:
+        assert_solves(problem, opened.state, 0.5)
+
+
+def test_most_paths_from_nearby_statuses_end():
+    ended = []
+    for seed in range(40):
+        problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=0.5)
+        bound = AffineBound.tangent(problem, np.zeros(problem.n_contact))
+        open_everywhere = ActiveSets(np.zeros(problem.n_contact, bool), np.zeros(problem.n_contact, np.intp))
+        ended.append(follow_path(problem, bound, open_everywhere).state is not None)
+    assert np.mean(ended) > 0.9
+
+
+def test_statuses_that_do_not_hold_the_body_begin_no_path():
+    problem = block_problem(Coulomb(0.5))
+    bound = AffineBound.tangent(problem, np.zeros(12))
+    end = follow_path(problem, bound, ActiveSets(np.zeros(12, bool), np.zeros(12, np.intp)))
+    assert end.state is None
+    assert "leave a rigid motion free" in end.reason
+
+
 def test_newton_says_when_it_follows_the_path():
-    history = solve(hard_problem(16), SemismoothNewton()).history
-    messages = [record.message for record in history]
-    assert any("line search begins" in message for message in messages)
+    messages = [record.message for record in solve(hard_problem(16), SemismoothNewton()).history]
     assert any("the path is followed next" in message for message in messages)
     assert any(message.startswith("path of ") for message in messages)
+    messages = [
+        record.message for record in solve(hard_problem(16), SemismoothNewton(follows_path=False), throw=False).history
+    ]
+    assert any("line search begins" in message for message in messages)
+
+
+def test_newton_starts_again_from_weaker_friction_where_short_paths_end():
+    """Random problems far beyond uniqueness, where some of the first short paths and line searches fail."""
+    messages = []
+    for seed in range(60):
+        problem = hard_problem(seed, n_most=20, condition=1e3, friction_coefficient=5.0)
+        solution = solve(problem, SemismoothNewton())
+        assert_solves(problem, solution.state, 5.0)
+        messages += [record.message for record in solution.history]
+    assert any("of the friction" in message and message.startswith("path of") for message in messages)
 
 
 # ------------------------------------------------------------------------------------------------------- metamorphic
