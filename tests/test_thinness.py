@@ -54,3 +54,20 @@ def test_collocation_of_thin_bodies_is_warned_of(shape: object, n: int, is_weak:
     if is_weak:
         assert "bends too stiffly: take" in found[0]
     assert thinness_warnings(*planned(shape, n, bk.LinearGalerkin())) == ()
+
+
+def test_the_warning_reaches_plan_and_solution() -> None:
+    parts = (bk.Part("load", bk.Pressure(1.0), sides=tuple(f"outer-{k}" for k in range(1, 5))),)
+    scene = bk.Scene(
+        title="thin",
+        shape=bk.Ring(0.8, 1.0),
+        material=bk.Material(1.0, 0.3),
+        mesh=bk.MeshOptions(40),
+        parts=parts,
+        law=bk.Frictionless(),
+        discretisation=bk.ConstantCollocation(),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+    )
+    solution = bk.run(scene)
+    assert any("bends too stiffly" in warning for warning in solution.plan.warnings)
+    assert any("bends too stiffly" in warning for warning in solution.warnings)

@@ -16,6 +16,7 @@ from bemkit.plan.decisions import Decisions, decide
 from bemkit.plan.items import PlanItem, Wishes, output_items, plan_items
 from bemkit.plan.machine import Machine
 from bemkit.plan.sizes import Sizes, find_sizes
+from bemkit.plan.thinness import thinness_warnings
 from bemkit.scene import Scene
 
 
@@ -102,4 +103,5 @@ def make_plan(
     sizes = find_sizes(steps, mesh, decisions)
     choice = decisions.linear_choice(sizes.n_displacements, sizes.n_open)
     decisions = replace(decisions, linear_solver=choice.solver)
-    return Plan(decisions, sizes, plan_items(scene, decisions, sizes, choice.reason, proposal))
+    items = plan_items(scene, decisions, sizes, choice.reason, proposal)
+    return Plan(decisions, sizes, items, thinness_warnings(decisions, mesh))
