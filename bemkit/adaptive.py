@@ -193,7 +193,10 @@ def _ending(solutions: list[Solution], obstacle: str = "") -> tuple[Solution, ..
     )
     if obstacle:
         wished = best.scene.mesh.accuracy
-        message = f"The accuracy {wished:g} was not reached: {obstacle}; estimated error {_error(best):.1e}. {message}"
+        message = (
+            f"The accuracy {wished:g} was not reached: {obstacle}; estimated error {_error(best):.1e}; allow more "
+            f"elements or time, or ask for less. {message}"
+        )
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
     others = [solution for solution in solutions if solution is not best]
