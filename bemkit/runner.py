@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import IntArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.boundary_data import Units, find_units
 from bemkit.clock import StageClock
 from bemkit.contact.admissibility import find_unsolvable_load
@@ -207,7 +207,7 @@ def _solution(model: Model | ElasticModel, result: ContactSolution, plan: Plan, 
     else:
         state, node_status = with_held_friction(model, result.state, result.node_status)
         displacement, traction, energy = model.boundary_fields(state)
-        table = _contact_table(model, state, node_status)
+        table = _contact_table(model, state, node_status, displacement)
         transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
         warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points = dof_points(model.elastic.displacement_space, model.mesh)
@@ -350,8 +350,14 @@ def _attempt(scene: Scene) -> Solution | FailedRun:
         return FailedRun(scene, error.with_traceback(None))  # whose frames hold matrices
 
 
-def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> ContactTable:
+def _contact_table(
+    model: Model, state: ContactState, node_status: IntArray, boundary_displacement: FloatArray
+) -> ContactTable:
     units, contact = model.units, model.contact
+    tangents = model.nodes.frame[:, 1]
+    # where the tangent is no unknown the body itself says how it moves
+    u_t = np.sum(boundary_displacement[model.nodes.nodes] * tangents, axis=1)
+    u_t = np.where(model.body.tangent_is_free, u_t, state.u_t * units.displacement)
     points = dof_points(model.elastic.displacement_space, model.mesh)[model.nodes.nodes]
     displacement = state.displacement * units.displacement
     return ContactTable(
@@ -360,7 +366,7 @@ def _contact_table(model: Model, state: ContactState, node_status: IntArray) -> 
         y=points[:, 1].copy(),
         s=contact.arc_length.copy(),
         u_n=displacement[:, 0].copy(),
-        u_t=displacement[:, 1].copy(),
+        u_t=u_t,
         sigma_n=state.sigma_n * units.stress,
         sigma_t=state.sigma_t * units.stress,
         gap=contact.gap.copy(),

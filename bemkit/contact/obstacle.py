@@ -259,7 +259,8 @@ class PolygonalObstacle:
         """Return (n,) bool: points inside, by the number of sides that a ray to the right crosses."""
         start, along = self._sides()
         x, y = points[:, :1], points[:, 1:]
-        spans = (start[:, 1] > y) != ((start + along)[:, 1] > y)
+        end = np.roll(start, -1, axis=0)  # to the last digit the start of the next side
+        spans = (start[:, 1] > y) != (end[:, 1] > y)
         rise = np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
         crossings = spans & (x < start[:, 0] + along[:, 0] * (y - start[:, 1]) / rise)
         return np.asarray(crossings.sum(axis=1) % 2 == 1)

@@ -143,6 +143,14 @@ def test_points_that_rest_on_a_tilted_polygon_touch_its_sides(share: float, numb
     assert gap[0] == pytest.approx(0.0, abs=1e-12)  # coordinates of about 100
 
 
+def test_points_at_the_height_of_a_corner_are_inside_or_outside_like_their_neighbours() -> None:
+    # an apex whose height, as an end of a side, is one digit more than as the start of the next one
+    apex = (-8.85597793472789, -4.953661135183589)
+    spike = PolygonalObstacle(((-22.79091429013547, -33.45377412800914), (5.078958420679685, -33.45377412800914), apex))
+    points, down = np.array([[-9.08, apex[1]], [-8.6, apex[1]], [-8.856, -8.0]]), np.array([[0.0, -1.0]] * 3)
+    assert (np.sign(spike.gap(points, down)) == [1.0, 1.0, -1.0]).all()
+
+
 def test_a_body_that_rests_on_a_corner_touches_along_its_own_normal() -> None:
     normals = np.array([[0.6, -0.8]])
     gap, direction = measure_contact(

@@ -8,6 +8,9 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Cavity, Circle, DirectedObstacle, Gap, HalfPlane, Obstacle, PolygonalObstacle
 from bemkit.expression import evaluate_field
 
+_ROUND_OFF = 1e-12
+"""Distance from a corner, relative to the coordinates, that may be their round-off."""
+
 
 def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Measure the way from points of the body to an obstacle.
@@ -37,7 +40,7 @@ def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> 
             away, distance = _polar(points, centre, -normals)
             return radius - distance, away
         case PolygonalObstacle(vertices):
-            return _to_polygon(np.array(vertices, dtype=float), points)
+            return _to_polygon(np.array(vertices, dtype=float), points, normals)
         case Gap(value=value, direction=None):
             return evaluate_field(value, points), normals
         case Gap(value=value, direction=(x, y)):
@@ -47,8 +50,11 @@ def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> 
     return obstacle.gap(points, normals), direction
 
 
-def _to_polygon(vertices: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return distance and direction to the nearest side or corner of a polygon, side by side."""
+def _to_polygon(vertices: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return distance and direction to the nearest side or corner of a polygon, side by side.
+
+    At a corner itself any direction between the normals of its sides is right; the body's normal is taken.
+    """
     x, y = (vertices - vertices[0]).T
     if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
         vertices = vertices[::-1]
@@ -68,7 +74,8 @@ def _to_polygon(vertices: FloatArray, points: FloatArray) -> tuple[FloatArray, F
         sign = np.where(is_inside, -1.0, 1.0)[:, None]
         towards = sign * (start - points) / np.where(to_start > 0.0, to_start, 1.0)[:, None]
         _keep_nearer(nearest, direction, to_start, towards, to_start > 0.0)
-    return np.where(is_inside, -nearest, nearest), direction
+    is_corner = np.hypot(*np.moveaxis(to_corners, -1, 0)).min(axis=1) <= _ROUND_OFF * np.abs(points).max(initial=0.0)
+    return np.where(is_inside, -nearest, nearest), np.where(is_corner[:, None], normals, direction)
 
 
 def _keep_nearer(
