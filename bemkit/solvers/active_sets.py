@@ -155,12 +155,12 @@ class ProjectedConditions:
         """Return the sets of `trial` with every direct change of slip direction replaced by stick.
 
         A node may slip the other way only after it has come to rest. Without this the active sets of stiff bodies
-        alternate between slip to the left and slip to the right for ever. Nodes without any bound are exempt.
+        alternate between slip to the left and slip to the right for ever. Nodes without any bound slide whatever their
+        direction is; theirs is zero here, so that equal sets give equal steps.
         """
         sets = trial.sets
         flips = (sets.direction * previous.direction < 0) & sets.is_closed & previous.is_closed
-        flips &= ~trial.is_free
-        return ActiveSets(sets.is_closed, np.where(flips, 0, sets.direction))
+        return ActiveSets(sets.is_closed, np.where(flips | trial.is_free, 0, sets.direction))
 
 
 def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:

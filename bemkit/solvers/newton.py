@@ -15,7 +15,7 @@ _SPRING = 1e-3
 springs still carry by about this factor. Not tiny: the response must stay well determined."""
 
 _WEAKER = 0.1
-_WEAKEST = 1e-6
+_WEAKEST = 1e-8
 """Springs become weaker by the first factor with every step that ends in the sets it began with, so that a small force
 soon carries the body to where other sets hold it; by the second at most."""
 

@@ -149,3 +149,10 @@ def test_a_body_that_glued_contact_cannot_hold_is_named() -> None:
     elastic = GalerkinMap(mesh, MATERIAL)
     with pytest.raises(SingularMatrixError, match="the body held by its supports and its contact boundary"):
         condense(elastic, [], side_of(elastic, "bottom").take(np.zeros(0, np.intp)), np.zeros((mesh.n_nodes, 2)))
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_the_scale_of_stiffness_is_that_of_the_material(kind: type) -> None:
+    for rollers in ((), ("right", "top")):  # whatever the supports leave of it
+        body, nodes, elastic = pressed_block(kind, *rollers)
+        assert body.stiffness_scale == pytest.approx(elastic.material.plane_modulus / np.median(nodes.weights))
