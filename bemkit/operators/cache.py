@@ -35,7 +35,7 @@ from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
 
 FORMAT = "bemkit-operator"
 SCHEMA_VERSION = 1
-FORMULA_VERSION = 1
+FORMULA_VERSION = 2
 """To be raised whenever a change of the code changes what an operator's matrix holds beyond round-off."""
 FINGERPRINTS = ("operator", "geometry", "material", "spaces", "formulas")
 MARKER = b"bemkit operator cache\n"

@@ -27,8 +27,8 @@ def planned_work(decisions: Decisions, sizes: Sizes) -> Work:
 
 def _galerkin(decisions: Decisions, sizes: Sizes) -> Work:
     n_tractions, n_displacements = sizes.n_tractions, sizes.n_displacements
-    # of the single layer: the resultants and the pressures; of the body: the one that keeps its volume
-    n_columns = sizes.n_motions + sizes.n_pressures + sizes.n_volumes
+    # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
+    n_columns = sizes.n_motions + sizes.n_pressures + min(sizes.n_pressures, 1)
     factorisations = [Factorisation(FactorKind.CHOLESKY, n_tractions)]
     if decisions.forms_matrix:
         n_columns += n_displacements

@@ -12,8 +12,7 @@ import bemkit as bk
 from bemkit.geometry.outline import Outline
 
 DISCRETISATIONS = [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin()]
-ALMOST = 0.4999999999
-POISSON_RATIOS = [0.49, 0.4995, 0.499995, ALMOST, 0.5]
+POISSON_RATIOS = [0.49, 0.4995, 0.499995, 0.4999999999, 0.5]
 RADII = [0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99]
 BOTH = bk.Symmetry(x=0.0, y=0.0)
 INNER, OUTER = (tuple(f"{name}-{k}" for k in range(1, 5)) for name in ("inner", "outer"))
@@ -41,20 +40,10 @@ def widening(radius: float, nu: float, at: np.ndarray) -> np.ndarray:
     return (1.0 + nu) * ((1.0 - 2.0 * nu) * a * at + a / at)
 
 
-def refused(solution: bk.Solution) -> bool:
-    """Whether a solution is refused by name, which stiff directions, 1e10 of the others, may excuse alone."""
-    if solution.is_converged:
-        return False
-    assert solution.scene.material.poisson_ratio == ALMOST
-    assert solution.status is bk.Status.STALLED
-    return True
-
-
 def pressure_error(radius: float, nu: float, n: int, discretisation: object) -> float:
-    """Largest relative error of the displacement under pressure inside; 0 if refused by name."""
+    """Largest relative error of the displacement under pressure inside."""
     solution = ring(radius, nu, n, discretisation, bk.Part("inner", bk.Pressure(1.0), sides=INNER))
-    if refused(solution):
-        return 0.0
+    assert solution.is_converged
     x = solution.boundary.points
     r = np.hypot(*x.T)
     exact = widening(radius, nu, r)
@@ -62,11 +51,10 @@ def pressure_error(radius: float, nu: float, n: int, discretisation: object) -> 
 
 
 def shaft_error(radius: float, nu: float, n: int, discretisation: object, **options: object) -> float:
-    """Largest relative error of the pressure on a rigid shaft larger by a thousandth; 0 if refused by name."""
+    """Largest relative error of the pressure on a rigid shaft larger by a thousandth."""
     shaft = bk.Contact(bk.Gap(-1e-3 * radius))
     solution = ring(radius, nu, n, discretisation, bk.Part("inner", shaft, sides=INNER), **options)
-    if refused(solution):
-        return 0.0
+    assert solution.is_converged
     exact = 1e-3 * radius / widening(radius, nu, np.array(radius))
     return float(np.abs(solution.contact.sigma_n / -exact - 1.0).max())
 

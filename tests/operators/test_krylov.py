@@ -78,7 +78,8 @@ BODIES = {
 
 
 def steps_of(name: str, n_elements: int, solver: Krylov) -> int:
-    (iterations,) = pressed(mesh_of(BODIES[name][0], n_elements, BODIES[name][1]), solver)[0].condensed.iterations
+    # the second is for the uniform pressure
+    iterations, _ = pressed(mesh_of(BODIES[name][0], n_elements, BODIES[name][1]), solver)[0].condensed.iterations
     return iterations.n_steps
 
 
@@ -168,7 +169,7 @@ def test_inclined_supports_and_other_loads() -> None:
     displacement, force = random.normal(size=(2, mesh.n_nodes, 2))
     later = iterated.under(displacement, force)
     assert_same(direct.under(displacement, force), later, (first, second))
-    assert [one.n_columns for one in later.condensed.iterations] == [11, 1]
+    assert [one.n_columns for one in later.condensed.iterations] == [11, 1, 1]  # with the uniform pressure
     free = np.flatnonzero(direct.conditions.is_free)[::7]
     for one, two in zip(direct.condensed.follow(free), iterated.condensed.follow(free), strict=True):
         assert np.abs(one - two).max() < 1e-8 * np.abs(one).max()

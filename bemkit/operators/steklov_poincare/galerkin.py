@@ -14,16 +14,18 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.boundary import mass
-from bemkit.operators.dense import Cholesky
+from bemkit.operators.dense import Cholesky, multiply
 from bemkit.operators.linear import DenseCholesky, LinearSolver, LinearSolverWish
 from bemkit.operators.linear_choice import choose_linear_solver
 from bemkit.operators.material import Material
 from bemkit.operators.memory import physical_memory
 from bemkit.operators.nodal import NodalConditions
+from bemkit.operators.rigid import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
+from bemkit.operators.steklov_poincare.held_volume import Volume
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers, dilatation_of
-from bemkit.operators.steklov_poincare.nodes import integrate_traction, rotate_rows
+from bemkit.operators.steklov_poincare.nodes import integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.work import Work
@@ -39,7 +41,7 @@ class GalerkinFactors:
     Parameters
     ----------
     matrix : (n_dofs, n_dofs) array [Pa]
-        S, symmetric.
+        S, symmetric, without the uniform pressure.
     single_layer : Cholesky
         V = L L^T.
     strained : (n_traction_dofs, n_dofs) array
@@ -74,7 +76,7 @@ class GalerkinMap:
 
     At nu = 1/2 a uniform pressure on a loop causes no displacement, and only displacements that keep the volume are
     possible: V is then inverted on tractions without such pressures, `matrix` is S without the pressure that keeps
-    the volume, and `condense` finds that pressure as one more unknown.
+    the volume, and `condense` finds that pressure as one more unknown, as it does for compressible bodies.
     """
 
     def __init__(
@@ -105,8 +107,7 @@ class GalerkinMap:
         return self._assemble()
 
     def _assemble(self) -> Layers:
-        pressures, fluxes = self._pressures, self._fluxes
-        return assemble_layers(self.displacement_space, self.traction_space, self.material, pressures, fluxes)
+        return assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
 
     @cached_property
     def _pressures(self) -> FloatArray:
@@ -139,13 +140,31 @@ class GalerkinMap:
         fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, vanishing_dofs(self.displacement_space)] = 0.0
-        return np.asarray(flux.T)
+        # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
+        motions = resting_motions(self.mesh, dof_points(self.displacement_space))
+        return np.asarray(flux.T - motions @ np.linalg.lstsq(motions, flux.T, rcond=None)[0])
 
     @cached_property
-    def _volume(self) -> FloatArray:
-        """(n_dofs, 0 or 1) change of volume per displacement dof of an incompressible body."""
-        n_columns = int(self.material.is_incompressible and not self.mesh.is_exterior)
-        return np.asarray(self._fluxes.sum(axis=1, keepdims=True)[:, :n_columns])
+    def _volume(self) -> Volume:
+        """The change of volume, on which the uniform pressure works.
+
+        Curved elements hold normals n only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as
+        V n does, would resist every change of volume of a nearly incompressible body. Exact normals stand among the
+        tractions instead. With the dilatation x, whose tractions are n / beta, beta the compressibility, and the flux f
+        of displacements, the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
+        (f - beta W x) u = beta x (f - beta W x) p. On the other tractions, <V n, t> = 0, W x is S x.
+        """
+        total = self._fluxes.sum(axis=1, keepdims=True)[:, : self._fluxes.shape[1]]
+        if self.material.is_incompressible or self.mesh.is_exterior:
+            return Volume(total, 0.0)
+        beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)[:, None]
+        change = total - beta * self._without_pressure(dilatation)
+        return Volume(change, beta * float(np.vdot(dilatation, change)))
+
+    def _without_pressure(self, displacement: FloatArray) -> FloatArray:
+        """Return S u for the columns of (n_dofs, m) displacements, without the uniform pressure."""
+        is_formed = "factors" in self.__dict__ or "layers" not in self.__dict__
+        return multiply(self.factors.matrix, displacement) if is_formed else self.layers.apply(displacement)
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -153,7 +172,12 @@ class GalerkinMap:
 
     def matrix(self) -> FloatArray:
         """Return the weak, symmetric matrix [Pa]; rigid motions are its kernel, and an exterior has none."""
-        return self.factors.matrix
+        if not self._volume.yields:
+            return self.factors.matrix
+        change = self._volume.change
+        matrix: FloatArray = self.factors.matrix + change @ change.T / self._volume.yields
+        read_only(matrix)
+        return matrix
 
     def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
         """Return the consistent nodal forces of a traction field on some elements."""
@@ -171,12 +195,12 @@ class GalerkinMap:
         stiffness = FreeStiffness(self.layers, self.displacement_space, conditions)
         check_is_held(stiffness, dof_points(self.displacement_space), _HELD_BODY)
         factor = solver.factor(stiffness, _HELD_BODY)
-        volume = rotate_rows(self._volume, conditions.frame)
+        volume = self._volume.in_frames(conditions.frame)
         return IterativeCondensation(stiffness, factor, volume).condense(force, self.layers.work)
 
     def _condense_matrix(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense the formed S."""
-        condensation = SchurCondensation(self.matrix(), self._volume, conditions, solver, _HELD_BODY)
+        condensation = SchurCondensation(self.factors.matrix, self._volume, conditions, solver, _HELD_BODY)
         first = condensation.under(force, conditions.displacement)
         return replace(first, work=self.factors.work + condensation.work + first.work)
 

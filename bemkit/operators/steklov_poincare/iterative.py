@@ -12,7 +12,7 @@ from bemkit.operators.dense import SingularMatrixError
 from bemkit.operators.linear import Factor
 from bemkit.operators.rigid import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
-from bemkit.operators.steklov_poincare.held_volume import HeldVolume, room
+from bemkit.operators.steklov_poincare.held_volume import HeldVolume, Volume, room
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.work import Work
 
@@ -49,8 +49,7 @@ class IterativeCondensation:
     stiffness : FreeStiffness
     factor : Factor
         Solves for the free directions.
-    volume : (n_dofs, 0 or 1) array
-        Change of volume of an incompressible body.
+    volume : Volume
 
     Notes
     -----
@@ -62,7 +61,7 @@ class IterativeCondensation:
 
     stiffness: FreeStiffness
     factor: Factor
-    volume: FloatArray
+    volume: Volume
 
     @cached_property
     def _open(self) -> IntArray:
@@ -74,7 +73,7 @@ class IterativeCondensation:
 
     @cached_property
     def _held(self) -> HeldVolume:
-        return HeldVolume(self.factor, room(self.volume)[self.stiffness.free])
+        return HeldVolume(self.factor, room(self.volume.change)[self.stiffness.free], self.volume.yields)
 
     @cached_property
     def _sensitivity(self) -> FloatArray:
@@ -99,16 +98,16 @@ class IterativeCondensation:
         -------
         CondensedMap
         """
-        unit = np.zeros((len(self.volume), self._open.size))
+        unit = np.zeros((self.stiffness.space.n_dofs, self._open.size))
         unit[self._open, np.arange(self._open.size)] = 1.0
         moved, known = self._given(force, self.stiffness.conditions.displacement)
         solved = self._solved(np.column_stack([unit, moved]), known)
-        own = Work(right_hand_sides=self._open.size + 1 + self.volume.shape[1])
+        own = Work(right_hand_sides=self._open.size + 1 + self.volume.change.shape[1])
         return self._map(solved.columns(slice(None, -1)), solved.columns(-1), force, work + own)
 
     def _given(self, force: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the prescribed displacements (n_dofs,) and the given forces on free directions (n_free,)."""
-        moved = np.zeros(len(self.volume))
+        moved = np.zeros(self.stiffness.space.n_dofs)
         moved[self._fixed] = displacement.ravel()[self._fixed]
         return moved, self.stiffness.to_frames(force.reshape(-1, 1))[self.stiffness.free, 0]
 
@@ -118,8 +117,8 @@ class IterativeCondensation:
         right = -self.stiffness.forces(moved)[free]
         right[:, -1] += known
         displacements = moved.copy()
-        displacements[free], pressures = self._held.solve(right, -self.volume.T @ moved)
-        return _Fields(displacements, self.stiffness.forces(displacements) + self.volume @ pressures)
+        displacements[free], pressures = self._held.solve(right, -self.volume.change.T @ moved)
+        return _Fields(displacements, self.stiffness.forces(displacements) + self.volume.change @ pressures)
 
     def _map(self, response: _Fields, at_rest: _Fields, force: FloatArray, work: Work) -> CondensedMap:
         given = self.stiffness.to_frames(force.reshape(-1, 1))[:, 0]

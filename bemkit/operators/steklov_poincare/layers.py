@@ -29,7 +29,7 @@ class Layers:
     strain : (n_traction_dofs, n_dofs) array
         1/2 M + K.
     hypersingular : (n_dofs, n_dofs) array
-        W, of a compressible body with the part of the uniform pressure.
+        W.
     work : Work
         What they took.
     """
@@ -62,11 +62,7 @@ class Layers:
 
 
 def assemble_layers(
-    displacements: BoundarySpace,
-    tractions: BoundarySpace,
-    material: Material,
-    pressures: FloatArray,
-    fluxes: FloatArray,
+    displacements: BoundarySpace, tractions: BoundarySpace, material: Material, pressures: FloatArray
 ) -> Layers:
     """Assemble V, K and W of a map and factor V.
 
@@ -76,13 +72,11 @@ def assemble_layers(
     material : Material
     pressures : (n_traction_dofs, n_pressures) array
         Uniform pressures as traction dofs hold them; V is not inverted on those of an incompressible body.
-    fluxes : (n_dofs, n_pressures) array
-        What displacements change the volume by where these pressures act.
 
     Returns
     -------
     Layers
-        Of a compressible body with the part of the uniform pressure, see `_of_uniform_pressure`.
+        On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n alone.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
     v, k, w = single_layer(t, t, material), double_layer(u, t, material), hypersingular(u, u, material)
@@ -93,7 +87,7 @@ def assemble_layers(
         double_layer=Entries.full(t.n_dofs, u.n_dofs),
         hypersingular=Entries.full(u.n_dofs, u.n_dofs),
     )
-    is_compressible = bool(fluxes.shape[1]) and not material.is_incompressible
+    is_compressible = not (material.is_incompressible or mesh.is_exterior)
     annihilated = mass(t, t).matrix() @ pressures[:, : 0 if is_compressible else None]
     kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
     factor = Cholesky(_without_kernel(v.matrix(), kernel), "the single layer operator")
@@ -112,8 +106,6 @@ def assemble_layers(
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     idle = np.column_stack([resultants, annihilated, strain @ dilatation])
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
-    if is_compressible:
-        hyper = hyper + _of_uniform_pressure(hyper, dilatation, _without(fluxes.T, at_rest).T, material)
     work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
     return Layers(factor, resultant, strain, hyper, work)
 
@@ -121,31 +113,6 @@ def assemble_layers(
 def dilatation_of(space: BoundarySpace) -> FloatArray:
     """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
     return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
-
-
-def _of_uniform_pressure(
-    hypersingular: FloatArray, dilatation: FloatArray, flux: FloatArray, material: Material
-) -> FloatArray:
-    """Return what the exact normals n add to S, if they stand among the tractions for their interpolant.
-
-    Curved elements hold normals only by interpolation; the rest of them, which does not vanish with 1 - 2 nu as V n
-    does, would resist every change of volume of a nearly incompressible body. With the dilatation x, whose tractions
-    are n / beta, beta = (1 - 2 nu) / (2 mu), the identities are V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x.
-    On the other tractions t with <V n, t> = 0, which (1/2 + K) x causes none of, this is q q^T with
-    q = (f - beta W x) / sqrt(beta x (f - beta W x)), and then S x = f / beta.
-
-    Parameters
-    ----------
-    hypersingular : (n_dofs, n_dofs) array
-        W.
-    dilatation, flux : (n_dofs, 1) arrays
-        x, and the flux f of displacements.
-    material : Material
-    """
-    beta = material.plane_compressibility
-    rest = flux - beta * (hypersingular @ dilatation)
-    stiffness: FloatArray = rest @ rest.T / (beta * np.vdot(dilatation, rest))
-    return stiffness
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.dense import multiply
 from bemkit.operators.linear import Factor, LinearSolver, MatrixOperator
 from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.steklov_poincare.held_volume import HeldVolume, room
+from bemkit.operators.steklov_poincare.held_volume import HeldVolume, Volume, room
 from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.work import Work
@@ -23,9 +23,9 @@ class SchurCondensation:
     Parameters
     ----------
     matrix : (n_dofs, n_dofs) array
-        S in x and y.
-    volume : (n_dofs, 0 or 1) array
-        Change of volume of an incompressible body, in x and y.
+        S in x and y, without the uniform pressure.
+    volume : Volume
+        In x and y.
     conditions : NodalConditions
     solver : LinearSolver
     name : str
@@ -38,7 +38,7 @@ class SchurCondensation:
     """
 
     matrix: FloatArray
-    volume: FloatArray
+    volume: Volume
     conditions: NodalConditions
     solver: LinearSolver
     name: str
@@ -53,8 +53,8 @@ class SchurCondensation:
         self.factor = self.solver.factor(MatrixOperator(matrix[np.ix_(self._free, self._free)]), self.name)
         self._coupling = matrix[np.ix_(self._free, self._open)]
         self._of_fixed = matrix[:, self._fixed]
-        self._volume = volume = rotate_rows(self.volume, conditions.frame)
-        self._held = HeldVolume(self.factor, room(volume)[self._free])
+        self._volume = volume = self.volume.in_frames(conditions.frame).change
+        self._held = HeldVolume(self.factor, room(volume)[self._free], self.volume.yields)
         self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._open].T)
         stiffness = matrix[np.ix_(self._open, self._open)] + multiply(self._coupling.T, self._response)
         stiffness += volume[self._open] @ self._pressures
@@ -64,7 +64,7 @@ class SchurCondensation:
     @property
     def work(self) -> Work:
         """What the elimination took."""
-        n_columns = self._open.size + self.volume.shape[1]
+        n_columns = self._open.size + self._volume.shape[1]
         return Work(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
@@ -82,7 +82,7 @@ class SchurCondensation:
             local[free] = at_rest + response @ open_displacement
             displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
             force = self.matrix @ displacement.ravel()
-            force += self.volume @ (pressure + self._pressures @ open_displacement)
+            force += self.volume.change @ (pressure + self._pressures @ open_displacement)
             return displacement, force.reshape(-1, 2)
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
