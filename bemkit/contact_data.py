@@ -37,6 +37,9 @@ class ContactData:
         Distance to the obstacle along the direction of contact.
     facing : (n_contact,) array [-]
         Cosine of the angle between the direction of contact and the body's normal; of the nearer side at a corner.
+    points : (n_contact, 2) array [m]
+        As the mesh has them: by way of dimensionless points a node on an obstacle would lie beside it far from the
+        origin.
     """
 
     nodes: ContactNodes
@@ -44,12 +47,14 @@ class ContactData:
     arc_length: FloatArray
     gap: FloatArray
     facing: FloatArray
+    points: FloatArray
 
     def of(self, nodes: ContactNodes) -> ContactData:
         """Return the rows of some of the nodes, in the order they have here."""
         rows = np.isin(self.nodes.nodes, nodes.nodes)
         parts = tuple(part for part, is_kept in zip(self.parts, rows.tolist(), strict=True) if is_kept)
-        return ContactData(self.nodes.take(rows), parts, self.arc_length[rows], self.gap[rows], self.facing[rows])
+        columns = (column[rows] for column in (self.arc_length, self.gap, self.facing, self.points))
+        return ContactData(self.nodes.take(rows), parts, *columns)
 
     def has_same_directions(self, other: ContactData) -> bool:
         """Whether the same nodes touch in the same directions."""
@@ -85,7 +90,9 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
         if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
     }
     if not obstacles:
-        return ContactData(contact_along_normals(space, np.zeros(0, np.intp)), (), *(np.zeros(0),) * 3)
+        return ContactData(
+            contact_along_normals(space, np.zeros(0, np.intp)), (), *(np.zeros(0),) * 3, np.zeros((0, 2))
+        )
     sides = [_Side.of(obstacle, mesh.part(name), mesh, space) for name, obstacle in obstacles.items()]
     owner = _owners(sides, space.n_dofs // 2, SAME_GAP * mesh.diameter)
     directions = np.zeros((owner.size, 2))
@@ -109,13 +116,14 @@ class _Side:
     arc_length: FloatArray
     gap: FloatArray
     facing: FloatArray
+    points: FloatArray
 
     @classmethod
     def of(cls, obstacle: Obstacle, elements: IntArray, mesh: BoundaryMesh, space: BoundarySpace) -> _Side:
         elements = along_boundary(mesh, elements)
         nodes, normals = nodes_on(space, elements)
-        # not by way of the dimensionless points: a node on the obstacle has the gap zero, also far from the origin
-        gap, directions = measure_contact(obstacle, dof_points(space, mesh)[nodes], normals)
+        points = dof_points(space, mesh)[nodes]
+        gap, directions = measure_contact(obstacle, points, normals)
         lengths = mesh.lengths[elements]
         begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         dofs = space.element_dofs[elements]
@@ -125,7 +133,7 @@ class _Side:
         towards[nodes] = directions
         np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, space.local_nodes) * towards[dofs], axis=2))
         weights = dof_weights(space, elements)[nodes]
-        return cls(nodes, directions, weights, arc_length[nodes], gap, facing[nodes])
+        return cls(nodes, directions, weights, arc_length[nodes], gap, facing[nodes], points)
 
     def take(self, rows: BoolArray) -> _Side:
         return _Side(*(column[rows] for column in vars(self).values()))
@@ -152,10 +160,9 @@ def _joined(
     scene: Scene, names: Sequence[str], sides: Sequence[_Side], weights: FloatArray, space: BoundarySpace
 ) -> ContactData:
     columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
-    nodes, directions, _, arc_length, gap, facing = columns
+    nodes, directions, _, arc_length, gap, facing, points = columns
     parts = tuple(name for name, side in zip(names, sides, strict=True) for _ in range(side.nodes.size))
     smooth = {name for name, law in scene.laws.items() if law.is_frictionless}
     is_frictionless = np.array([part in smooth for part in parts], bool)
-    points = dof_points(space)[nodes]
-    found = ContactNodes(nodes, points, contact_frame(directions), weights[nodes], is_frictionless)
-    return ContactData(found, parts, arc_length, gap, facing)
+    found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights[nodes], is_frictionless)
+    return ContactData(found, parts, arc_length, gap, facing, points)

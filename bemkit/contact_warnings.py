@@ -8,7 +8,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact_data import find_contact
-from bemkit.geometry.space import dof_points
 from bemkit.model import Model
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -53,18 +52,16 @@ def _oblique(model: Model, node_status: IntArray) -> list[str]:
 
 
 def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
-    space = model.elastic.displacement_space
-    everywhere = find_contact(model.scene, model.mesh, space)
+    everywhere = find_contact(model.scene, model.mesh, model.elastic.displacement_space)
     nodes = everywhere.nodes
     overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - everywhere.gap
     overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
-    points = dof_points(space, model.mesh)[nodes.nodes]
     found = []
     for part in dict.fromkeys(everywhere.parts):
         own = np.array([name == part for name in everywhere.parts])
         node = int(np.argmax(np.where(own, overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
-            x, y = points[node]
+            x, y = everywhere.points[node]
             found.append(
                 f"Supports push part {part!r} {overlap[node]:.3g} m into its obstacle at ({x:.6g}, {y:.6g}), where "
                 "contact cannot act: let them move with the obstacle, or leave a free element between them."

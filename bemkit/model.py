@@ -112,8 +112,7 @@ class Model:
     @property
     def law(self) -> FrictionLaw:
         """The friction law of the contact nodes, dimensionless, also where supports hold them."""
-        points = self.units.to_physical(self.nodes.points)
-        return self.scene.law_at(self.contact.parts, points).scaled(self.units.stress)
+        return self.scene.law_at(self.contact.parts, self.contact.points).scaled(self.units.stress)
 
     def boundary_fields(self, state: ContactState) -> tuple[FloatArray, FloatArray, float]:
         """Return the physical fields of a contact state on the whole boundary.
@@ -194,7 +193,7 @@ def check_position(mesh: BoundaryMesh) -> None:
 
 
 def _problem(scene: Scene, units: Units, body: CondensedBody, contact: ContactData) -> ContactProblem:
-    law = scene.law_at(contact.parts, units.to_physical(contact.nodes.points), body.is_held)
+    law = scene.law_at(contact.parts, contact.points, body.is_held)
     return ContactProblem(body, contact.gap / units.displacement, law.scaled(units.stress))
 
 

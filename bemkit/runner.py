@@ -358,12 +358,11 @@ def _contact_table(
     # where the tangent is no unknown the body itself says how it moves
     u_t = np.sum(boundary_displacement[model.nodes.nodes] * tangents, axis=1)
     u_t = np.where(model.body.tangent_is_free, u_t, state.u_t * units.displacement)
-    points = dof_points(model.elastic.displacement_space, model.mesh)[model.nodes.nodes]
     displacement = state.displacement * units.displacement
     return ContactTable(
         part=contact.parts,
-        x=points[:, 0].copy(),
-        y=points[:, 1].copy(),
+        x=contact.points[:, 0].copy(),
+        y=contact.points[:, 1].copy(),
         s=contact.arc_length.copy(),
         u_n=displacement[:, 0].copy(),
         u_t=u_t,
