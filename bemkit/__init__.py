@@ -12,10 +12,9 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from bemkit.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from bemkit.cascade import run_cascade as run_cascade
     from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
     from bemkit.contact.laws import Coulomb as Coulomb
     from bemkit.contact.laws import FrictionLaw as FrictionLaw
@@ -30,12 +29,12 @@ if TYPE_CHECKING:
     from bemkit.errors import BemkitError as BemkitError
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
-    from bemkit.expression import Expression as Expression
-    from bemkit.geometry.discretise import discretise as discretise
+    from bemkit.formulas import Expression as Expression
     from bemkit.geometry.grading import Algebraic as Algebraic
     from bemkit.geometry.grading import Geometric as Geometric
     from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+    from bemkit.geometry.meshing.discretise import discretise as discretise
     from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
@@ -44,76 +43,108 @@ if TYPE_CHECKING:
     from bemkit.geometry.shapes import Rectangle as Rectangle
     from bemkit.geometry.shapes import Ring as Ring
     from bemkit.geometry.shapes import Sector as Sector
-    from bemkit.geometry.space import ConstantSpace as ConstantSpace
-    from bemkit.geometry.space import LinearSpace as LinearSpace
-    from bemkit.geometry.space import QuadraticSpace as QuadraticSpace
-    from bemkit.geometry.space import corner_nodes as corner_nodes
+    from bemkit.geometry.spaces import ConstantSpace as ConstantSpace
+    from bemkit.geometry.spaces import LinearSpace as LinearSpace
+    from bemkit.geometry.spaces import QuadraticSpace as QuadraticSpace
+    from bemkit.geometry.spaces import corner_nodes as corner_nodes
     from bemkit.geometry.symmetry import Symmetry as Symmetry
-    from bemkit.interior import interior_fields as interior_fields
-    from bemkit.io import read_result as read_result
-    from bemkit.io import write_result as write_result
     from bemkit.operators.boundary import adjoint_double_layer as adjoint_double_layer
     from bemkit.operators.boundary import assemble as assemble
     from bemkit.operators.boundary import double_layer as double_layer
     from bemkit.operators.boundary import hypersingular as hypersingular
     from bemkit.operators.boundary import mass as mass
     from bemkit.operators.boundary import single_layer as single_layer
-    from bemkit.operators.linear import Automatic as Automatic
-    from bemkit.operators.linear import DenseCholesky as DenseCholesky
-    from bemkit.operators.linear import Krylov as Krylov
+    from bemkit.operators.linear.solvers import Automatic as Automatic
+    from bemkit.operators.linear.solvers import DenseCholesky as DenseCholesky
+    from bemkit.operators.linear.solvers import Krylov as Krylov
     from bemkit.operators.material import Material as Material
     from bemkit.operators.material import Plane as Plane
-    from bemkit.operators.representation import InteriorFields as InteriorFields
+    from bemkit.operators.somigliana.fields import InteriorFields as InteriorFields
+    from bemkit.operators.somigliana.stress import principal_stresses as principal_stresses
+    from bemkit.operators.somigliana.stress import von_mises as von_mises
     from bemkit.operators.steklov_poincare import CollocationMap as CollocationMap
     from bemkit.operators.steklov_poincare import GalerkinMap as GalerkinMap
-    from bemkit.operators.stress import principal_stresses as principal_stresses
-    from bemkit.operators.stress import von_mises as von_mises
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
-    from bemkit.runner import FailedRun as FailedRun
-    from bemkit.runner import run as run
-    from bemkit.runner import run_all as run_all
-    from bemkit.runner import run_history as run_history
-    from bemkit.runner import run_probe as run_probe
-    from bemkit.scene import Clamped as Clamped
-    from bemkit.scene import ConstantCollocation as ConstantCollocation
-    from bemkit.scene import Contact as Contact
-    from bemkit.scene import LinearGalerkin as LinearGalerkin
-    from bemkit.scene import MeshOptions as MeshOptions
-    from bemkit.scene import Part as Part
-    from bemkit.scene import PrescribedDisplacement as PrescribedDisplacement
-    from bemkit.scene import Pressure as Pressure
-    from bemkit.scene import QuadraticGalerkin as QuadraticGalerkin
-    from bemkit.scene import Roller as Roller
-    from bemkit.scene import Scene as Scene
-    from bemkit.scene import Traction as Traction
-    from bemkit.scenefile import load_scene as load_scene
-    from bemkit.scenefile import scene_from_toml as scene_from_toml
-    from bemkit.scenefile import scene_to_toml as scene_to_toml
-    from bemkit.solution import Solution as Solution
+    from bemkit.results.interior import interior_fields as interior_fields
+    from bemkit.results.result_file import read_result as read_result
+    from bemkit.results.result_file import write_result as write_result
+    from bemkit.results.solution import Solution as Solution
+    from bemkit.runs.nested import run_cascade as run_cascade
+    from bemkit.runs.run import FailedRun as FailedRun
+    from bemkit.runs.run import run as run
+    from bemkit.runs.run import run_all as run_all
+    from bemkit.runs.run import run_history as run_history
+    from bemkit.runs.run import run_probe as run_probe
+    from bemkit.scene.scene import Clamped as Clamped
+    from bemkit.scene.scene import ConstantCollocation as ConstantCollocation
+    from bemkit.scene.scene import Contact as Contact
+    from bemkit.scene.scene import LinearGalerkin as LinearGalerkin
+    from bemkit.scene.scene import MeshOptions as MeshOptions
+    from bemkit.scene.scene import Part as Part
+    from bemkit.scene.scene import PrescribedDisplacement as PrescribedDisplacement
+    from bemkit.scene.scene import Pressure as Pressure
+    from bemkit.scene.scene import QuadraticGalerkin as QuadraticGalerkin
+    from bemkit.scene.scene import Roller as Roller
+    from bemkit.scene.scene import Scene as Scene
+    from bemkit.scene.scene import Traction as Traction
+    from bemkit.scene.toml import load_scene as load_scene
+    from bemkit.scene.toml import scene_from_toml as scene_from_toml
+    from bemkit.scene.toml import scene_to_toml as scene_to_toml
     from bemkit.solvers.alm import AugmentedLagrangian as AugmentedLagrangian
     from bemkit.solvers.base import ContactSolver as ContactSolver
     from bemkit.solvers.base import Status as Status
     from bemkit.solvers.base import solve as solve
     from bemkit.solvers.fixed_point import FixedPoint as FixedPoint
-    from bemkit.solvers.lemke import LemkePivoting as LemkePivoting
     from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
+    from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
-    "cascade": ("run_cascade",),
-    "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
-    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle", "PolygonalObstacle"),
-    "errors": ("BemkitError", "InputError", "NoResultError"),
-    "expression": ("Expression",),
-    "geometry.discretise": ("discretise",),
-    "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
+    "contact.laws": (
+        "CohesiveCoulomb",
+        "Coulomb",
+        "FrictionLaw",
+        "Frictionless",
+        "Tresca",
+    ),
+    "contact.obstacle": (
+        "Cavity",
+        "Circle",
+        "Gap",
+        "HalfPlane",
+        "Obstacle",
+        "PolygonalObstacle",
+    ),
+    "errors": (
+        "BemkitError",
+        "InputError",
+        "NoResultError",
+    ),
+    "formulas": ("Expression",),
+    "geometry.grading": (
+        "Algebraic",
+        "Geometric",
+        "Uniform",
+    ),
     "geometry.mesh": ("BoundaryMesh",),
+    "geometry.meshing.discretise": ("discretise",),
     "geometry.selection": ("Selection",),
-    "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring", "Sector"),
-    "geometry.space": ("ConstantSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
+    "geometry.shapes": (
+        "Disk",
+        "ExteriorOf",
+        "PlateWithHole",
+        "Polygon",
+        "Rectangle",
+        "Ring",
+        "Sector",
+    ),
+    "geometry.spaces": (
+        "ConstantSpace",
+        "LinearSpace",
+        "QuadraticSpace",
+        "corner_nodes",
+    ),
     "geometry.symmetry": ("Symmetry",),
-    "interior": ("interior_fields",),
-    "io": ("read_result", "write_result"),
     "operators.boundary": (
         "adjoint_double_layer",
         "assemble",
@@ -122,15 +153,41 @@ _HOME = {
         "mass",
         "single_layer",
     ),
-    "operators.linear": ("Automatic", "DenseCholesky", "Krylov"),
-    "operators.material": ("Material", "Plane"),
-    "operators.representation": ("InteriorFields",),
-    "operators.steklov_poincare": ("CollocationMap", "GalerkinMap"),
-    "operators.stress": ("principal_stresses", "von_mises"),
+    "operators.linear.solvers": (
+        "Automatic",
+        "DenseCholesky",
+        "Krylov",
+    ),
+    "operators.material": (
+        "Material",
+        "Plane",
+    ),
+    "operators.somigliana.fields": ("InteriorFields",),
+    "operators.somigliana.stress": (
+        "principal_stresses",
+        "von_mises",
+    ),
+    "operators.steklov_poincare": (
+        "CollocationMap",
+        "GalerkinMap",
+    ),
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
-    "runner": ("FailedRun", "run", "run_all", "run_history", "run_probe"),
-    "scene": (
+    "results.interior": ("interior_fields",),
+    "results.result_file": (
+        "read_result",
+        "write_result",
+    ),
+    "results.solution": ("Solution",),
+    "runs.nested": ("run_cascade",),
+    "runs.run": (
+        "FailedRun",
+        "run",
+        "run_all",
+        "run_history",
+        "run_probe",
+    ),
+    "scene.scene": (
         "Clamped",
         "ConstantCollocation",
         "Contact",
@@ -144,13 +201,20 @@ _HOME = {
         "Scene",
         "Traction",
     ),
-    "scenefile": ("load_scene", "scene_from_toml", "scene_to_toml"),
-    "solution": ("Solution",),
+    "scene.toml": (
+        "load_scene",
+        "scene_from_toml",
+        "scene_to_toml",
+    ),
     "solvers.alm": ("AugmentedLagrangian",),
-    "solvers.base": ("ContactSolver", "Status", "solve"),
+    "solvers.base": (
+        "ContactSolver",
+        "Status",
+        "solve",
+    ),
     "solvers.fixed_point": ("FixedPoint",),
-    "solvers.lemke": ("LemkePivoting",),
     "solvers.ssn": ("SemismoothNewton",),
+    "testing.lemke": ("LemkePivoting",),
 }
 _MODULE_OF = {name: f"bemkit.{module}" for module, names in _HOME.items() for name in names}
 

@@ -6,7 +6,7 @@ import sys
 def main() -> None:
     """Load the command line and run it; Ctrl-C while it loads ends like Ctrl-C later."""
     try:
-        from bemkit.cli import main as run
+        from bemkit.cli.main import main as run
 
         run()
     except KeyboardInterrupt:

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.atomic_files import replacing
 from bemkit.errors import InputError
-from bemkit.files import replacing
 from bemkit.printable import printable, shown_path
 
 if TYPE_CHECKING:

@@ -17,10 +17,10 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
-from bemkit.study.plots import draw_errors
-from bemkit.study.rows import Row, by_series, fitted_order, pareto_front
-from bemkit.study.runs import AdaptiveMeshes, all_runs, graded, uniform
-from bemkit.study.sweep import timed_rows
+from bemkit.studies.accuracy.plots import draw_errors
+from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, pareto_front
+from bemkit.studies.accuracy.runs import AdaptiveMeshes, all_runs, graded, uniform
+from bemkit.studies.accuracy.sweep import timed_rows
 
 PAGE = Path(__file__).parent / "error-against-run-time.md"
 IMAGES = Path(__file__).parent / "images"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import bemkit as bk
-from bemkit.plotting import Units, draw_contact_displacement, draw_contact_traction, draw_deformation
-from bemkit.scenefile import with_overrides
+from bemkit.results.figures import Units, draw_contact_displacement, draw_contact_traction, draw_deformation
+from bemkit.scene.toml import with_overrides
 
 IMAGES = Path(__file__).parent / "images"
 DOTS_PER_INCH = 110  # sharp at the width of a page, and each file below 100 kB

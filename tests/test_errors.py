@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import bemkit
-import bemkit.runner
-from bemkit.cli import main
-from bemkit.complaint import complaint, concerning
+import bemkit.runs.run
+from bemkit.cli.errors import complaint, concerning
+from bemkit.cli.main import main
 from bemkit.errors import BemkitError, InputError, NoResultError
 
 MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
@@ -69,7 +69,7 @@ def test_the_command_line_ends_named_errors_in_one_line(
     def refuse(*arguments: object, **options: object) -> None:
         raise kind("the mesh is\ntoo coarse")
 
-    monkeypatch.setattr(bemkit.runner, "run", refuse)
+    monkeypatch.setattr(bemkit.runs.run, "run", refuse)
     with pytest.raises(SystemExit) as end:
         main(["run", "paper-1"])
     assert end.value.code == code
@@ -80,6 +80,6 @@ def test_the_command_line_leaves_defects_their_traceback(monkeypatch: pytest.Mon
     def fail(*arguments: object, **options: object) -> None:
         raise ValueError("shapes do not match")  # as numpy says it
 
-    monkeypatch.setattr(bemkit.runner, "run", fail)
+    monkeypatch.setattr(bemkit.runs.run, "run", fail)
     with pytest.raises(ValueError, match="shapes do not match"):
         main(["run", "paper-1"])

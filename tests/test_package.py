@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -13,60 +15,99 @@ import bemkit
 
 PACKAGE = Path(bemkit.__file__).parent
 
-# imports point up only: a module may import those of its own layer and of earlier ones
-LAYERS = [
-    {"arrays", "complaint", "errors", "expression", "files", "hdf5", "locks", "printable", "streams", "workers"},
-    {"geometry"},
-    {"operators"},
-    {"contact"},
-    {"solvers"},
-    {"discretisations", "mesh_options", "scene", "scene_symmetry"},
-    {
-        "boundary_data",
-        "contact_data",
-        "elasticity",
-        "estimate",
-        "plan",
-        "kinds",
-        "model",
-        "history",
-        "structuring",
-        "shipped",
-    },
-    {"clock", "solution", "scenefile", "escape"},
-    {"warm_start", "held_friction", "contact_warnings", "energy", "solution_warnings", "totals"},
-    {"planfile", "io", "tables", "boundary_figure", "plotting", "interior", "runner", "adaptive", "reference"},
-    {"outputs", "report", "explain", "rowfile", "testing", "cascade"},
-    {"study", "stability"},
-    {"cli"},
-]
+CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
+NAME = "bemkit"
+TO_BE_TURNED = {
+    "bemkit.model.contact_model imports bemkit.plan",
+    "bemkit.model.elastic_model imports bemkit.plan",
+    "bemkit.studies.accuracy.session imports bemkit.cli.outputs",
+    "bemkit.studies.stability.plots imports bemkit.cli.outputs",
+    "bemkit.studies.stability.trial_session imports bemkit.cli.outputs",
+    "bemkit.runs.run -> bemkit.runs.adaptive -> bemkit.runs.run",
+    "bemkit.runs.adaptive -> bemkit.runs.run -> bemkit.runs.adaptive",
+    "bemkit.scene.scene -> bemkit.scene.symmetry -> bemkit.scene.scene",
+    "bemkit.scene.symmetry -> bemkit.scene.scene -> bemkit.scene.symmetry",
+}
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")
+
+
+def order() -> list[str]:
+    """Return the leaves and folders of the package from the first to the last, as CONTRIBUTING lists them."""
+    tree = re.search(r"```text\nbemkit/\n(.*?)```", CONTRIBUTING.read_text(), re.DOTALL)
+    assert tree
+    return [line.split()[0].removesuffix(".py").removesuffix("/") for line in tree[1].splitlines()]
 
 
 def modules() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-def layer_of(module: str) -> int:
-    first = module.split(".")[1]
-    return next(number for number, names in enumerate(LAYERS) if first in names)
+def dotted(path: Path) -> str:
+    return ".".join((NAME, *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
 
 
-def imports_of(path: Path) -> set[str]:
+def imports_of(path: Path, package: Path = PACKAGE) -> set[str]:
+    """Return the modules of the package that a module imports, in functions and for its types too."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("bemkit."):
-            found.add(node.module)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == NAME:
+            for alias in node.names:
+                inner = Path(package, *node.module.split(".")[1:], alias.name)
+                is_module = inner.with_suffix(".py").exists() or inner.is_dir()
+                found.add(f"{node.module}.{alias.name}" if is_module else node.module)
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name.split(".")[0] == NAME}
     return found
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_point_up_only(path: Path) -> None:
-    name = ".".join(("bemkit", *path.relative_to(PACKAGE).with_suffix("").parts))
-    if name in {"bemkit.__init__", "bemkit.__main__"}:
-        return
-    for imported in imports_of(path):
-        assert layer_of(imported) <= layer_of(name), f"{name} imports {imported}, which stands below it"
+def wrong_imports(graph: dict[str, set[str]], layers: list[str]) -> list[str]:
+    """Return the imports that point down the list or to the face of the package, and a circle if there is one."""
+    wrong = [
+        f"{name} imports {imported}"
+        for name, targets in graph.items()
+        for imported in targets
+        if imported == NAME or layers.index(imported.split(".")[1]) > layers.index(name.split(".")[1])
+    ]
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        wrong.append(" -> ".join(error.args[1]))
+    return wrong
+
+
+def import_graph() -> dict[str, set[str]]:
+    return {dotted(path): imports_of(path) for path in modules() if path.parent != PACKAGE or path.stem[0] != "_"}
+
+
+def test_the_tree_of_contributing_is_the_tree_of_the_package() -> None:
+    there = {path.stem for path in PACKAGE.iterdir() if path.is_dir() or path.suffix == ".py"}
+    assert set(order()) == {name for name in there if not name.startswith("_")}
+
+
+def test_imports_point_up_only_and_in_no_circle() -> None:
+    assert set(wrong_imports(import_graph(), order())) <= TO_BE_TURNED
+
+
+@pytest.mark.parametrize(
+    ("graph", "found"),
+    [
+        ({"bemkit.a.x": {"bemkit.b.y"}, "bemkit.b.y": set()}, "bemkit.a.x imports bemkit.b.y"),
+        ({"bemkit.a.x": {"bemkit"}}, "bemkit.a.x imports bemkit"),
+        ({"bemkit.a.x": {"bemkit.a.y"}, "bemkit.a.y": {"bemkit.a.x"}}, " -> "),
+    ],
+    ids=["down", "face", "circle"],
+)
+def test_wrong_imports_are_found(graph: dict[str, set[str]], found: str) -> None:
+    assert any(found in line for line in wrong_imports(graph, ["a", "b"]))
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["import bemkit", "import bemkit.geometry.mesh", "from bemkit.geometry import mesh", "from bemkit import run"],
+)
+def test_every_form_of_import_is_seen(line: str, tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(f"def late():\n    {line}\n")
+    assert imports_of(tmp_path / "module.py")
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -86,7 +127,12 @@ def test_the_typed_exports_are_the_real_ones() -> None:
     tree = ast.parse((PACKAGE / "__init__.py").read_text())
     typed = {}
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("bemkit."):
+        if (
+            isinstance(node, ast.ImportFrom)
+            and node.module
+            and node.module.startswith("bemkit.")
+            and node.module != "bemkit.version"
+        ):
             typed |= {alias.name: node.module for alias in node.names}
     assert typed == {name: getattr(bemkit, "_MODULE_OF")[name] for name in bemkit.__all__}  # noqa: B009
 

@@ -8,7 +8,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import BemkitError, InputError
-from bemkit.operators.balance import Imbalance
+from bemkit.operators.equilibrium import Imbalance
 
 
 class SingularResponse(BemkitError, ArithmeticError):  # noqa: N818 - a response, not a mistake of the caller

@@ -18,7 +18,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
-from bemkit.expression import ScalarField, check_field, evaluate_field
+from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 Coefficient: TypeAlias = ScalarField | FloatArray
 """A number, a formula or function of x and y, or one number per contact node."""

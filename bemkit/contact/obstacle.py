@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.expression import ScalarField, check_field, evaluate_field
+from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 FACING = 1e-12
 """Cosine of the angle between the body's normal and the contact direction below which a point does not face the

@@ -7,10 +7,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.contact.dense import DenseBody
 from bemkit.contact.laws import FrictionLaw, LawError
-from bemkit.contact.partwise import law_name
+from bemkit.contact.piecewise_law import law_name
 from bemkit.errors import InputError
 
 __all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]

@@ -1,10 +1,9 @@
 """Curves, shapes, selections, gradings and boundary meshes."""
 
-from bemkit.geometry.curve import Arc as Arc
-from bemkit.geometry.curve import Curve as Curve
-from bemkit.geometry.curve import ParametricCurve as ParametricCurve
-from bemkit.geometry.curve import Segment as Segment
-from bemkit.geometry.discretise import discretise as discretise
+from bemkit.geometry.curves import Arc as Arc
+from bemkit.geometry.curves import Curve as Curve
+from bemkit.geometry.curves import ParametricCurve as ParametricCurve
+from bemkit.geometry.curves import Segment as Segment
 from bemkit.geometry.errors import GeometryError as GeometryError
 from bemkit.geometry.errors import UnknownPartError as UnknownPartError
 from bemkit.geometry.grading import Algebraic as Algebraic
@@ -14,6 +13,7 @@ from bemkit.geometry.grading import Uniform as Uniform
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
 from bemkit.geometry.meshfile import read_mesh as read_mesh
 from bemkit.geometry.meshfile import write_mesh as write_mesh
+from bemkit.geometry.meshing.discretise import discretise as discretise
 from bemkit.geometry.outline import Outline as Outline
 from bemkit.geometry.outline import Side as Side
 from bemkit.geometry.selection import Selection as Selection

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.curve import Curve
+from bemkit.geometry.curves import Curve
 
 
 class Elements(NamedTuple):

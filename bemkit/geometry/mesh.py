@@ -9,11 +9,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
-from bemkit.geometry.curve import Curve, MovedCurve, as_point, require_positive
+from bemkit.geometry.curves import Curve, MovedCurve, as_point, require_positive
 from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
-from bemkit.geometry.loops import swept_areas
-from bemkit.geometry.mesh_checks import (
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.symmetry import Symmetry, check_half, unfold
+from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.validity.loops import swept_areas
+from bemkit.geometry.validity.mesh_checks import (
     as_index,
     check_chains,
     check_curves,
@@ -22,9 +25,6 @@ from bemkit.geometry.mesh_checks import (
     follow_loops,
     restrict_loops,
 )
-from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
-from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.vectors import norms, turned_right
 
 _N_LENGTH_POINTS = 16

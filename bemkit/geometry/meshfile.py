@@ -10,8 +10,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError, format_point
-from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.validity.loops import following_in_loops
 from bemkit.geometry.vectors import cross
 from bemkit.printable import printable
 

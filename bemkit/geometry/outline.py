@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.curve import Curve
+from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError, format_point
-from bemkit.geometry.loops import check_loops
-from bemkit.geometry.magnitude import check_magnitude
-from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
+from bemkit.geometry.validity.chords import RESOLUTION, make_pieces, resolution
+from bemkit.geometry.validity.loops import check_loops
+from bemkit.geometry.validity.magnitude import check_magnitude
 from bemkit.geometry.vectors import norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.curve import Curve
+from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError
 
 N_SAMPLES = 257

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.curve import Curve
+from bemkit.geometry.curves import Curve
 from bemkit.geometry.elements import Elements
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.pieces import RESOLUTION
+from bemkit.geometry.validity.chords import RESOLUTION
 
 _ON_LINE = 64 * RESOLUTION
 """Nodes closer to a line than this, times the size of coordinates, lie on it: trigonometry loses a few digits."""

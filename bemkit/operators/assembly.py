@@ -19,13 +19,13 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.folding import element_images, vanishing_dofs
-from bemkit.geometry.space import BoundarySpace
+from bemkit.geometry.reflection import element_images, vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators import kernels
-from bemkit.operators.integrals import PairSweep
-from bemkit.operators.pairs import Degrees, PairIntegrals
-from bemkit.operators.stopwatch import assembling
-from bemkit.operators.threads import for_each_chunk
+from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
+from bemkit.operators.integrals.sweep import PairSweep
+from bemkit.operators.linear.threads import for_each_chunk
+from bemkit.stopwatch import assembling
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
 """The xx, xy, yx, yy entries, each (n_rows, n_trial); None is zero."""

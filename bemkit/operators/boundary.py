@@ -20,11 +20,11 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, read_only
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.folding import vanishing_dofs
-from bemkit.geometry.space import BoundarySpace, local_coefficients
+from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.assembly import Block, Tensor, TrialTerm, assemble_together, clear_vanishing
+from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.material import Material
-from bemkit.operators.pairs import Degrees
 
 if TYPE_CHECKING:
     from scipy.sparse.linalg import LinearOperator

@@ -23,13 +23,13 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.atomic_files import check_room, check_target, replacing
 from bemkit.errors import InputError
-from bemkit.files import check_room, check_target, replacing
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import BoundarySpace, local_coefficients
+from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.hdf5 import USER_BLOCK, Reader, ResultFileError, opened, seal, write_attributes
 from bemkit.operators.boundary import DoubleLayer, Hypersingular, Mass, SingleLayer
-from bemkit.operators.dense import Cholesky
+from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
 
@@ -80,14 +80,14 @@ def save(path: str | Path, operator: CachedOperator) -> None:
     """
     import h5py
 
-    import bemkit
+    from bemkit.version import __version__
 
     target = check_target(Path(path), "bemkit operator cache", _is_own)
     arrays = _computed(operator)
     check_room(target, sum(array.nbytes for array in arrays.values()) + _OVERHEAD)
     with replacing(target) as temporary:
         with h5py.File(str(temporary), "w", userblock_size=USER_BLOCK, locking=False) as file:
-            marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": bemkit.__version__}
+            marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": __version__}
             write_attributes(file, {**marks, **fingerprints(operator)})
             for name, array in arrays.items():
                 file.create_dataset(f"arrays/{name}", data=array)

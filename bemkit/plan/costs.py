@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bemkit.operators.integrals import CHUNK_PAIRS
+from bemkit.operators.integrals.sweep import CHUNK_PAIRS
 from bemkit.plan.decisions import Decisions, Formulation
 from bemkit.plan.machine import Machine
 from bemkit.plan.sizes import Sizes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bemkit.operators.work import Entries, Factorisation, FactorKind, Work
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, Work
 from bemkit.plan.decisions import Decisions, Formulation
 from bemkit.plan.sizes import Sizes
 

@@ -6,11 +6,11 @@ import enum
 from dataclasses import dataclass
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
-from bemkit.operators.linear import Automatic, Choice, DenseCholesky, Krylov, LinearSolverWish
-from bemkit.operators.linear_choice import choose_linear_solver
-from bemkit.operators.memory import physical_memory
-from bemkit.scene import LARGEST_KRYLOV_ERROR, ConstantCollocation, QuadraticGalerkin, Scene
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
+from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.memory import physical_memory
+from bemkit.operators.linear.solvers import Automatic, Choice, DenseCholesky, Krylov, LinearSolverWish
+from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, ConstantCollocation, QuadraticGalerkin, Scene
 
 
 class Formulation(enum.Enum):
@@ -22,7 +22,7 @@ class Formulation(enum.Enum):
 
 @dataclass(frozen=True)
 class Decisions:
-    """The choices of a plan; `bemkit.model.build_model` and `bemkit.runner.run` follow them.
+    """The choices of a plan; `bemkit.model.contact_model.build_model` and `bemkit.runs.run.run` follow them.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ class Decisions:
     displacement_degree, traction_degree : int
         Of the polynomials on each element.
     takes_slopes : bool
-        Whether the double layer of constant elements takes slopes between neighbours (`bemkit.operators.slopes`).
+        Whether the double layer of constant elements takes slopes between neighbours
+        (`bemkit.operators.collocation.gradient_reconstruction`).
     n_load_steps : int
     has_contact : bool
         Whether any part may touch an obstacle; without one the body is solved at once.

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.operators.linear import Krylov
-from bemkit.operators.linear_choice import krylov_cost
+from bemkit.operators.linear.choice import krylov_cost
+from bemkit.operators.linear.solvers import Krylov
 from bemkit.plan.costs import CONTACT_STEPS, FLOPS_PER_NUMBER, Cost, Stage, assembly
 from bemkit.plan.decisions import Decisions, Formulation
 from bemkit.plan.machine import Machine
 from bemkit.plan.sizes import Sizes
-from bemkit.scene import Scene
+from bemkit.scene.scene import Scene
 
 _BYTES = 8
 _DEGREES = ("constant", "linear", "quadratic")

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from bemkit.operators import kernels
-from bemkit.operators.threads import blas_threads_for
+from bemkit.operators.linear.threads import blas_threads_for
 
 _ORDER = 320
 _EVALUATIONS = 4096

@@ -8,8 +8,7 @@ from typing import Any
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.history import load_steps
-from bemkit.operators.work import Work
+from bemkit.operators.counts import Work
 from bemkit.plan.costs import Stage, peaks
 from bemkit.plan.counts import planned_work
 from bemkit.plan.decisions import Decisions, decide
@@ -17,7 +16,8 @@ from bemkit.plan.items import PlanItem, Wishes, output_items, plan_items
 from bemkit.plan.machine import Machine
 from bemkit.plan.sizes import Sizes, find_sizes
 from bemkit.plan.thinness import thinness_warnings
-from bemkit.scene import Scene
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def make_plan(
     steps : sequence of Scene, optional
         What follows each other in time; the load steps of the scene by default.
     proposal : Symmetry, optional
-        A symmetry that the scene has but does not use, from `bemkit.scene_symmetry.find_symmetry`.
+        A symmetry that the scene has but does not use, from `bemkit.scene.symmetry.find_symmetry`.
 
     Returns
     -------

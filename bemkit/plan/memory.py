@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bemkit.errors import InputError
-from bemkit.operators.memory import physical_memory
+from bemkit.operators.linear.memory import physical_memory
 from bemkit.plan.make import Plan, make_plan
-from bemkit.scene import Scene
+from bemkit.scene.scene import Scene
 
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.boundary_data import find_units, nodal_forces, supports_on
-from bemkit.contact.nodes import contact_conditions, free_motions
-from bemkit.contact.unknowns import find_tangents
-from bemkit.contact_data import find_contact
+from bemkit.contact.condensation.nodes import contact_conditions, free_motions
+from bemkit.contact.condensation.retained import find_tangents
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import BoundarySpace
-from bemkit.operators.nodal import NodalConditions, supported
-from bemkit.operators.rigid import possible_motions
-from bemkit.operators.steklov_poincare.given import GivenData
-from bemkit.operators.threads import n_threads
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.model.boundary_data import find_units, nodal_forces, supports_on
+from bemkit.model.contact_data import find_contact
+from bemkit.operators.linear.threads import n_threads
+from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, supported
+from bemkit.operators.steklov_poincare.prescribed import GivenData
 from bemkit.plan.decisions import Decisions, Formulation
-from bemkit.scene import Scene
+from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True)

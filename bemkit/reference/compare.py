@@ -11,12 +11,12 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic
-from bemkit.geometry.order import along_boundary
+from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.mesh_options import MeshOptions
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
-from bemkit.scene import Contact, QuadraticGalerkin, Scene
-from bemkit.solution import Solution
+from bemkit.results.solution import Solution
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Contact, QuadraticGalerkin, Scene
 
 FINEST = 1e-12
 """An accuracy that no mesh reaches, so that the number of elements alone ends the search."""
@@ -96,8 +96,8 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
 
 
 def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
-    from bemkit.adaptive import run_adaptive
-    from bemkit.runner import run
+    from bemkit.runs.adaptive import run_adaptive
+    from bemkit.runs.run import run
 
     if len(scene.load_factors) == 1:
         return list(run_adaptive(replace(scene, mesh=MeshOptions(accuracy=FINEST, most_elements=most_elements))))

@@ -8,14 +8,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bemkit.mesh_options import MeshOptions
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.paper import paper_reference
 from bemkit.reference.pressure import places_along
 from bemkit.reference.values import Answer, Places, Reference
 from bemkit.reference.wavy import WavyObstacle
-from bemkit.scene import LinearGalerkin, Scene
-from bemkit.scenefile import load_scene
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import LinearGalerkin, Scene
+from bemkit.scene.toml import load_scene
 from bemkit.solvers.ssn import SemismoothNewton
 
 

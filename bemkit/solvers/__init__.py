@@ -1,1 +1,1 @@
-"""solvers."""
+"""Drivers for contact problems as strategy objects, and the one loop that runs them."""

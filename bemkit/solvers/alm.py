@@ -12,7 +12,7 @@ from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
 from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.newton import respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
-from bemkit.solvers.outer import Progress
+from bemkit.solvers.progress import Progress
 
 _AUTOMATIC_RHO = 100.0
 """In units of the body's stiffness scale. Large enough that the multipliers gain two digits a step, so that the rate of

@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.admissibility import find_long_travel, find_unsolvable_load
 from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.solvers.floating import FloatingResponse, floating_response

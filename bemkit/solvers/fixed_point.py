@@ -9,7 +9,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import InputError
 from bemkit.solvers.base import Iterate, Status, solve
 from bemkit.solvers.options import check_max_steps
-from bemkit.solvers.outer import Progress
+from bemkit.solvers.progress import Progress
 from bemkit.solvers.ssn import SemismoothNewton
 
 

@@ -6,9 +6,9 @@ from enum import Enum, auto
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
 from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.homotopy import AffineBound, follow_path, path_exists
 from bemkit.solvers.newton import merit, respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
-from bemkit.solvers.path import AffineBound, follow_path, path_exists
 
 _MOST_PATHS = 5
 """Paths followed to their ends before giving up. One is enough for bounds that are affine in the pressure; for others
@@ -101,7 +101,7 @@ class SemismoothNewton:
     damped_steps : int
         Steps with line search allowed before the path is followed; zero leaves the line search out.
     follows_path : bool
-        Whether to follow the path of solutions when all else fails; see `bemkit.solvers.path`.
+        Whether to follow the path of solutions when all else fails; see `bemkit.solvers.homotopy`.
 
     Notes
     -----

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.curve import Curve
+from bemkit.geometry.curves import Curve
 from bemkit.geometry.vectors import cross, norms
 from bemkit.testing.failure import demand
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.dense import SingularMatrixError
-from bemkit.operators.linear import LinearSolver, MatrixOperator
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear.solvers import LinearSolver, MatrixOperator
 from bemkit.testing.failure import demand
 
 _ORDER = 40

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.space import dof_points
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.boundary import BoundaryOperator, DoubleLayer, Tag, mass
-from bemkit.operators.rigid import rigid_motions
+from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.testing.failure import demand
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.testing.failure import demand
 
 ROUND_OFF = 1e-12

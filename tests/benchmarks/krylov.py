@@ -19,13 +19,13 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.contact.condensation import condense
-from bemkit.contact.nodes import contact_along_normals
-from bemkit.operators.linear import LinearSolver
-from bemkit.operators.linear_choice import direct_cost, krylov_cost
+from bemkit.contact.condensation.nodes import contact_along_normals
+from bemkit.contact.condensation.reduction import condense
+from bemkit.operators.linear.choice import direct_cost, krylov_cost
+from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare import CondensedMap
-from bemkit.operators.stopwatch import assembly_time
-from bemkit.operators.threads import blas_threads_for
+from bemkit.stopwatch import assembly_time
 
 L_SHAPE = bk.Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 BODIES = {

@@ -17,9 +17,9 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
+from bemkit.cli.console import format_seconds, format_size
 from bemkit.plan import Stage, this_machine
-from bemkit.report import format_seconds, format_size
-from bemkit.scenefile import load_scene, with_overrides
+from bemkit.scene.toml import load_scene, with_overrides
 
 SCENES = [
     ("paper-1", "constant", 320),

@@ -21,12 +21,12 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit import adaptive
-from bemkit.geometry.partition import Partition, better_partition
+from bemkit.geometry.meshing.partition import Partition, better_partition
+from bemkit.runs import adaptive
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.adaptive.problems import paper
 from tests.benchmarks.accuracy import measured_errors
+from tests.runs.refinement_problems import paper
 
 ACCURACIES = (4e-3, 1e-3, 6e-5)
 SPLIT = 2.0**0.5

@@ -25,7 +25,7 @@ from rich.table import Table
 from scipy.linalg.lapack import dgetrf, dpotrf
 
 import bemkit as bk
-from bemkit.operators.collocation import collocation_matrices
+from bemkit.operators.collocation.assembly import collocation_matrices
 
 
 def keep_memory() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from tests.adaptive.problems import paper, reference_values
 from tests.benchmarks import fem
+from tests.runs.refinement_problems import paper, reference_values
 
 
 @pytest.fixture(params=["PARDISO", "SuperLU"])

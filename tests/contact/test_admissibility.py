@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bemkit.contact.admissibility import find_unsolvable_load
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.solvability import find_unsolvable_load
 from tests.handmade import block_problem
 
 

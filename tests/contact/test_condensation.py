@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.contact.condensation import CondensedBody, condense
+from bemkit.contact.condensation.nodes import ContactNodes, contact_along_normals
+from bemkit.contact.condensation.reduction import CondensedBody, condense
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.laws import Frictionless
-from bemkit.contact.nodes import ContactNodes, contact_along_normals
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
-from bemkit.operators.dense import SingularMatrixError
+from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
-from bemkit.operators.nodal import Support
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.nodal_conditions import Support
 
 MAPS = [GalerkinMap, CollocationMap]
 MATERIAL = Material(1.0, 0.3)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.boundary_data import nodal_forces, supports_on
-from bemkit.contact.condensation import condense
+from bemkit.contact.condensation.reduction import condense
+from bemkit.contact.condensation.tangents import open_tangents
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactState, LawError
-from bemkit.contact.tangents import open_tangents
-from bemkit.model import Model, build_model
-from bemkit.runner import UnsolvableSceneError
-from bemkit.scene import Discretisation
+from bemkit.model.boundary_data import nodal_forces, supports_on
+from bemkit.model.contact_model import Model, build_model
+from bemkit.runs.run import UnsolvableSceneError
+from bemkit.scene.scene import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
-from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.path import AffineBound, follow_path
+from bemkit.solvers.homotopy import AffineBound, follow_path
+from bemkit.testing.lemke import LemkePivoting
 
 FLOOR = bk.HalfPlane()
 NEWTON = bk.SemismoothNewton()

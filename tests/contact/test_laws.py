@@ -4,7 +4,7 @@ import pytest
 from bemkit.contact import laws
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, RescaledLaw, Tresca
 from bemkit.contact.problem import ContactProblem, LawError
-from bemkit.expression import Expression
+from bemkit.formulas import Expression
 from bemkit.testing import check_law
 from tests.handmade import random_problem
 

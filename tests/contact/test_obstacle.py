@@ -19,7 +19,7 @@ from bemkit.contact.obstacle import (
     PolygonalObstacle,
     measure_contact,
 )
-from bemkit.expression import Expression
+from bemkit.formulas import Expression
 
 coordinates = st.floats(-10.0, 10.0)
 points = st.tuples(coordinates, coordinates)

@@ -5,16 +5,16 @@ import pytest
 
 from bemkit.contact.certificate import certify
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, LawError, Tresca
-from bemkit.contact.partwise import PartwiseLaw
+from bemkit.contact.piecewise_law import PartwiseLaw
 from bemkit.contact.problem import ContactProblem
-from bemkit.expression import Expression
+from bemkit.formulas import Expression
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.path import path_exists
+from bemkit.solvers.homotopy import path_exists
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing import check_law
+from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_body
 
 POINTS = np.stack([np.linspace(0.0, 1.0, 5), np.full(5, 2.0)], axis=1)

@@ -8,9 +8,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
-from bemkit.geometry.space import LinearSpace, QuadraticSpace, corner_nodes, dof_points
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material
-from bemkit.operators.rigid import resting_motions
+from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 
 

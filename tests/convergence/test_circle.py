@@ -8,7 +8,7 @@ from scipy.special import zeta
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, discretise
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.boundary import assemble, double_layer, hypersingular, single_layer
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare

@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, Outline, ParametricCurve, Side, discretise
-from bemkit.geometry.space import BoundarySpace, LinearSpace, QuadraticSpace, dof_points
+from bemkit.geometry.spaces import BoundarySpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
 from bemkit.operators.material import Material
 from tests.convergence.fields import observed_order

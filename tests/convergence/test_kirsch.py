@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, discretise
-from bemkit.geometry.space import dof_points
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
 from tests.convergence.fields import distance, forces, neumann, observed_order, quadratic_map

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.adaptive import run_adaptive
 from bemkit.arrays import FloatArray
-from tests.adaptive.problems import angle, contact_error, paper, reference_values
+from bemkit.runs.adaptive import run_adaptive
+from tests.runs.refinement_problems import angle, contact_error, paper, reference_values
 
 ELEMENTS: dict[str, Any] = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.contact.condensation import condense
+from bemkit.contact.condensation.nodes import contact_along_normals
+from bemkit.contact.condensation.reduction import condense
 from bemkit.contact.laws import Coulomb, Frictionless
-from bemkit.contact.nodes import contact_along_normals
 from bemkit.contact.obstacle import Circle
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import Disk, ExteriorOf, discretise

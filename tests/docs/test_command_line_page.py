@@ -13,9 +13,9 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from bemkit import cli
+from bemkit.cli.main import main as cli
+from bemkit.results.tables import TABLES
 from bemkit.solvers.base import Status
-from bemkit.tables import TABLES
 from tests.docs.pages import plain, read, section, table
 
 PAGE = read("command-line.md")

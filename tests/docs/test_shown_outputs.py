@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bemkit.cli import main
+from bemkit.cli.main import main
 from tests.docs.pages import blocks, read
 
 

@@ -11,7 +11,7 @@ from scipy.special import ellipe, ellipeinc
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, GeometryError
 from bemkit.geometry.arclength import ArcLength
-from bemkit.geometry.curve import ParametricCurve
+from bemkit.geometry.curves import ParametricCurve
 
 
 def ellipse(a: float, b: float) -> ParametricCurve:

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.curve import Arc, Curve, MovedCurve, ParametricCurve, Segment, reverse_curve
+from bemkit.geometry.curves import Arc, Curve, MovedCurve, ParametricCurve, Segment, reverse_curve
 from bemkit.geometry.errors import GeometryError
 
 

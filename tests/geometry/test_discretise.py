@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.curve import ParametricCurve, Segment
-from bemkit.geometry.discretise import discretise, share_elements
+from bemkit.geometry.curves import ParametricCurve, Segment
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.grading import Algebraic, Geometric
+from bemkit.geometry.meshing.discretise import discretise, share_elements
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Disk, PlateWithHole, Polygon, Rectangle, Ring

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.curve import Arc
-from bemkit.geometry.discretise import discretise
+from bemkit.geometry.curves import Arc
 from bemkit.geometry.errors import UnknownPartError
 from bemkit.geometry.grading import Geometric
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring
 

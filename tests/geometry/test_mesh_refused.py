@@ -3,10 +3,10 @@ import re
 import numpy as np
 import pytest
 
-from bemkit.geometry.curve import Arc
-from bemkit.geometry.discretise import discretise
+from bemkit.geometry.curves import Arc
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.shapes import Rectangle
 
 from .strategies import closed, rotation

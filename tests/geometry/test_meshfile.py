@@ -10,10 +10,10 @@ import meshio
 import numpy as np
 import pytest
 
-from bemkit.geometry.discretise import discretise
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshfile import read_mesh, write_mesh
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import ExteriorOf, Polygon, Rectangle
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from bemkit.geometry.curve import Arc, MovedCurve, ParametricCurve, Segment, reverse_curve
-from bemkit.geometry.discretise import discretise
+from bemkit.geometry.curves import Arc, MovedCurve, ParametricCurve, Segment, reverse_curve
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Outline, Side
 
 DOWN = -np.pi / 2 + np.pi / 32  # the middle of one of the 16 pieces of a half circle

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.geometry.partition import LEAST, STEEPEST, Partition, better_partition, first_partition
+from bemkit.geometry.meshing.partition import LEAST, STEEPEST, Partition, better_partition, first_partition
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 

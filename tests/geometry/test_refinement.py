@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.discretise import discretise
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.curve import Arc, Segment
+from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.selection import Selection, breakpoints, merge_breakpoints
 

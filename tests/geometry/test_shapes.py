@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bemkit.geometry.discretise import discretise
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
 
 from .strategies import angles, polygon_area, rotation, sizes, star_polygons

@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, GeometryError
 from bemkit.operators.boundary import PairOperator
-from bemkit.operators.dense import Cholesky, DenseLU, SingularMatrixError, multiply
+from bemkit.operators.linear.dense import Cholesky, DenseLU, SingularMatrixError, multiply
 
 MATERIAL = bk.Material(2.0, 0.25)
 

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
-from bemkit.files import OutputFileError
+from bemkit.atomic_files import OutputFileError
 from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
-from bemkit.geometry.space import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.hdf5 import seal
 from bemkit.operators import cache
 from bemkit.operators.boundary import double_layer, hypersingular, mass, single_layer
@@ -58,7 +58,9 @@ def test_a_map_from_a_file_computes_nothing_and_gives_the_same_tractions(
     u = np.random.default_rng(1).normal(size=(16, 2))
     expected = written.tractions(u)
     cache.save(tmp_path / "map.h5", written)
-    monkeypatch.setattr("bemkit.operators.steklov_poincare.layers.assemble", lambda *_: pytest.fail("assembled again"))
+    monkeypatch.setattr(
+        "bemkit.operators.steklov_poincare.layer_operators.assemble", lambda *_: pytest.fail("assembled again")
+    )
     cache.load(tmp_path / "map.h5", fresh)
     # the same numbers, multiplied in another order
     np.testing.assert_allclose(fresh.tractions(u), expected, rtol=1e-11)
@@ -203,7 +205,7 @@ def test_a_disk_without_room_is_named_before_anything_is_written(
     cache.save(path, galerkin())
     before = path.read_bytes()
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr("bemkit.files.shutil.disk_usage", lambda _: usage._replace(free=70_000))
+    monkeypatch.setattr("bemkit.atomic_files.shutil.disk_usage", lambda _: usage._replace(free=70_000))
     # three matrices of order 40 take 38 kB besides the file's own overhead
     with pytest.raises(OutputFileError, match=r"0\.0001\d* GB are needed and 7e-05 GB free"):
         cache.save(path, galerkin(mesh(20)))

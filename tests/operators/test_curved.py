@@ -27,14 +27,14 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.space import corner_nodes
-from bemkit.operators.collocation import collocation_matrices
-from bemkit.operators.inner import inner_integrals, inner_on_element
-from bemkit.operators.integrals import PairSweep
+from bemkit.geometry.spaces import corner_nodes
+from bemkit.operators.collocation.assembly import collocation_matrices
+from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
+from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
+from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
-from bemkit.operators.pairs import Degrees, PairIntegrals
-from bemkit.operators.panels import Panels
-from bemkit.operators.rigid import rigid_motions
+from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))

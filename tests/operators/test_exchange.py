@@ -9,15 +9,15 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, Ring, discretise
-from bemkit.geometry.space import corner_nodes
-from bemkit.operators.collocation import collocation_matrices, fill_columns
-from bemkit.operators.columns import column_runs
+from bemkit.geometry.spaces import corner_nodes
+from bemkit.operators.collocation.assembly import collocation_matrices, fill_columns
+from bemkit.operators.collocation.columns import column_runs
+from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.reciprocity import Reciprocity
-from bemkit.operators.rigid import resting_motions
+from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare import CollocationMap
-from bemkit.operators.work import Entries
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from tests.operators.test_curved import composite
 
 MATERIAL = Material(2.0, 0.3)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh
-from bemkit.operators.integrals import PairSweep
-from bemkit.operators.pairs import Degrees
+from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.integrals.sweep import PairSweep
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))
 

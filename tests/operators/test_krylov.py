@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation import CondensedBody, condense
-from bemkit.contact.nodes import contact_along_normals
+from bemkit.contact.condensation.nodes import contact_along_normals
+from bemkit.contact.condensation.reduction import CondensedBody, condense
 from bemkit.geometry import (
     Algebraic,
     BoundaryMesh,
@@ -24,15 +24,15 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.space import LinearSpace, QuadraticSpace, break_nodes
-from bemkit.operators.block_cg import NotConvergedError, block_cg
-from bemkit.operators.dense import SingularMatrixError
-from bemkit.operators.linear import DenseCholesky, Krylov, LinearSolver
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, break_nodes
+from bemkit.operators.linear.block_cg import NotConvergedError, block_cg
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear.multigrid import Multigrid
+from bemkit.operators.linear.solvers import DenseCholesky, Krylov, LinearSolver
 from bemkit.operators.material import Material
-from bemkit.operators.multigrid import Multigrid
-from bemkit.operators.nodal import Support, supported
 from bemkit.operators.steklov_poincare import GalerkinMap
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
+from bemkit.operators.steklov_poincare.nodal_conditions import Support, supported
 
 L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 SQUARE = Rectangle(1.0, 1.0)
@@ -299,8 +299,8 @@ def test_wrong_options_are_refused(options: dict[str, float], message: str) -> N
 def test_pyamg_is_loaded_by_a_hierarchy_alone() -> None:
     program = (
         "import sys, numpy as np, bemkit as bk\n"
-        "from bemkit.contact.condensation import condense\n"
-        "from bemkit.contact.nodes import contact_along_normals\n"
+        "from bemkit.contact.condensation.reduction import condense\n"
+        "from bemkit.contact.condensation.nodes import contact_along_normals\n"
         "mesh = bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=24)\n"
         "for solver in (bk.DenseCholesky(), bk.Krylov(), bk.Krylov(coarsest=8)):\n"
         "    elastic = bk.GalerkinMap(mesh, bk.Material(1.0, 0.3), linear_solver=solver)\n"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.operators.linear_choice import choose_linear_solver, direct_cost, krylov_cost
+from bemkit.operators.linear.choice import choose_linear_solver, direct_cost, krylov_cost
 from bemkit.plan import make_plan
 from bemkit.plan.decisions import decide
 

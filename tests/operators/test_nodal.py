@@ -7,8 +7,8 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, discretise
-from bemkit.geometry.space import ConstantSpace, LinearSpace
-from bemkit.operators.nodal import ConflictingSupportsError, Support, supported
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace
+from bemkit.operators.steklov_poincare.nodal_conditions import ConflictingSupportsError, Support, supported
 
 
 def square() -> BoundaryMesh:

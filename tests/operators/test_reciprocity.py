@@ -8,8 +8,8 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, PlateWithHole, Rectangle, Ring, discretise
+from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.material import Material
-from bemkit.operators.reciprocity import Reciprocity
 
 POISSON_RATIOS = [0.0, 0.3, 0.4999999999, 0.5]
 HOLED = PlateWithHole(2.0, 1.5, 0.4, (-1.0, 0.3))

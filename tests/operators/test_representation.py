@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Polygon, Rectangle, Ring, discretise
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.space import (
+from bemkit.geometry.spaces import (
     BoundarySpace,
     ConstantSpace,
     LinearSpace,
@@ -23,15 +23,15 @@ from bemkit.geometry.space import (
     corner_nodes,
     dof_points,
 )
-from bemkit.interior import interior_fields
-from bemkit.operators import inner_moments
-from bemkit.operators.inner_moments import local_moments, straight_gradient_moments
-from bemkit.operators.interior_points import PointNotInsideError
+from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.panels import Panels
-from bemkit.operators.representation import InteriorFields
+from bemkit.operators.somigliana import moments as inner_moments
+from bemkit.operators.somigliana.fields import InteriorFields
+from bemkit.operators.somigliana.locate import PointNotInsideError
+from bemkit.operators.somigliana.moments import local_moments, straight_gradient_moments
+from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
-from bemkit.operators.stress import principal_stresses, von_mises
+from bemkit.results.interior import interior_fields
 
 Field = Callable[[FloatArray], FloatArray]
 VERTICES = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))

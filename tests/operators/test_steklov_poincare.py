@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import Algebraic, BoundaryMesh, Geometric, Polygon, Rectangle, Shape, Uniform, discretise
-from bemkit.geometry.space import LinearSpace, QuadraticSpace, corner_nodes, dof_points
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.rigid import rigid_motions
+from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
 
 MATERIAL = Material(1.0, 0.3)
@@ -168,7 +168,7 @@ def test_no_size_of_the_body_is_degenerate(kind: type, shape: Rectangle, nu: flo
 
 
 def test_single_layer_constant_does_not_matter() -> None:
-    from bemkit.geometry.space import ConstantSpace
+    from bemkit.geometry.spaces import ConstantSpace
     from bemkit.operators.boundary import double_layer, hypersingular, mass, single_layer
 
     mesh = mesh_of(L_SHAPE, 48)

@@ -10,9 +10,9 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting
-from bemkit.solvers.path import AffineBound, follow_path
+from bemkit.solvers.homotopy import AffineBound, follow_path
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_problem, random_problem
 
 DRIVERS = {

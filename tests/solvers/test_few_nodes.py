@@ -8,7 +8,7 @@ from bemkit.contact.certificate import certify
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
-from bemkit.stability.evidence import examine
+from bemkit.studies.stability.evidence import examine
 
 FEET = {
     "one foot in a guide": "x > 0.97",

@@ -12,8 +12,8 @@ from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.floating import floating_response
-from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import block_body
 
 N = 13

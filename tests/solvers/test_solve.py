@@ -12,10 +12,10 @@ from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting, lemke
-from bemkit.solvers.path import AffineBound, follow_path, path_exists
-from bemkit.solvers.probe import start_with
+from bemkit.solvers.homotopy import AffineBound, follow_path, path_exists
+from bemkit.solvers.multistart import start_with
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting, lemke
 from tests.contact.test_laws import Rubber
 from tests.handmade import assert_solves, block_body, block_problem, hard_problem, random_problem
 

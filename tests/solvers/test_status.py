@@ -7,12 +7,12 @@ import pytest
 
 from bemkit.contact.laws import Coulomb, FrictionLaw
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, SingularResponse
-from bemkit.operators.balance import Imbalance
+from bemkit.operators.equilibrium import Imbalance
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.solvers.base import ContactFailure, Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.lemke import LemkePivoting
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_problem, hard_problem, random_problem
 
 BARE_NEWTON = SemismoothNewton(damped_steps=0, follows_path=False)

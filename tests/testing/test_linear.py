@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray
-from bemkit.kinds import LINEAR_SOLVERS
-from bemkit.operators.linear import Automatic, DefiniteOperator, DenseCholesky, Krylov, MatrixOperator
-from bemkit.operators.work import Factorisation
+from bemkit.operators.counts import Factorisation
+from bemkit.operators.linear.solvers import Automatic, DefiniteOperator, DenseCholesky, Krylov, MatrixOperator
+from bemkit.scene.registry import LINEAR_SOLVERS
 from bemkit.testing import CheckFailed, check_linear_solver
 
 SOLVERS = [DenseCholesky(), Krylov(), Krylov(coarsest=8)]

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.operators import boundary
 from bemkit.operators.boundary import (
     BoundaryOperator,

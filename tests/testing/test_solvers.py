@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bemkit.contact.problem import ContactProblem, ContactState
-from bemkit.kinds import SOLVERS
+from bemkit.scene.registry import SOLVERS
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate
 from bemkit.solvers.base import Iterate, Status, solve
 from bemkit.solvers.ssn import SemismoothNewton

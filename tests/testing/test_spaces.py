@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curve, discretise, space
-from bemkit.geometry.curve import MovedCurve
+from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.testing import CheckFailed, check_curve, check_space
 
 MESHES = [

@@ -8,10 +8,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.space import ConstantSpace
+from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.material import Material
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.steklov_poincare.exchange import ColumnExchange
+from bemkit.operators.steklov_poincare.mixed_system import ColumnExchange
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.nodes import integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
 
@@ -24,7 +24,8 @@ class CollocationMap:
     mesh : BoundaryMesh
     material : Material
     slopes : bool
-        Whether the double layer takes slopes between neighbouring elements (`bemkit.operators.slopes`).
+        Whether the double layer takes slopes between neighbouring elements
+        (`bemkit.operators.collocation.gradient_reconstruction`).
 
     Notes
     -----
@@ -33,7 +34,7 @@ class CollocationMap:
     forces and moments only up to the discretisation error: here a rigid motion c is added to the equations and the
     resultants of the tractions are set to zero; c vanishes with the mesh size. On an exterior neither c nor the
     condition on the resultants is there. Likewise one reciprocity for each loop tells the pressure there, which the
-    displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.reciprocity`).
+    displacement equation loses as Poisson's ratio approaches 1/2 (`bemkit.operators.collocation.reciprocity`).
     """
 
     def __init__(self, mesh: BoundaryMesh, material: Material, *, slopes: bool = True) -> None:

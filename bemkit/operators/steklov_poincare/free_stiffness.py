@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.space import BoundarySpace, dof_points
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.rigid import rigid_motions
-from bemkit.operators.steklov_poincare.layers import Layers
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.operators.steklov_poincare.layer_operators import Layers
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
 
 if TYPE_CHECKING:

@@ -8,27 +8,27 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
-from bemkit.geometry.folding import vanishing_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace, ConstantSpace, LinearSpace, dof_points
+from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.boundary import mass
-from bemkit.operators.dense import Cholesky, multiply
-from bemkit.operators.linear import DenseCholesky, LinearSolver, LinearSolverWish
-from bemkit.operators.linear_choice import choose_linear_solver
+from bemkit.operators.counts import Work
+from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.dense import Cholesky, multiply
+from bemkit.operators.linear.memory import physical_memory
+from bemkit.operators.linear.solvers import DenseCholesky, LinearSolver, LinearSolverWish
 from bemkit.operators.material import Material
-from bemkit.operators.memory import physical_memory
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.rigid import resting_motions
+from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
-from bemkit.operators.steklov_poincare.held_volume import Volume
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
-from bemkit.operators.steklov_poincare.layers import Layers, assemble_layers, dilatation_of
+from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.nodes import integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
-from bemkit.operators.work import Work
+from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
 _DIRECT = DenseCholesky()
 _HELD_BODY = "the body held by its supports and its contact boundary"

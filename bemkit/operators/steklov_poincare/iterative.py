@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.dense import SingularMatrixError
-from bemkit.operators.linear import Factor
-from bemkit.operators.rigid import resting_motions
+from bemkit.operators.counts import Work
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear.solvers import Factor
+from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
-from bemkit.operators.steklov_poincare.held_volume import HeldVolume, Volume, room
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.work import Work
+from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
 
 _HELD = 1e-9
 """A rigid motion that moves the held and open directions by less than this, relative to its size, is free of them."""

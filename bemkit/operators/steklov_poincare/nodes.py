@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.space import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.steklov_poincare.protocol import TractionField
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.space import BoundarySpace
-from bemkit.operators.block_cg import Iterations
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.counts import Work
+from bemkit.operators.linear.block_cg import Iterations
 from bemkit.operators.material import Material
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.work import Work
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
 """Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
@@ -41,7 +41,7 @@ class CondensedMap:
         above the forces themselves, which then are differences and carry its round-off.
     iterations : tuple of Iterations
         What each solution for free displacements so far took that was found by iteration; see
-        `bemkit.operators.linear.Krylov`.
+        `bemkit.operators.linear.solvers.Krylov`.
     work : Work
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     """

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.dense import multiply
-from bemkit.operators.linear import Factor, LinearSolver, MatrixOperator
-from bemkit.operators.nodal import NodalConditions
-from bemkit.operators.steklov_poincare.held_volume import HeldVolume, Volume, room
+from bemkit.operators.counts import Work
+from bemkit.operators.linear.dense import multiply
+from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.work import Work
+from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
 
 
 @dataclass(eq=False)

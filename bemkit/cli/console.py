@@ -1,0 +1,193 @@
+"""What the command line prints for people: the summary, the plan and the convergence table."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
+from bemkit.plan import Machine, Plan
+from bemkit.results.solution import Solution
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
+from bemkit.solvers.base import StepRecord
+
+_MANY_TRANSITIONS = 12
+
+
+def print_summary(solution: Solution, console: Console | None = None) -> None:
+    """Print a solution as a compact table.
+
+    Parameters
+    ----------
+    solution : Solution
+    console : rich.console.Console, optional
+        Standard output by default.
+    """
+    console = Console(highlight=False) if console is None else console
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in _summary_rows(solution):
+        table.add_row(name, value)
+    console.print(Text(solution.scene.title, style="bold"))
+    console.print(table)
+    _print_warnings(solution.warnings, console)
+
+
+def print_plan(title: str, plan: Plan, machine: Machine) -> None:
+    """Print what a scene needs and what it leaves out, with the costs on a computer."""
+    console = Console(highlight=False)
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+    table.add_column("")
+    table.add_column("item", overflow="fold")
+    table.add_column("why", overflow="fold")
+    table.add_column("memory", justify="right", no_wrap=True)
+    table.add_column("time", justify="right", no_wrap=True)
+    for item in plan.items:
+        style = "" if item.is_needed else "dim"
+        mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
+        size = format_size(item.cost.size) if item.cost.size else ""
+        seconds = item.cost.seconds(machine)
+        spent = format_seconds(seconds) if seconds else ""
+        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style), size, spent)
+    console.print(Text(title, style="bold"))
+    console.print(table)
+    total = sum(plan.seconds(machine).values())
+    console.print(f"about {format_seconds(total)}, and {format_size(plan.memory)} of memory at the largest moment")
+    _print_warnings(plan.warnings, console)
+
+
+def _print_warnings(warnings: Sequence[str], console: Console) -> None:
+    for warning in warnings:
+        console.print(Text(f"warning: {warning}", style="yellow"))
+
+
+class ConvergenceTable:
+    """Prints one line per step of the solver as it happens; give it to `bemkit.run` as callback.
+
+    Parameters
+    ----------
+    console : rich.console.Console, optional
+        Standard error by default.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = Console(stderr=True, highlight=False) if console is None else console
+        self._has_header = False
+
+    def __call__(self, record: StepRecord) -> None:
+        """Print a line."""
+        if not self._has_header:
+            header = (
+                f"{'step':>4}  {'solves':>6}  {'separated':>9}  {'stick':>6}  {'slip':>6}  {'changed':>7}  {'worst':>8}"
+            )
+            self._console.print(Text(header, style="bold"))
+            self._has_header = True
+        line = (
+            f"{record.step:4d}  {record.linear_solves:6d}  {record.n_separated:9d}  {record.n_stick:6d}  "
+            f"{record.n_slip:6d}  {record.n_changed:7d}  {record.certificate.worst:8.1e}"
+        )
+        self._console.print(Text(f"{line}  {record.message}".rstrip()))
+
+
+def format_size(n_bytes: int) -> str:
+    """Return a memory size in words such as ``3.3 MB``."""
+    size = float(n_bytes)
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"
+
+
+def format_seconds(seconds: float) -> str:
+    """Return a time in words such as ``3.3 ms``."""
+    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+
+
+def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
+    timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
+    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
+    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
+    if not solution.is_converged:
+        status.append(f": {solution.message or solution.status.value}", style="not bold")
+    discretisation = DISCRETISATIONS.kind_of(solution.scene.discretisation)
+    rows = [
+        ("status", status),
+        ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
+        *_symmetry(solution),
+        *_contact(solution),
+        ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
+        *_estimate(solution),
+        *_solve(solution),
+        ("certificate", Text(_certificate_line(solution.certificate))),
+        ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
+    ]
+    return rows
+
+
+def _certificate_line(certificate: Certificate) -> str:
+    violations = certificate.violations
+    worst = max(violations, key=lambda name: _nan_first(violations[name]))
+    name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
+    return f"worst entry {certificate.worst:.1e}{name}; round-off of the forces up to {certificate.round_off:.1e}"
+
+
+def _symmetry(solution: Solution) -> list[tuple[str, Text]]:
+    mesh = solution.mesh
+    if mesh.symmetry is None:
+        return []
+    values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
+    return [("symmetry", Text(f"about {mesh.symmetry}: {values}"))]
+
+
+def _contact(solution: Solution) -> list[tuple[str, Text]]:
+    if not solution.contact.n_contact:
+        return [("contact", Text("none"))]
+    counts = Counter(solution.contact.status_words())
+    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+    return [
+        ("contact nodes", Text(f"{solution.contact.n_contact}: {nodes}")),
+        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
+        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
+    ]
+
+
+def _solve(solution: Solution) -> list[tuple[str, Text]]:
+    if not solution.contact.n_contact:
+        return []
+    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})"
+    return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
+
+
+def _estimate(solution: Solution) -> list[tuple[str, Text]]:
+    error = solution.estimated_error
+    return [] if error is None else [("estimated error", Text(f"{error:.1e}  relative, in the energy norm"))]
+
+
+def _nan_first(value: float) -> float:
+    return value if value == value else float("inf")
+
+
+def _solver_name(solution: Solution) -> str:
+    try:
+        return SOLVERS.kind_of(solution.scene.solver)
+    except InputError:  # a class of one's own
+        return type(solution.scene.solver).__name__
+
+
+def _transition_lines(solution: Solution) -> list[str]:
+    lines = [
+        f"{item.part}: {item.from_status} to {item.to_status} at ({item.x:.6g}, {item.y:.6g}), s = {item.s:.6g}"
+        for item in solution.transitions[:_MANY_TRANSITIONS]
+    ]
+    n_more = len(solution.transitions) - len(lines)
+    if n_more > 0:
+        lines.append(f"and {n_more} more (--csv -)")
+    return lines or ["none"]

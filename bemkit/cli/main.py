@@ -1,0 +1,240 @@
+"""The command line: ``bemkit run | show | scenes | plan | study | stability``.
+
+Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
+interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bemkit.cli.errors import complaint, concerning
+from bemkit.cli.stability import stability
+from bemkit.cli.study import study
+from bemkit.errors import BemkitError, NoResultError
+from bemkit.printable import printable
+from bemkit.streams import PipeClosedError, guarded_streams, print_data
+from bemkit.version import __version__
+
+if TYPE_CHECKING:
+    from bemkit.results.solution import Solution
+    from bemkit.scene.scene import Scene
+
+NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        By default those of the process.
+    """
+    with guarded_streams():
+        code = _run_to_end(arguments)
+    sys.exit(code)
+
+
+def _run_to_end(arguments: list[str] | None) -> int:
+    """Run the command line and return its exit code; the one place where errors end."""
+    try:
+        code = commands.main(args=arguments, prog_name="bemkit", standalone_mode=False)
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.format_message())
+        code = BAD_INPUT
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        hint = f" (see {context.command_path} --help)" if context is not None else ""
+        _complain(error.format_message() + hint)
+        code = BAD_INPUT
+    except PipeClosedError:  # the reader, such as head, has seen enough
+        code = PIPE_CLOSED
+    except BemkitError as error:
+        _complain(complaint(error))
+        code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        _complain("interrupted; no file is half written")
+        code = INTERRUPTED
+    except MemoryError:
+        _complain("not enough memory: use fewer elements (--elements N)")
+        code = BAD_INPUT
+    return code if isinstance(code, int) else 0
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="bemkit")
+def commands() -> None:
+    """Frictional contact of elastic bodies by boundary elements."""
+
+
+@commands.command()
+@click.argument("scene")
+@click.option("-o", "--output", metavar="FILE", help="Write the result (HDF5).")
+@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
+@click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
+@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
+@click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
+@click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
+@click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
+@click.option("--explain", is_flag=True, help="Print planned against measured time and memory, and what was left out.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
+def run(
+    scene: str,
+    output: str | None,
+    json_file: str | None,
+    csv_file: str | None,
+    folder: str | None,
+    elements: int | None,
+    accuracy: float | None,
+    discretisation: str | None,
+    solver: str | None,
+    rho: float | None,
+    cascade: bool,
+    explain: bool,
+    quiet: bool,
+) -> int:
+    """Solve SCENE, a TOML file or the name of a shipped scene."""
+    from bemkit.atomic_files import reserved
+    from bemkit.cli.outputs import Outputs
+
+    wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
+    click.get_current_context().with_resource(reserved(wanted.check()))
+    chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
+    is_live = not quiet and sys.stderr.isatty()
+    with concerning(scene):
+        solution = _solve(chosen, cascade=cascade, is_live=is_live)
+        if explain:
+            from bemkit.cli.explain import with_memory
+
+            solution = with_memory(solution, lambda: _solve(chosen, cascade=cascade, is_live=False))
+    solution = replace(solution, plan=solution.plan.with_outputs(wanted.wishes))
+    begin = time.perf_counter()
+    wanted.write(solution)
+    output_seconds = time.perf_counter() - begin
+    if not quiet and not wanted.uses_stdout:
+        from bemkit.cli.console import print_summary
+
+        print_summary(solution)
+    if explain:
+        from bemkit.cli.explain import print_explanation
+
+        print_explanation(solution, output_seconds, to_stderr=wanted.uses_stdout)
+    if solution.is_converged:
+        return 0
+    return INACCURATE if solution.is_certified else NOT_CONVERGED
+
+
+@commands.command()
+@click.argument("result")
+@click.option("--csv", "table", type=click.Choice(["contact", "boundary", "history"]), help="Print a table as CSV.")
+@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
+def show(result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool) -> None:
+    """Show RESULT, a file written by bemkit run -o."""
+    from bemkit.cli.outputs import STDOUT, Outputs
+    from bemkit.results.result_file import read_result
+    from bemkit.scene.toml import scene_to_toml
+
+    if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
+        raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
+    wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
+    wanted.check()
+    solution = read_result(result)
+    wanted.write(solution)
+    if shows_scene:
+        print_data(scene_to_toml(solution.scene))
+    elif wanted == Outputs():
+        from bemkit.cli.console import print_summary
+
+        print_summary(solution)
+
+
+@commands.command()
+def scenes() -> None:
+    """List the scenes that are shipped with bemkit."""
+    from bemkit.scene.shipped import shipped_scenes
+
+    titles = shipped_scenes()
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        print(f"{name:<{width}}  {title}")
+
+
+@commands.command()
+@click.argument("scene")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
+@click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
+def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
+    """Say what SCENE needs and what it leaves out, without solving it."""
+    from bemkit.plan import check_elements, make_plan, this_machine
+    from bemkit.scene.symmetry import find_symmetry
+
+    chosen = _load(scene, elements, discretisation)
+    with concerning(scene):
+        check_elements(chosen)
+        proposal = find_symmetry(chosen) if chosen.symmetry is None else None
+        made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
+    if is_json:
+        import json
+
+        print(json.dumps(made.as_dict(this_machine()), indent=2))
+    else:
+        from bemkit.cli.console import print_plan
+
+        print_plan(chosen.title, made, this_machine())
+
+
+commands.add_command(study)
+commands.add_command(stability)
+
+
+def _load(
+    source: str,
+    elements: int | None,
+    discretisation: str | None,
+    solver: str | None = None,
+    rho: float | None = None,
+    accuracy: float | None = None,
+) -> Scene:
+    from bemkit.scene.toml import load_scene, with_overrides
+
+    scene = load_scene(source)
+    return with_overrides(
+        scene, elements=elements, accuracy=accuracy, discretisation=discretisation, solver=solver, rho=rho
+    )
+
+
+def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
+    from bemkit.runs.run import run as solve_scene
+
+    callback = None
+    if is_live:
+        from bemkit.cli.console import ConvergenceTable
+
+        callback = ConvergenceTable()
+    if cascade:
+        from bemkit.runs.nested import run_cascade
+
+        return run_cascade(scene, callback=callback)[-1]
+    return solve_scene(scene, callback=callback)
+
+
+def _path(name: str | None) -> Path | None:
+    return None if name is None else Path(name)
+
+
+def _complain(message: str) -> None:
+    print(f"bemkit: error: {printable(' '.join(message.split()))}", file=sys.stderr)

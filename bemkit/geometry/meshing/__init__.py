@@ -1,0 +1,1 @@
+"""From outlines to meshes: division into elements, refinement, gradual lengths, order of nodes."""

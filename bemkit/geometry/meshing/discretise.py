@@ -1,0 +1,193 @@
+"""From an outline to a mesh: the user's parts, the user's number of elements."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.curves import Curve
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.grading import Grading, Uniform
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.division import Division, divide
+from bemkit.geometry.meshing.transition import gradual_positions
+from bemkit.geometry.outline import Outline
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.vectors import norms
+
+_N_PANELS = 256
+_N_PANEL_POINTS = 4
+_SPEED_TOLERANCE = 1e-12  # a speed that varies by less is constant up to round-off
+
+
+def discretise(
+    outline: Outline,
+    *,
+    n_elements: int,
+    parts: Mapping[str, Selection] | None = None,
+    grading: Grading | None = None,
+    density: Mapping[str, float] | None = None,
+    symmetry: Symmetry | None = None,
+) -> BoundaryMesh:
+    """Cut an outline into elements.
+
+    Parameters
+    ----------
+    outline : Outline
+        The boundary.
+    n_elements : int
+        Number of elements of the mesh, shared among sides (and the pieces that the parts cut from them) in proportion
+        to their lengths, at least one each.
+    parts : mapping of str to Selection, optional
+        Boundary parts by name; they must not overlap, and need not cover the boundary.
+    grading : Grading, optional
+        Spacing of the elements on every piece. Uniform if left out, but for lengths that grow gradually next to a piece
+        with elements of less than half the length.
+    density : mapping of str to float, optional
+        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
+    symmetry : Symmetry, optional
+        Lines of which only the side x <= a, y <= b is divided, into a half or a quarter of `n_elements`.
+
+    Returns
+    -------
+    BoundaryMesh
+        Elements run along each loop in order, node i starts element i; parts end exactly at nodes.
+
+    Raises
+    ------
+    GeometryError
+        If a part is empty, overlaps another or names an unknown side, or there are fewer elements than pieces, or a
+        density is not positive or names an unknown side, or one beyond the symmetry lines; or if these do not cross
+        the body.
+    """
+    density = {} if density is None else density
+    _check_density(density, outline)
+    parts = {} if parts is None else parts
+    grading = Uniform() if grading is None else grading
+    division = divide(outline, parts)
+    if symmetry is not None:
+        division = division.half(symmetry)
+        n_elements = _share_of_half(n_elements, division, symmetry)
+        _check_sides_divided(density, division)
+    rulers = [_Ruler(side.curve) for side in outline.sides]
+    weights = [
+        density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span)
+        for piece in division.pieces
+    ]
+    counts = share_elements(n_elements, np.array(weights))
+    if isinstance(grading, Uniform):
+        lengths = np.array([rulers[piece.side].length(*piece.span) for piece in division.pieces])
+        positions = _gradual(division, counts, lengths)
+    else:
+        positions = [_checked_positions(grading, int(count)) for count in counts]
+    return division.mesh(
+        [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(division.pieces, positions, strict=True)]
+    )
+
+
+def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
+    """Share elements among pieces in proportion to their lengths, by largest remainders, at least one each.
+
+    Raises
+    ------
+    GeometryError
+        If there are fewer elements than pieces.
+    """
+    if not isinstance(n_elements, int | np.integer) or n_elements < len(lengths):
+        raise GeometryError(
+            f"discretise: n_elements is {n_elements}, but the outline has {len(lengths)} pieces (sides, cut "
+            f"where parts end): give a whole number of at least {len(lengths)}"
+        )
+    quota: FloatArray = n_elements * lengths / lengths.sum()
+    # pieces too short for a whole element get one, and leave the others to share the rest
+    is_short = np.zeros(len(lengths), dtype=bool)
+    while (quota[~is_short] < 1.0).any():
+        is_short |= quota < 1.0
+        rest = lengths[~is_short]
+        quota[~is_short] = (n_elements - np.count_nonzero(is_short)) * rest / rest.sum()
+    quota[is_short] = 1.0
+    quota = np.round(quota, 9)  # halves that differ by round-off are ties, settled by the order of pieces
+    counts: IntArray = np.floor(quota).astype(np.intp)
+    by_remainder = np.argsort(counts - quota, kind="stable")
+    counts[by_remainder[: n_elements - int(counts.sum())]] += 1
+    return counts
+
+
+class _Ruler:
+    """Measures a curve: parameter <-> arc length."""
+
+    def __init__(self, curve: Curve) -> None:
+        self._ends = np.linspace(0.0, 1.0, _N_PANELS + 1)
+        xi, weights = gauss_legendre(_N_PANEL_POINTS)
+        s = self._ends[:-1, None] + 0.5 / _N_PANELS * (1.0 + xi)
+        speed = norms(curve.derivative(s.ravel()))
+        self._arc_length = np.concatenate([[0.0], np.cumsum(0.5 / _N_PANELS * (speed.reshape(s.shape) @ weights))])
+        self._is_even = bool(np.ptp(speed) <= _SPEED_TOLERANCE * speed.max())
+
+    def length(self, start: float, end: float) -> float:
+        """Return the arc length between two parameters."""
+        return float(np.diff(np.interp([start, end], self._ends, self._arc_length))[0])
+
+    def parameters(self, span: tuple[float, float], positions: FloatArray) -> FloatArray:
+        """Return the parameters at fractions of the arc length of a span."""
+        if not self._is_even:
+            whole = np.interp(span, self._ends, self._arc_length)
+            lengths = whole[0] * (1.0 - positions) + whole[1] * positions
+            s: FloatArray = np.interp(lengths, self._arc_length, self._ends)
+            return s
+        return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
+
+
+def _gradual(division: Division, counts: IntArray, lengths: FloatArray) -> list[FloatArray]:
+    """Return positions on each piece that lead gradually to the elements of denser neighbours."""
+    sizes = lengths / counts
+    following = division.following
+    after = np.where(following >= 0, sizes[following], np.inf)  # none on a symmetry line
+    before = np.full(counts.size, np.inf)
+    before[following[following >= 0]] = sizes[following >= 0]
+    ends = zip(counts.tolist(), (before / lengths).tolist(), (after / lengths).tolist(), strict=True)
+    return [gradual_positions(*each) for each in ends]
+
+
+def _checked_positions(grading: Grading, n: int) -> FloatArray:
+    """Return the positions of a grading, which may be the user's own, or say what is wrong with them."""
+    positions = np.asarray(grading.positions(n), dtype=float)
+    is_right = positions.shape == (n + 1,) and positions[0] == 0.0 and positions[-1] == 1.0
+    if not (is_right and (np.diff(positions) > 0.0).all()):
+        raise GeometryError(
+            f"discretise: {grading} does not place {n} elements on a piece: its positions({n}) must increase strictly "
+            f"from 0 to 1 and have shape ({n + 1},); grade less, or use fewer elements"
+        )
+    return positions
+
+
+def _check_density(density: Mapping[str, float], outline: Outline) -> None:
+    for side, value in density.items():
+        if side not in outline.side_names:
+            raise GeometryError(
+                f"discretise: density names the side {side!r}: the sides are {', '.join(outline.side_names)}"
+            )
+        if not 0.0 < value < np.inf:
+            raise GeometryError(f"discretise: the density of side {side!r} is {value}: give a positive, finite number")
+
+
+def _share_of_half(n_elements: int, half: Division, symmetry: Symmetry) -> int:
+    share, n_pieces = -(-n_elements // symmetry.n_images), len(half.pieces)
+    if share < n_pieces:
+        raise GeometryError(
+            f"discretise: n_elements is {n_elements}, of which the symmetry leaves {share} for {n_pieces} pieces "
+            f"(sides cut where parts end): give at least {n_pieces * symmetry.n_images}"
+        )
+    return share
+
+
+def _check_sides_divided(density: Mapping[str, float], half: Division) -> None:
+    divided = {half.outline.side_names[piece.side] for piece in half.pieces}
+    for side in density:
+        if side not in divided:
+            raise GeometryError(
+                f"discretise: density names the side {side!r}, which lies beyond the symmetry lines ({half.symmetry}) "
+                f"and mirrors what is divided: name its image among the sides {', '.join(sorted(divided))}"
+            )

@@ -1,0 +1,1 @@
+"""What makes an outline or mesh impossible: self-intersection, nested loops, extreme magnitudes."""

@@ -1,0 +1,192 @@
+"""What makes arrays of nodes and elements the boundary of one body."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.geometry.curves import Curve
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, point_on, resolution
+from bemkit.geometry.validity.loops import check_loops
+from bemkit.geometry.validity.magnitude import check_magnitude
+from bemkit.geometry.vectors import norms
+
+_CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away
+_N_SPEEDS = 5
+_SPEED_TOLERANCE = 1e-10  # forgives the round-off of derivatives given as differences of large numbers, not more
+
+
+def as_index(values: npt.ArrayLike, name: str) -> IntArray:
+    """Return a new integer array, or say that `name` is none."""
+    array = np.array(values)
+    if array.size and array.dtype.kind not in "iu":
+        raise GeometryError(f"BoundaryMesh: {name} is an array of {array.dtype}: give an array of integers")
+    return array.astype(np.intp)
+
+
+def check_chains(nodes: FloatArray, elements: IntArray, symmetry: Symmetry | None = None) -> None:
+    """Raise unless the elements join finite, distinct nodes to chains, closed or between symmetry lines."""
+    for name, array in (("nodes", nodes), ("elements", elements)):
+        if array.ndim != 2 or array.shape[1] != 2 or not len(array):
+            raise GeometryError(f"BoundaryMesh: {name} has shape {array.shape}: give an array of shape (n, 2), n >= 2")
+    for node in np.flatnonzero(~np.isfinite(nodes).all(axis=1)):
+        raise GeometryError(f"BoundaryMesh: node {node} is {format_point(nodes[node])}: coordinates must be finite")
+    check_magnitude(nodes, "BoundaryMesh")
+    for element in np.flatnonzero(((elements < 0) | (elements >= len(nodes))).any(axis=1)):
+        raise GeometryError(
+            f"BoundaryMesh: element {element} joins nodes {elements[element].tolist()}, but there are {len(nodes)} "
+            f"nodes: use numbers from 0 to {len(nodes) - 1}"
+        )
+    n_starting, n_ending = (np.bincount(elements[:, column], minlength=len(nodes)) for column in (0, 1))
+    is_joint = (n_starting == 1) & (n_ending == 1)
+    if symmetry is not None:
+        is_joint |= (n_starting + n_ending == 1) & symmetry.meets(nodes).any(axis=1)
+    for node in np.flatnonzero(~is_joint):
+        raise GeometryError(
+            f"BoundaryMesh: node {node} at {format_point(nodes[node])} starts {n_starting[node]} and ends "
+            f"{n_ending[node]} elements: each node must start one and end one, so that the boundary is closed"
+            + ("" if symmetry is None else f", or lie on the symmetry line ({symmetry})")
+        )
+    chord = norms(nodes[elements[:, 1]] - nodes[elements[:, 0]])
+    for element in np.flatnonzero(chord <= resolution(nodes[elements[:, 0]], nodes[elements[:, 1]])):
+        raise GeometryError(
+            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has length {chord[element]:.3g}, no "
+            "more than the round-off of its coordinates: join its nodes, grade less, or move the body to the origin"
+        )
+    order = np.lexsort(nodes.T)
+    for k in np.flatnonzero((nodes[order[1:]] == nodes[order[:-1]]).all(axis=1)):
+        first, second = sorted((int(order[k]), int(order[k + 1])))
+        raise GeometryError(
+            f"BoundaryMesh: nodes {first} and {second} are the same point {format_point(nodes[first])}: "
+            "a boundary must not touch itself; move them apart, or join them if the elements between have no length"
+        )
+
+
+def check_curves(
+    nodes: FloatArray, elements: IntArray, curves: tuple[Curve, ...], element_curve: IntArray, span: FloatArray
+) -> None:
+    """Raise unless curved elements lie on their curves."""
+    n = len(elements)
+    if element_curve.shape != (n,) or span.shape != (n, 2):
+        raise GeometryError(
+            f"BoundaryMesh: element_curve has shape {element_curve.shape} and element_span {span.shape} for {n} "
+            f"elements: give shapes ({n},) and ({n}, 2)"
+        )
+    for element in np.flatnonzero((element_curve < -1) | (element_curve >= len(curves))):
+        raise GeometryError(
+            f"BoundaryMesh: element {element} follows curve {element_curve[element]} of {len(curves)} curves: "
+            "use the index of a curve, or -1 for a straight element"
+        )
+    is_curved = element_curve >= 0
+    for element in np.flatnonzero(is_curved & ~((span[:, 0] >= 0.0) & (span[:, 0] < span[:, 1]) & (span[:, 1] <= 1.0))):
+        raise GeometryError(
+            f"BoundaryMesh: element {element} has the span {span[element].tolist()} on its curve: "
+            "give an increasing pair of parameters in [0, 1]"
+        )
+    ends = nodes[elements]
+    distance = norms(evaluate_curves(curves, element_curve, span, point_on) - ends).max(axis=1)
+    tolerance = _CURVE_TOLERANCE * norms(ends[:, 1] - ends[:, 0]) + resolution(ends[:, 0], ends[:, 1])
+    for element in np.flatnonzero(is_curved & ~(distance <= tolerance)):
+        raise GeometryError(
+            f"BoundaryMesh: {describe_element(nodes, elements, int(element))}, has ends {distance[element]:.3g} away "
+            f"from the points of its curve at {span[element].tolist()}: correct its nodes, curve or span"
+        )
+    _check_speed(curves, np.flatnonzero(is_curved), element_curve[is_curved], span[is_curved])
+
+
+def _check_speed(curves: tuple[Curve, ...], elements: IntArray, element_curve: IntArray, span: FloatArray) -> None:
+    """Raise unless the speed |dx/ds| is the same all over each curved element."""
+    fractions = np.linspace(0.0, 1.0, _N_SPEEDS)
+    s = span[:, :1] * (1.0 - fractions) + span[:, 1:] * fractions
+    speed = norms(evaluate_curves(curves, element_curve, s, derivative_on))
+    for k in np.flatnonzero(~(np.ptp(speed, axis=1) <= _SPEED_TOLERANCE * speed.max(axis=1))):
+        raise GeometryError(
+            f"BoundaryMesh: element {elements[k]} follows curve {element_curve[k]} with speeds |dx/ds| from "
+            f"{speed[k].min():.6g} to {speed[k].max():.6g}: the parameter must be proportional to the arc length; "
+            "use ParametricCurve(curve.point, curve.derivative)"
+        )
+
+
+def check_parts(
+    parts: Mapping[str, npt.ArrayLike], n_elements: int, *, may_be_empty: bool = False
+) -> dict[str, IntArray]:
+    """Return the parts, sorted and read-only, or raise unless they are disjoint sets of elements."""
+    checked: dict[str, IntArray] = {}
+    part_of_element = np.full(n_elements, -1)
+    for number, (name, values) in enumerate(parts.items()):
+        members = np.sort(as_index(values, f"part {name!r}").ravel())
+        if not (isinstance(name, str) and name) or not (len(members) or may_be_empty):
+            raise GeometryError(
+                f"BoundaryMesh: part {name!r} has {len(members)} elements: give parts a name and at least one element"
+            )
+        if len(members) and (members[0] < 0 or members[-1] >= n_elements):
+            outside = members[0] if members[0] < 0 else members[-1]
+            raise GeometryError(
+                f"BoundaryMesh: part {name!r} contains element {outside}: use numbers from 0 to {n_elements - 1}"
+            )
+        for element in members[1:][members[1:] == members[:-1]]:
+            raise GeometryError(f"BoundaryMesh: part {name!r} contains element {element} twice: list it once")
+        for element in members[part_of_element[members] >= 0]:
+            other = list(parts)[part_of_element[element]]
+            raise GeometryError(
+                f"BoundaryMesh: element {element} is in the parts {other!r} and {name!r}: parts must not overlap"
+            )
+        part_of_element[members] = number
+        read_only(members)
+        checked[name] = members
+    return checked
+
+
+def follow_loops(elements: IntArray) -> tuple[IntArray, ...]:
+    """Return the elements of each loop in order, starting at its smallest; the nodes must have been checked."""
+    starting_at = np.empty(len(elements), dtype=np.intp)
+    starting_at[elements[:, 0]] = np.arange(len(elements))
+    following = starting_at[elements[:, 1]].tolist()
+    is_seen = [False] * len(elements)
+    loops = []
+    for first in range(len(elements)):
+        loop = []
+        element = first
+        while not is_seen[element]:
+            is_seen[element] = True
+            loop.append(element)
+            element = following[element]
+        if loop:
+            loops.append(np.array(loop, dtype=np.intp))
+    return tuple(loops)
+
+
+def restrict_loops(loops: tuple[IntArray, ...], elements: IntArray) -> tuple[IntArray, ...]:
+    """Return what loops of a whole body hold of the first elements, each in order from a symmetry line on."""
+    restricted = [loop[loop < len(elements)] for loop in loops]
+    result = []
+    for loop in filter(len, restricted):
+        starts_on_line = np.isin(elements[loop, 0], elements[loop, 1], invert=True)
+        result.append(np.roll(loop, -int(np.argmax(starts_on_line))))
+    return tuple(result)
+
+
+def check_mesh_loops(
+    nodes: FloatArray, elements: IntArray, pieces: Pieces, loops: tuple[IntArray, ...], is_exterior: bool
+) -> None:
+    """Raise unless the loops bound a body on their left."""
+    loop_of_element = np.empty(len(elements), dtype=np.intp)
+    for k, loop in enumerate(loops):
+        loop_of_element[loop] = k
+
+    def describe(element: int) -> str:
+        return describe_element(nodes, elements, element)
+
+    def describe_loop(k: int) -> str:
+        return f"loop of {len(loops[k])} elements through element {loops[k][0]}"
+
+    check_loops(pieces.take(np.concatenate(loops)), loop_of_element, is_exterior, describe, describe_loop)
+
+
+def describe_element(nodes: FloatArray, elements: IntArray, element: int) -> str:
+    """Name an element by its number and its ends."""
+    start, end = nodes[elements[element]]
+    return f"element {element}, from {format_point(start)} to {format_point(end)}"

@@ -1,0 +1,168 @@
+"""The nodes on the contact parts of a scene: which obstacle each may touch, how far away and in which direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.condensation.nodes import ContactNodes, contact_along_normals, contact_frame, nodes_on
+from bemkit.contact.obstacle import Obstacle, measure_contact
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
+from bemkit.scene.scene import Contact, Scene
+
+ALIKE = 0.866
+"""Cosine of 30 degrees: directions of contact at one node that differ by less belong to one smooth side."""
+SAME_GAP = 1e-9
+"""Difference of two gaps at one node, relative to the size of the body, that does not make one obstacle nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactData:
+    """What a scene says of each node that may touch an obstacle, in order along each contact part.
+
+    Parameters
+    ----------
+    nodes : ContactNodes
+        Dimensionless.
+    parts : tuple of n_contact str
+        The contact part that each node belongs to.
+    arc_length : (n_contact,) array [m]
+        From the start of that part.
+    gap : (n_contact,) array [m]
+        Distance to the obstacle along the direction of contact.
+    facing : (n_contact,) array [-]
+        Cosine of the angle between the direction of contact and the body's normal; of the nearer side at a corner.
+    points : (n_contact, 2) array [m]
+        As the mesh has them: by way of dimensionless points a node on an obstacle would lie beside it far from the
+        origin.
+    """
+
+    nodes: ContactNodes
+    parts: tuple[str, ...]
+    arc_length: FloatArray
+    gap: FloatArray
+    facing: FloatArray
+    points: FloatArray
+
+    def of(self, nodes: ContactNodes) -> ContactData:
+        """Return the rows of some of the nodes, in the order they have here."""
+        rows = np.isin(self.nodes.nodes, nodes.nodes)
+        parts = tuple(part for part, is_kept in zip(self.parts, rows.tolist(), strict=True) if is_kept)
+        columns = (column[rows] for column in (self.arc_length, self.gap, self.facing, self.points))
+        return ContactData(self.nodes.take(rows), parts, *columns)
+
+    def has_same_directions(self, other: ContactData) -> bool:
+        """Whether the same nodes touch in the same directions."""
+        own, others = self.nodes, other.nodes
+        return np.array_equal(own.nodes, others.nodes) and np.allclose(own.frame, others.frame, rtol=0.0, atol=1e-12)
+
+
+def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> ContactData:
+    """Find the nodes that may touch an obstacle, whatever supports hold them.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : BoundaryMesh
+        In physical units.
+    space : BoundarySpace
+        The displacement space, on the dimensionless mesh.
+
+    Returns
+    -------
+    ContactData
+
+    Notes
+    -----
+    A node of several contact parts belongs to the one whose obstacle is nearest, and to the first of those that are
+    equally near. Where their directions are alike, it stands for its share of all of them. At a corner it cannot touch
+    two obstacles in two directions: the others' shares go to their next nodes, as at crosspoints of mortar methods
+    [Wohlmuth2000].
+    """
+    obstacles = {
+        part.name: part.condition.obstacle
+        for part in scene.parts
+        if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
+    }
+    if not obstacles:
+        return ContactData(
+            contact_along_normals(space, np.zeros(0, np.intp)), (), *(np.zeros(0),) * 3, np.zeros((0, 2))
+        )
+    sides = [_Side.of(obstacle, mesh.part(name), mesh, space) for name, obstacle in obstacles.items()]
+    owner = _owners(sides, space.n_dofs // 2, SAME_GAP * mesh.diameter)
+    directions = np.zeros((owner.size, 2))
+    for number, side in enumerate(sides):
+        own = owner[side.nodes] == number
+        directions[side.nodes[own]] = side.directions[own]
+    weights = np.zeros(owner.size)
+    for side in sides:
+        np.add.at(weights, side.receivers(directions), side.weights)
+    kept = [side.take(owner[side.nodes] == number) for number, side in enumerate(sides)]
+    return _joined(scene, list(obstacles), kept, weights, space)
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The nodes of one contact part, as in `ContactData`; weights are the part's own."""
+
+    nodes: IntArray
+    directions: FloatArray
+    weights: FloatArray
+    arc_length: FloatArray
+    gap: FloatArray
+    facing: FloatArray
+    points: FloatArray
+
+    @classmethod
+    def of(cls, obstacle: Obstacle, elements: IntArray, mesh: BoundaryMesh, space: BoundarySpace) -> _Side:
+        elements = along_boundary(mesh, elements)
+        nodes, normals = nodes_on(space, elements)
+        points = dof_points(space, mesh)[nodes]
+        gap, directions = measure_contact(obstacle, points, normals)
+        lengths = mesh.lengths[elements]
+        begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+        dofs = space.element_dofs[elements]
+        arc_length, facing = np.full(space.n_dofs // 2, np.inf), np.full(space.n_dofs // 2, -1.0)
+        np.minimum.at(arc_length, dofs, begin[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0))
+        towards = np.zeros((space.n_dofs // 2, 2))
+        towards[nodes] = directions
+        np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, space.local_nodes) * towards[dofs], axis=2))
+        weights = dof_weights(space, elements)[nodes]
+        return cls(nodes, directions, weights, arc_length[nodes], gap, facing[nodes], points)
+
+    def take(self, rows: BoolArray) -> _Side:
+        return _Side(*(column[rows] for column in vars(self).values()))
+
+    def receivers(self, directions: FloatArray) -> IntArray:
+        """Return the node (n,) to which the weight of each node goes: itself, or the next one on this side."""
+        is_own = np.sum(directions[self.nodes] * self.directions, axis=1) > ALIKE
+        position = np.arange(self.nodes.size)
+        following, before = np.minimum(position + 1, position[-1]), np.maximum(position - 1, 0)
+        return self.nodes[np.where(is_own, position, np.where(is_own[following], following, before))]
+
+
+def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
+    """Return (n_nodes,): the side of each node whose obstacle is nearest, -1 for nodes of none."""
+    owner, nearest = np.full(n_nodes, -1), np.full(n_nodes, np.inf)
+    for number, side in enumerate(sides):
+        is_nearer = (owner[side.nodes] < 0) | (side.gap < nearest[side.nodes] - same)
+        owner[side.nodes[is_nearer]] = number
+        nearest[side.nodes[is_nearer]] = side.gap[is_nearer]
+    return owner
+
+
+def _joined(
+    scene: Scene, names: Sequence[str], sides: Sequence[_Side], weights: FloatArray, space: BoundarySpace
+) -> ContactData:
+    columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
+    nodes, directions, _, arc_length, gap, facing, points = columns
+    parts = tuple(name for name, side in zip(names, sides, strict=True) for _ in range(side.nodes.size))
+    smooth = {name for name, law in scene.laws.items() if law.is_frictionless}
+    is_frictionless = np.array([part in smooth for part in parts], bool)
+    found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights[nodes], is_frictionless)
+    return ContactData(found, parts, arc_length, gap, facing, points)

@@ -1,0 +1,113 @@
+"""Whether the elastic energy of a discrete body can be negative, which no body's can.
+
+Collocation does not make the stiffness symmetric and positive semidefinite, as Galerkin's method does: on elements that
+are much longer than a body is thick it may push back the wrong way, and still satisfy contact and equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.contact_model import Model
+from bemkit.model.elastic_model import ElasticModel
+from bemkit.operators.equilibrium import round_off_of
+from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.steklov_poincare import GalerkinMap
+from bemkit.solvers.base import ContactSolution, Status
+
+_ROUND_OFF = 1e-10
+"""Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
+a ring whose thickness is a hundredth of its radius has 1e-7 of the largest stiffness."""
+_CARRIED = 64.0 * float(np.finfo(float).eps)
+"""Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
+
+
+def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named NEGATIVE_ENERGY if the energy of the body is negative or can become so.
+
+    Parameters
+    ----------
+    model : Model or ElasticModel
+    result : ContactSolution
+
+    Returns
+    -------
+    ContactSolution
+        The same unless the condensed stiffness has a negative direction or the work of all forces is negative.
+    """
+    if not result.state.is_finite or result.status is Status.NOT_FINITE:
+        return result
+    if isinstance(model, ElasticModel):
+        condensed = model.condensed
+        displacement, force = condensed.recover(np.zeros(0))
+    else:
+        condensed = model.body.condensed
+        displacement, force = model.body.recover(result.state)
+        # by Galerkin's method no direction is negative but for round-off, which the work of the solution tells
+        is_galerkin = isinstance(model.elastic, GalerkinMap)
+        if not is_galerkin and is_indefinite(model.body.dense.stiffness, condensed.sensitivity):
+            return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
+    space = model.elastic.displacement_space
+    motions = resting_motions(space.mesh, dof_points(space))
+    share = negative_share(displacement, force, motions, condensed.sensitivity)
+    return (
+        _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
+    )
+
+
+def negative_share(
+    displacement: FloatArray, force: FloatArray, motions: FloatArray, sensitivity: FloatArray | None
+) -> float:
+    """Return how negative the work of all forces is, relative to the sum of the sizes of its parts.
+
+    Parameters
+    ----------
+    displacement, force : (n_nodes, 2) arrays [m], [N/m]
+    motions : (2 n_nodes, n_motions) array
+        Rigid motions that cost no energy: balanced forces do no work on them, but for round-off.
+    sensitivity : (n_nodes, 2) array or None
+        See `CondensedMap`.
+
+    Returns
+    -------
+    float
+        Zero for a work that is positive, or negative by no more than round-off.
+    """
+    strained = displacement - (motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]).reshape(-1, 2)
+    parts = strained * force
+    size = float(np.abs(parts).sum())
+    round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * float(np.abs(strained).max())
+    work = float(parts.sum())
+    return -work / size if work < -round_off else 0.0
+
+
+def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) -> bool:
+    """Tell whether the symmetric part of a stiffness has an eigenvalue that is negative beyond round-off.
+
+    Parameters
+    ----------
+    stiffness : (n, n) array [N/m]
+    sensitivity : (n_nodes, 2) array, optional
+        Of the body that it was condensed from, whose round-off it carries; see `CondensedMap`.
+    """
+    if not np.isfinite(stiffness).all():
+        return False  # overflow has a name of its own
+    symmetric = 0.5 * (stiffness + stiffness.T)
+    round_off = _ROUND_OFF * float(np.abs(symmetric).max(initial=0.0))
+    if sensitivity is not None:
+        round_off += _CARRIED * float(np.abs(sensitivity).max(initial=0.0))
+    symmetric[np.diag_indices_from(symmetric)] += round_off
+    try:
+        np.linalg.cholesky(symmetric)
+    except np.linalg.LinAlgError:
+        return True
+    return False
+
+
+def _named(result: ContactSolution, reason: str) -> ContactSolution:
+    status = Status.NEGATIVE_ENERGY
+    return replace(result, status=status, message=f"{status.value} [{reason}]")

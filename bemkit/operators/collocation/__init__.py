@@ -1,0 +1,1 @@
+"""Collocation at the middles of constant elements: points, columns, reconstructed gradients, reciprocity."""

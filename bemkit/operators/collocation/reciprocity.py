@@ -1,0 +1,157 @@
+"""One exact elastic field for each closed curve: what its reciprocity with the solution tells about the pressure there.
+
+The displacement equation hardly tells a uniform pressure on a closed curve: it displaces nothing but what the
+compressibility allows, so that an error of the equation along the normals comes back as a pressure 1 / (1 - 2 nu) times
+larger, and at nu = 1/2 nothing is left of it within a hole. Betti's theorem for a field w that carries volume through
+the curve tells it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
+
+    around a hole     w = a / conj(z - c),        t(w) ds = 2 mu i dw,     c in the hole, a its distance from the curve
+    the outer curve   w = (1 - 2 nu) (z - c),     t(w) ds = -2 mu i dz
+
+A source of volume and a uniform dilatation; both are elastic fields at every Poisson ratio, nu = 1/2 included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.material import Material
+
+_POINTS = 16
+"""Of the Gauss rule on an element; round-off where the element is not longer than the hole is wide."""
+_CANDIDATES = 64
+"""Places along a hole from which the middle of it is sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reciprocity:
+    """``on_traction @ traction == on_displacement @ displacement`` for elements, by 2 * element + component.
+
+    Parameters
+    ----------
+    on_traction : (n_loops, 2 n_elements) array [m^2/Pa]
+    on_displacement : (n_loops, 2 n_elements) array [m]
+    fields : (2 n_elements, n_loops) array
+        The fields at the midpoints: errors of the displacement equation that make room for these equations. They are
+        as smooth as the fields, so that elements at corners, however short, are not torn apart.
+    """
+
+    on_traction: FloatArray
+    on_displacement: FloatArray
+    fields: FloatArray
+
+    @classmethod
+    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> Reciprocity:
+        """Return the equations of constant tractions, and of displacements with or without slopes.
+
+        Parameters
+        ----------
+        mesh : BoundaryMesh
+            Of loops that are images of each other there is one equation.
+        material : Material
+        takes_slopes : bool
+            Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
+        """
+        panels = Panels(mesh.whole)
+        slopes = Slopes.of(mesh.whole, panels) if takes_slopes else None
+        on_tractions, on_displacements, fields = [], [], []
+        for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
+            field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
+            on_displacement = field.displacement[None, :]
+            if slopes is not None:
+                on_slope = field.gradient / (panels.half * panels.tangent)
+                slopes.add_to(on_displacement, on_slope[None, :], is_conjugate=False)
+            on_tractions.append(_folded(mesh, field.traction))
+            on_displacements.append(_folded(mesh, on_displacement[0]))
+            fields.append(np.stack([field.value.real, field.value.imag], axis=1)[: mesh.n_elements].ravel())
+        return cls(np.array(on_tractions), np.array(on_displacements), np.array(fields).T)
+
+
+@dataclass(frozen=True, eq=False)
+class _Field:
+    """Work of densities on w and t(w) / (2 mu): Re sum of (traction t), and of (displacement u + gradient g).
+
+    Each is an (n_elements,) complex array of the whole body; the displacement on an element is u + g (y - x). `value`
+    is the field at x.
+    """
+
+    value: ComplexArray
+    traction: ComplexArray
+    displacement: ComplexArray
+    gradient: ComplexArray
+
+
+def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
+    """Return the field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor."""
+    whole = mesh.whole
+    z, arm, dz = _quadrature(whole)
+    centre, factor = _plane(mesh.centre), 1.0 - 2.0 * material.effective_poisson_ratio
+    return _Field(
+        (_plane(whole.centres) - centre) / mesh.diameter,
+        np.sum((z - centre).conj() * np.abs(dz), axis=1) * (factor / (2.0 * material.shear_modulus * mesh.diameter)),
+        1j * _plane(whole.end - whole.start).conj() / mesh.diameter,
+        1j * np.sum(arm * dz.conj(), axis=1) / mesh.diameter,
+    )
+
+
+def _source(mesh: BoundaryMesh, material: Material, loop: IntArray) -> _Field:
+    """Return the field w = a / conj(z - c) of a source of volume in a hole, and in its images."""
+    z, arm, dz = _quadrature(mesh.whole)
+    start, middle, end = (_plane(points) for points in (mesh.whole.start, mesh.whole.centres, mesh.whole.end))
+    centre, radius = _largest_circle(mesh, loop)
+    images = [centre] if mesh.symmetry is None else [mesh.symmetry.reflected(centre, g) for g in mesh.symmetry.images]
+    value, traction, displacement, gradient = np.zeros((4, len(z)), complex)
+    for c in _plane(np.array(images)):
+        value += radius / (middle - c).conj()
+        traction += np.sum(np.abs(dz) / (z - c), axis=1) * (radius / (2.0 * material.shear_modulus))
+        displacement += 1j * radius * (end - start) / ((start - c) * (end - c))
+        gradient += 1j * radius * np.sum(arm * dz / (z - c) ** 2, axis=1)
+    return _Field(value, traction, displacement, gradient)
+
+
+def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:
+    """Return centre and radius of the largest circle in a hole that touches it in the middle of one of its elements.
+
+    A circle that touches x with the inward normal n and passes through y has the radius |y - x|^2 / (2 n (y - x)).
+    """
+    whole = mesh.whole
+    around = next(other for other in whole.loops if loop[0] in other)
+    touching = around[:: 1 + around.size // _CANDIDATES]
+    points = np.concatenate([whole.centres[around], whole.start[around]])
+    arms = points - whole.centres[touching, None]
+    ahead = np.einsum("tpc,tc->tp", arms, whole.normals[touching])
+    is_ahead = ahead > 0.0
+    radii = np.divide(np.sum(arms**2, axis=2), 2.0 * ahead, out=np.full(ahead.shape, np.inf), where=is_ahead).min(
+        axis=1
+    )
+    largest = int(np.argmax(np.where(np.isfinite(radii), radii, 0.0)))
+    radius = float(radii[largest])
+    return whole.centres[touching[largest]] + radius * whole.normals[touching[largest]], radius
+
+
+def _quadrature(whole: BoundaryMesh) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return Gauss points z, z - x and dz (n_elements, n_points), x the middle of the element."""
+    elements = np.arange(whole.n_elements)
+    xi, weights = gauss_legendre(_POINTS)
+    z, dz = _plane(whole.points(elements, xi)), _plane(whole.derivatives(elements, xi)) * weights
+    return z, z - _plane(whole.centres)[:, None], dz
+
+
+def _plane(vectors: FloatArray) -> ComplexArray:
+    result: ComplexArray = vectors @ np.array([1.0, 1j])
+    return result
+
+
+def _folded(mesh: BoundaryMesh, on: ComplexArray) -> FloatArray:
+    """Return the row (2 n_elements,) of Re sum (on v), v a symmetric density on the whole body."""
+    images = np.ones((1, 2)) if mesh.symmetry is None else mesh.symmetry.images
+    rows = np.stack([on.real, -on.imag], axis=1).reshape(len(images), mesh.n_elements, 2)
+    folded: FloatArray = np.einsum("gnc,gc->nc", rows, images).ravel()
+    return folded

@@ -1,0 +1,193 @@
+"""Inner integrals over one trial element, seen from a point: closed forms, and what bending adds to them.
+
+With zeta - p(t) = (t0 - t) g(t) (see `bent`) the integrals over a curved element near the point are those of the
+straight element seen from t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
+
+    int t^b log|rho| dt        = straight + int t^b log|g| dt
+    int t^b 2 pi k dt          = straight - int t^b Im(g' / g) dt
+    int t^b rho / conj(rho) dt = int t^b h dt + 2 i eta (h0 conj(T_b) + int t^b (h - h0) / (conj(t0) - t) dt),
+
+with h = g / conj(g) on the real axis and h0 its value at conj(t0). Nothing is singular or cancels, wherever the point
+lies. Far from the element the integrands themselves are smooth and a Gauss rule serves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators import kernels
+from bemkit.operators.integrals import curved_panels
+from bemkit.operators.integrals.pairs import Degrees, Inner
+from bemkit.operators.integrals.panels import Panels
+
+N_SMOOTH = 16
+"""Points for the smooth remainders, and for the integrals themselves outside `curved_panels.ELLIPSE`."""
+
+
+def inner_integrals(
+    panels: Panels, degrees: Degrees, trial: IntArray, from_start: ComplexArray, from_end: ComplexArray
+) -> Inner:
+    """Integrate over trial elements that are seen from points at any distance, one point for each.
+
+    Parameters
+    ----------
+    panels : Panels
+    degrees : Degrees
+    trial : (n,) int array
+        Elements.
+    from_start, from_end : (n,) complex arrays [m]
+        The points relative to either end of their element, each accurate near that end.
+    """
+    plus, minus = from_start * panels.to_local[trial], from_end * panels.to_local[trial]
+    if panels.bent is None or bool(panels.is_straight[trial].all()):
+        return _seen_from(degrees, plus, minus)
+    result = Inner.zeros(degrees, trial.shape)
+    zeta = local_coordinates(panels, trial, from_start)
+    near = np.flatnonzero(np.abs(zeta) < panels.reach(curved_panels.ELLIPSE)[trial])
+    t_plus, t_minus, is_found = curved_panels.find_parameters(panels.bent, trial[near], plus[near], minus[near])
+    near = near[is_found]
+    store(result, near, near_inner(degrees, panels.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
+    is_far = np.ones(trial.size, bool)
+    is_far[near] = False
+    far = np.flatnonzero(is_far)
+    store(result, far, far_inner(degrees, panels.polynomials(trial[far]), zeta[far], N_SMOOTH))
+    return result
+
+
+def local_coordinates(panels: Panels, trial: IntArray, from_start: ComplexArray) -> ComplexArray:
+    """Return the local coordinates of points given relative to the start of their element."""
+    zeta: ComplexArray = ((panels.start - panels.centre)[trial] + from_start) * panels.to_local[trial]
+    return zeta
+
+
+def inner_on_element(panels: Panels, degrees: Degrees, elements: IntArray, xi: float) -> Inner:
+    """Integrate over elements seen from their own points at the local coordinate `xi`; k is a principal value."""
+    end: ComplexArray = np.full(elements.size, 1.0 + 0j)
+    moments, log_minus, log_plus = kernels.near_moments(xi + end, xi - end, degrees.highest_moment)
+    principal: list[ComplexArray] = [moment.real.astype(complex) for moment in moments]
+    straight = Inner.straight(degrees, principal, log_minus + log_plus, np.zeros(elements.size))
+    return _sum(straight, bending(degrees, panels.polynomials(elements), np.full(elements.size, xi + 0j)))
+
+
+def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
+    """Write the integrals of some of the points."""
+    for log, value in zip(result.log, values.log, strict=True):
+        log[chosen] = value
+    for quotient, complex_value in zip(result.quotient, values.quotient, strict=True):
+        quotient[chosen] = complex_value
+    for double, value in zip(result.double, values.double, strict=True):
+        double[chosen] = value
+
+
+def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
+    """Return the closed forms of straight elements; `plus` and `minus` as in `kernels.near_moments`."""
+    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
+    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
+    return Inner.straight(degrees, moments, log_minus + log_plus, eta)
+
+
+def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray, minus: ComplexArray) -> Inner:
+    """Integrate over curved elements near points with the parameters t0 = plus - 1 = minus + 1.
+
+    Parameters
+    ----------
+    degrees : Degrees
+    coefficients : (n_powers, n) complex array
+        The polynomials p of the elements.
+    plus, minus : (n,) complex arrays
+    """
+    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
+    at_start = np.abs(plus) < np.abs(minus)
+    eta = np.where(at_start, plus.imag, minus.imag)
+    root = np.where(at_start, plus - 1.0, minus + 1.0)
+    straight = Inner.straight(degrees, moments, log_minus + log_plus, eta)
+    return _sum(straight, bending(degrees, coefficients, root, eta, moments))
+
+
+def _sum(straight: Inner, smooth: Inner) -> Inner:
+    """Add what bending adds; the quotient of `smooth` is the whole one."""
+    return Inner(
+        [one + other for one, other in zip(straight.log, smooth.log, strict=True)],
+        smooth.quotient,
+        [one + other for one, other in zip(straight.double, smooth.double, strict=True)],
+    )
+
+
+def bending(
+    degrees: Degrees,
+    coefficients: ComplexArray,
+    root: ComplexArray,
+    eta: FloatArray | None = None,
+    moments: list[ComplexArray] | None = None,
+) -> Inner:
+    """Return what bending adds to log and double, and the whole quotient, at points with the parameters `root` (n,).
+
+    Points on the elements themselves need neither `eta`, which is zero, nor the moments T_b.
+    """
+    n_log, n_double = degrees.trial_powers
+    divided = curved_panels.divided_difference(coefficients, root)
+    t, _ = gauss_legendre(N_SMOOTH)
+    powers = np.vander(t, divided.shape[0], increasing=True)
+    g = _product(powers, divided)
+    size = np.square(g.real) + np.square(g.imag)
+    ratio = g * g / size
+    log: list[FloatArray] = list(_weights(n_log) @ (0.5 * np.log(size)))
+    quotient: list[ComplexArray] = list(_product(_weights(n_log), ratio))
+    if n_log and eta is not None and moments is not None:
+        at_mirror = curved_panels.evaluate(divided, root.conj()) / curved_panels.evaluate(divided, root).conj()
+        gap = root.conj() - t[:, None]
+        gap[gap == 0.0] = 1.0  # then eta is zero, and with it the whole term
+        change = _product(_weights(n_log), (ratio - at_mirror) / gap)
+        for b in range(n_log):
+            quotient[b] = quotient[b] + (2j * eta) * (at_mirror * moments[b].conj() + change[b])
+    slope = _product(powers[:, :-1], curved_panels.derivative(divided))
+    double: list[FloatArray] = list(_weights(n_double) @ (-(slope * g.conj()).imag / size))
+    return Inner(log, quotient, double)
+
+
+def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, n_points: int) -> Inner:
+    """Integrate over curved elements far from points by a Gauss rule.
+
+    Parameters
+    ----------
+    degrees : Degrees
+    coefficients : (n_powers, n_trial) complex array
+        The polynomials p of the elements.
+    zeta : (..., n_trial) complex array
+        Local coordinates of the points.
+    n_points : int
+        Enough for the distance of the points.
+    """
+    n_log, n_double = degrees.trial_powers
+    result = Inner.zeros(degrees, zeta.shape)
+    slopes = curved_panels.derivative(coefficients)
+    for t, weight in zip(*gauss_legendre(n_points), strict=True):
+        place = np.full(coefficients.shape[1], t + 0j)
+        rho = zeta - curved_panels.evaluate(coefficients, place)
+        size = np.square(rho.real) + np.square(rho.imag)
+        if n_log:
+            log = np.log(size)
+            quotient = rho * rho / size
+        if n_double:
+            angle = (curved_panels.evaluate(slopes, place) * rho.conj()).imag / size
+        for b in range(n_log):
+            result.log[b] += (0.5 * weight * t**b) * log
+            result.quotient[b] += (weight * t**b) * quotient
+        for b in range(n_double):
+            result.double[b] += (weight * t**b) * angle
+    return result
+
+
+def _product(matrix: FloatArray, values: ComplexArray) -> ComplexArray:
+    """Return matrix @ values for a real matrix and complex values by one real product."""
+    values = np.ascontiguousarray(values)
+    return np.asarray(matrix @ values.view(float)).view(complex)
+
+
+def _weights(n_powers: int) -> FloatArray:
+    """Return the weights of the rule for smooth remainders, times t**b: (n_powers, N_SMOOTH)."""
+    t, weights = gauss_legendre(N_SMOOTH)
+    result: FloatArray = weights * np.vander(t, n_powers, increasing=True).T
+    return result

@@ -1,0 +1,98 @@
+"""The elements of a mesh in complex notation, as the integrals want them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.integrals import curved_panels
+
+
+class Panels:
+    """Elements as arrays: end nodes, half lengths, tangents, centres (complex numbers x + i y).
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        Its coordinates should be relative to a point near the body, so that differences keep their digits.
+
+    Raises
+    ------
+    GeometryError
+        If a curved element turns too far to be a polynomial of its arc length.
+
+    Notes
+    -----
+    In the local coordinate (x - centre) / (half tangent) a straight element is the interval [-1, 1], and a curved one
+    the image of that interval under a polynomial p of small degree with |p'| = 1 (see `curved_panels`): `half` is half the arc
+    length, `tangent` the direction of the chord and `centre` the point in the middle.
+    """
+
+    def __init__(self, mesh: BoundaryMesh) -> None:
+        self.start_node: IntArray = mesh.elements[:, 0]
+        self.end_node: IntArray = mesh.elements[:, 1]
+        nodes: ComplexArray = mesh.nodes[:, 0] + 1j * mesh.nodes[:, 1]
+        self.start: ComplexArray = nodes[self.start_node]
+        self.end: ComplexArray = nodes[self.end_node]
+        span = self.end - self.start
+        self.half: FloatArray = 0.5 * np.abs(span)
+        self.tangent: ComplexArray = span / (2.0 * self.half)
+        self.centre: ComplexArray = self.start + 0.5 * span
+        self.is_straight = mesh.is_straight
+        self.bent: curved_panels.BentPanels | None = None
+        if not self.is_straight.all():
+            curved = np.flatnonzero(~self.is_straight)
+            self.half[curved] = 0.5 * mesh.lengths[curved]
+            self.centre[curved] = mesh.centres[curved] @ np.array([1.0, 1j])
+            self.bent = curved_panels.fit(mesh, self.tangent, self.half, self.centre)
+        self.to_local: ComplexArray = self.tangent.conj() / self.half
+
+    def polynomials(self, elements: IntArray) -> ComplexArray:
+        """Return the coefficients (n_powers, n) of p for some elements."""
+        if self.bent is None:
+            return np.repeat(np.array([[0.0], [1.0 + 0j]]), elements.size, axis=1)
+        return self.bent.about_centre[:, elements]
+
+    def point(self, elements: IntArray, xi: float) -> ComplexArray:
+        """Return the points of some elements at one local coordinate in [-1, 1]."""
+        if self.bent is None:
+            return self.centre[elements] + (xi * self.half * self.tangent)[elements]
+        local = curved_panels.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
+        return self.centre[elements] + (self.half * self.tangent)[elements] * local
+
+    def offset(self, elements: IntArray, fraction: FloatArray | float, at_start: bool) -> ComplexArray:
+        """Return how far points lie from one end node, accurate however close they are to it.
+
+        Parameters
+        ----------
+        elements : (n,) int array
+        fraction : (n,) array or float
+            Distances along the elements, in their lengths, from the start node (or from the end node).
+        at_start : bool
+            Which end.
+        """
+        step = self.tangent[elements] * (2.0 * self.half[elements] * (1.0 if at_start else -1.0))
+        if self.bent is None:
+            return step * fraction
+        about = (self.bent.about_start if at_start else self.bent.about_end)[1:, elements]
+        shift = np.broadcast_to(2.0 * fraction * (1.0 if at_start else -1.0), elements.shape).astype(complex)
+        return step * fraction * curved_panels.evaluate(about, shift)
+
+    def reach(self, distance: float) -> FloatArray:
+        """Return how many half lengths from the centre of each element the parameter is `distance` away from it.
+
+        Outside of a circle the parameter grows with the logarithm of the distance only; on straight elements both are
+        the same.
+        """
+        if self.bent is None:
+            return np.full(self.half.size, distance)
+        return curved_panels.stretched(self.bent.bend, distance)
+
+
+def squared_distance(x: ComplexArray, y: ComplexArray) -> FloatArray:
+    """Return |x - y|**2, broadcast."""
+    difference = x - y
+    result: FloatArray = np.square(difference.real)
+    result += np.square(difference.imag)
+    return result

@@ -1,0 +1,151 @@
+"""Dense factorisations with LAPACK: each names what could not be factored."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.operators.counts import Factorisation, FactorKind
+
+
+def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return left @ right by the BLAS of scipy.
+
+    numpy and scipy bring one BLAS each, and the threads of one keep spinning for a while after each call: products
+    between LAPACK calls are several times faster when they come from the same library.
+    """
+    from scipy.linalg.blas import dgemm
+
+    a, trans_a = (left.T, 1) if left.flags.c_contiguous else (left, 0)
+    b, trans_b = (right.T, 1) if right.flags.c_contiguous else (right, 0)
+    return np.asarray(dgemm(1.0, a, b, trans_a=trans_a, trans_b=trans_b))
+
+
+class SingularMatrixError(InputError):
+    """A matrix that must be regular is not; the message names it."""
+
+
+class Cholesky:
+    """Factor a symmetric positive definite matrix, which is also the proof that it is one.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    name : str
+        What the matrix stands for, for the message.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the matrix is not positive definite to working precision.
+    """
+
+    def __init__(self, matrix: FloatArray, name: str) -> None:
+        from scipy.linalg.lapack import dpotrf
+
+        # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
+        self._factor, info = dpotrf(np.array(matrix.T, order="F"), lower=1, overwrite_a=1, clean=0)
+        # each pivot by its own diagonal entry: on graded meshes these differ by the square of the grading
+        pivots, sizes = np.diag(self._factor), np.sqrt(np.abs(np.diag(matrix)))
+        if info or np.any(pivots <= 1e-14 * sizes):
+            raise SingularMatrixError(
+                f"{name} is not positive definite: check for coincident elements and for supports that leave "
+                "the body free"
+            )
+
+    @classmethod
+    def from_lower(cls, lower: FloatArray) -> Cholesky:
+        """Take over a factor L computed earlier."""
+        factor = cls.__new__(cls)
+        factor._factor = np.asfortranarray(lower)
+        return factor
+
+    @property
+    def factorisation(self) -> Factorisation:
+        """What it took."""
+        return Factorisation(FactorKind.CHOLESKY, len(self._factor))
+
+    @property
+    def factorisations(self) -> tuple[Factorisation, ...]:
+        """The same as one of several."""
+        return (self.factorisation,)
+
+    @property
+    def iterations(self) -> tuple[()]:
+        """None: a factorisation does not iterate."""
+        return ()
+
+    @property
+    def lower(self) -> FloatArray:
+        """The factor L, zero above its diagonal."""
+        return np.tril(self._factor)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve A x = right."""
+        from scipy.linalg.lapack import dpotrs
+
+        if not right.size:  # a body in contact all round leaves nothing else to solve for, which LAPACK does not take
+            return np.zeros(right.shape)
+        return np.asarray(dpotrs(self._factor, right, lower=1)[0])
+
+    def solve_lower(self, right: FloatArray) -> FloatArray:
+        """Solve L x = right with A = L L^T."""
+        from scipy.linalg.lapack import dtrtrs
+
+        return np.asarray(dtrtrs(self._factor, right, lower=1)[0])
+
+    def solve_upper(self, right: FloatArray) -> FloatArray:
+        """Solve L^T x = right with A = L L^T."""
+        from scipy.linalg.lapack import dtrtrs
+
+        return np.asarray(dtrtrs(self._factor, right, lower=1, trans=1)[0])
+
+
+class DenseLU:
+    """Factor a general square matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+        Overwritten.
+    name : str
+        What the matrix stands for, for the message.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the matrix is singular to working precision.
+    """
+
+    def __init__(self, matrix: FloatArray, name: str) -> None:
+        from scipy.linalg.lapack import dgecon, dgetrf, dlange
+
+        # columns belong to elements: on graded meshes their sizes differ by the grading, which is no singularity
+        sizes = np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0))
+        self._column_sizes = np.where(sizes > 0.0, sizes, 1.0)
+        matrix /= self._column_sizes
+        # LAPACK stores by columns: a matrix that is stored by rows is factored as its transpose, without a copy
+        self._is_transposed = matrix.flags.c_contiguous and not matrix.flags.f_contiguous
+        stored = matrix.T if self._is_transposed else matrix
+        norm = float(dlange("1", stored))  # type: ignore[call-arg]  # the stubs lack its arguments
+        self._factor, self._pivots, info = dgetrf(stored, overwrite_a=1)
+        reciprocal_condition = 0.0 if info else dgecon(self._factor, norm)[0]
+        if not reciprocal_condition > 1e-15:
+            raise SingularMatrixError(
+                f"{name} is singular (reciprocal condition {reciprocal_condition:.1e}): "
+                "check that the supports and contacts hold it"
+            )
+
+    @property
+    def factorisation(self) -> Factorisation:
+        """What it took."""
+        return Factorisation(FactorKind.LU, len(self._factor))
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Solve A x = right."""
+        from scipy.linalg.lapack import dgetrs
+
+        solution = np.asarray(dgetrs(self._factor, self._pivots, right, trans=int(self._is_transposed))[0])
+        solution /= self._column_sizes[(slice(None), *[None] * (solution.ndim - 1))]
+        return solution

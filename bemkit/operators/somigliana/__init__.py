@@ -1,0 +1,1 @@
+"""Displacements and stresses inside a body by Somigliana's identity."""

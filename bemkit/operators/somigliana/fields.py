@@ -1,0 +1,276 @@
+r"""Fields inside a body from its boundary data, by the representation formula u = V t - K u.
+
+With complex displacements u = u_x + i u_y and z = x + i y, the formula is differentiated under the integral sign:
+
+    2 mu du/dz     = kappa Phi - conj(Phi)      (dilatation and rotation)
+    2 mu du/dzbar  = D                          (shears)
+    sigma_xx + sigma_yy = 4 Re Phi,    sigma_xx - sigma_yy + 2 i sigma_xy = 2 D
+
+(Kolosov and Muskhelishvili), where Phi and D are boundary integrals of the tractions and displacements. No division by
+1 - 2 nu occurs, so stresses hold for incompressible materials, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import comb
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.errors import InputError
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import BoundarySpace, local_coefficients
+from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.material import Material
+from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
+from bemkit.operators.somigliana.moments import (
+    CENTRE,
+    END,
+    START,
+    CurvedElements,
+    DisplacementMoments,
+    GradientMoments,
+    straight_displacement_moments,
+    straight_gradient_moments,
+)
+
+CHUNK_PAIRS = 8192
+
+
+class InteriorFields:
+    """Displacement, its gradient, strain and stress at points inside a body.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    displacement_space : BoundarySpace
+        Any space, discontinuous ones included.
+    displacement_dofs : (n_scalar, 2) array [m]
+        Boundary displacements.
+    traction_space : BoundarySpace
+    traction_dofs : (n_scalar, 2) array [Pa]
+        Boundary tractions, stress @ n with n out of the body.
+
+    Raises
+    ------
+    GeometryError
+        If a space lives on another mesh.
+    ValueError
+        If the dofs have the wrong shape or are not finite.
+
+    Notes
+    -----
+    Every method takes points strictly inside the body; `is_inside` tells which are. At a point outside or on the
+    boundary they raise `PointNotInsideError`, which names it. For the body outside of a closed boundary the fields
+    are those that vanish at infinity, up to the logarithm that belongs to a resultant force.
+
+    All integrals are exact to round-off: straight elements are integrated in closed form, curved ones by a rule that
+    follows the distance d of the point, and the displacement of the nearest boundary point is subtracted before the
+    strongly singular kernels act. On straight sides that holds at any distance; near curved elements the round-off
+    of the coordinates enters stresses as eps L / d (L the diameter of the body).
+
+    What limits the accuracy is the boundary data: the result is the exact field of the given piecewise polynomials.
+    Where these jump or kink, at a node between constant or linear elements, stresses of that field grow like log(d)
+    (jumps of tractions or kinks of displacements) or 1 / d (jumps of displacements). Closer to the boundary than
+    about one element length, stresses of discrete solutions are therefore to be read opposite the middle of elements.
+    """
+
+    def __init__(
+        self,
+        mesh: BoundaryMesh,
+        material: Material,
+        displacement_space: BoundarySpace,
+        displacement_dofs: FloatArray,
+        traction_space: BoundarySpace,
+        traction_dofs: FloatArray,
+    ) -> None:
+        self.mesh = mesh
+        self.material = material
+        self._displacement = _element_polynomials(mesh, displacement_space, displacement_dofs, "displacement")
+        self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
+        self._locator = Locator(mesh)
+        self._curved = CurvedElements(mesh, mesh.centre)
+        self._panels = Panels(mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1]))))
+
+    def is_inside(self, points: FloatArray) -> BoolArray:
+        """Return the (n,) mask of the (n, 2) points [m] that lie strictly inside the body."""
+        return self._locator.locate(_as_points(points)).is_inside
+
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement.
+
+        Parameters
+        ----------
+        points : (n, 2) array [m]
+            Points strictly inside the body.
+
+        Returns
+        -------
+        (n, 2) array [m]
+
+        Raises
+        ------
+        PointNotInsideError
+            Naming the first point that is not inside.
+        """
+        points = _as_points(points)
+        result = np.empty(len(points), complex)
+        for rows, x, reference in self._chunks(points):
+            # a constant displacement c is represented as c inside a bounded body, and as zero inside an exterior one
+            result[rows] = 0.0 if self.mesh.is_exterior else reference
+            for pair, element, is_curved in self._pairs(x.size):
+                moments = self._displacement_moments(x[pair], element, is_curved)
+                terms = self._displacement_terms(moments, element, reference[pair])
+                result[rows] += terms.reshape(x.size, -1).sum(axis=1)
+        return np.column_stack([result.real, result.imag])
+
+    def displacement_gradient(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; otherwise as `displacement`."""
+        potential, shear = self._potentials(points)
+        kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
+        along = (kappa * potential - potential.conj()) / two_mu
+        across = shear / two_mu
+        # du/dz = (u_x,x + u_y,y + i (u_y,x - u_x,y)) / 2, du/dzbar = (u_x,x - u_y,y + i (u_y,x + u_x,y)) / 2
+        first = np.column_stack([along.real + across.real, across.imag - along.imag])
+        second = np.column_stack([across.imag + along.imag, along.real - across.real])
+        return np.stack([first, second], axis=1)
+
+    def strain(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) strain, the symmetric part of the gradient; otherwise as `displacement`."""
+        gradient = self.displacement_gradient(points)
+        return 0.5 * (gradient + np.swapaxes(gradient, 1, 2))
+
+    def stress(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) stress [Pa]; otherwise as `displacement`."""
+        potential, shear = self._potentials(points)
+        middle, difference, off = 2.0 * potential.real, shear.real, shear.imag
+        return np.stack(
+            [np.column_stack([middle + difference, off]), np.column_stack([off, middle - difference])], axis=1
+        )
+
+    def _potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return Phi and D (n,) [Pa]."""
+        points = _as_points(points)
+        potential, shear = np.zeros(len(points), complex), np.zeros(len(points), complex)
+        for rows, x, reference in self._chunks(points):
+            for pair, element, is_curved in self._pairs(x.size):
+                moments = self._gradient_moments(x[pair], element, is_curved)
+                phi, d = self._gradient_terms(moments, element, reference[pair])
+                potential[rows] += phi.reshape(x.size, -1).sum(axis=1)
+                shear[rows] += d.reshape(x.size, -1).sum(axis=1)
+        return potential, shear
+
+    def _chunks(self, points: FloatArray) -> Iterator[tuple[slice, ComplexArray, ComplexArray]]:
+        """Yield slices of the points, their coordinates, and the displacements of the nearest boundary points."""
+        location = self._locator.locate(points)
+        _require_inside(location, points)
+        relative = points - self.mesh.centre
+        powers = location.xi[:, None] ** np.arange(self._displacement.shape[2])
+        reference = np.sum(self._displacement[CENTRE, location.element] * powers, axis=1)
+        step = max(1, CHUNK_PAIRS // self.mesh.n_elements)
+        for first in range(0, len(points), step):
+            rows = slice(first, min(first + step, len(points)))
+            yield rows, relative[rows, 0] + 1j * relative[rows, 1], reference[rows]
+
+    def _pairs(self, n_points: int) -> Iterator[tuple[IntArray, IntArray, bool]]:
+        """Yield all pairs of a point and an element: first those with straight, then those with curved elements."""
+        for is_curved in (False, True):
+            elements = np.flatnonzero(self.mesh.is_straight != is_curved)
+            if elements.size:
+                yield np.repeat(np.arange(n_points), elements.size), np.tile(elements, n_points), is_curved
+
+    @property
+    def _highest(self) -> int:
+        """Highest power of the local coordinate in the densities."""
+        return int(max(self._displacement.shape[2], self._traction.shape[2])) - 1
+
+    def _displacement_moments(self, x: ComplexArray, element: IntArray, is_curved: bool) -> DisplacementMoments:
+        """Evaluate the inner integrals of displacements."""
+        if is_curved:
+            return self._curved.displacement_moments(x, element, self._highest, self.mesh.diameter)
+        return straight_displacement_moments(self._panels, x, element, self._highest, self.mesh.diameter)
+
+    def _gradient_moments(self, x: ComplexArray, element: IntArray, is_curved: bool) -> GradientMoments:
+        """Evaluate the inner integrals of gradients."""
+        if is_curved:
+            return self._curved.gradient_moments(x, element, self._highest)
+        return straight_gradient_moments(self._panels, x, element, self._highest)
+
+    def _displacement_terms(
+        self, moments: DisplacementMoments, element: IntArray, reference: ComplexArray
+    ) -> ComplexArray:
+        """Return what each element adds to the displacement."""
+        kappa = self.material.kappa
+        factor = 1.0 / (np.pi * (kappa + 1.0))
+        result = np.zeros(element.size, complex)
+        for k, p in enumerate(self._traction[CENTRE, element].T):
+            diagonal = 0.5 * moments.measure[k] - kappa * moments.log[k]
+            single = diagonal * p + 0.5 * moments.quotient[k] * p.conj()
+            result += (0.5 * factor / self.material.shear_modulus) * single
+        for k, v in enumerate(self._displacement[CENTRE, element].T):
+            v = v - reference if k == 0 else v
+            own = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
+            result += (0.5j * factor) * (own * v - moments.turn[k] * v.conj())
+        return result
+
+    def _gradient_terms(
+        self, moments: GradientMoments, element: IntArray, reference: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return what each element adds to Phi and to D."""
+        kappa = self.material.kappa
+        factor = 1.0 / (np.pi * (kappa + 1.0))
+        potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
+        for k, p in enumerate(self._traction[moments.origin, element].T):
+            potential -= (0.5 * factor) * moments.reciprocal[k] * p
+            shear -= (0.5 * factor) * (kappa * moments.reciprocal[k].conj() * p + moments.spread[k] * p.conj())
+        double = 1j * factor * self.material.shear_modulus
+        for k, v in enumerate(self._displacement[moments.origin, element].T):
+            v = v - reference if k == 0 else v
+            potential -= double * moments.hyper[k] * v
+            shear += double * (moments.hyper[k].conj() * v - moments.twist[k] * v.conj())
+        return potential, shear
+
+
+def _as_points(points: FloatArray) -> FloatArray:
+    points = np.asarray(points, dtype=float)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        raise InputError(f"points has the shape {points.shape}: give an (n, 2) array of finite coordinates")
+    return points
+
+
+def _require_inside(location: Location, points: FloatArray) -> None:
+    wrong = np.flatnonzero(~location.is_inside)
+    if wrong.size:
+        first = int(wrong[0])
+        place = "on the boundary of" if location.is_on_boundary[first] else "outside of"
+        raise PointNotInsideError(
+            f"point {first} at ({points[first, 0]:.9g}, {points[first, 1]:.9g}) lies {place} the body "
+            f"({wrong.size} of {len(points)} points do not lie inside): select points with is_inside(points)"
+        )
+
+
+def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatArray, name: str) -> ComplexArray:
+    """Return the (3, n_elements, degree + 1) complex coefficients of a boundary field about centre, start and end."""
+    if space.mesh is not mesh:
+        raise GeometryError(f"{name}_space lives on another mesh: build it on the BoundaryMesh object given as mesh")
+    dofs = np.asarray(dofs, dtype=np.float64)
+    shape = (space.n_dofs // 2, 2)
+    if dofs.shape != shape or not np.isfinite(dofs).all():
+        raise InputError(
+            f"{name}_dofs has the shape {dofs.shape}{'' if dofs.shape != shape else ' and is not finite'}: "
+            f"give {shape} finite numbers, one row for each scalar dof"
+        )
+    values: ComplexArray = dofs[:, 0] + 1j * dofs[:, 1]
+    about_centre: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
+    powers = range(space.degree + 1)
+    result = np.zeros((3, *about_centre.shape), complex)
+    for origin, e in ((CENTRE, 0.0), (START, -1.0), (END, 1.0)):
+        for k in powers:
+            for j in range(k + 1):
+                result[origin, :, j] += comb(k, j) * e ** (k - j) * about_centre[:, k]
+    # the very value at the node, so that two elements agree there to the last bit
+    result[[START, END], :, 0] = (values[space.element_dofs] @ space.basis(np.array([-1.0, 1.0]))).T
+    return result

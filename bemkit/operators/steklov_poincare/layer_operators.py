@@ -1,0 +1,139 @@
+"""The boundary operators of a Galerkin map, and the products with S that they give without forming it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
+from bemkit.operators.counts import Entries, Work
+from bemkit.operators.linear.dense import Cholesky, multiply
+from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import resting_motions
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """S = hypersingular + strain^T V^-1 strain, V inverted on tractions without a resultant or a uniform pressure.
+
+    Parameters
+    ----------
+    single_layer : Cholesky
+        V = L L^T.
+    resultant : (n_traction_dofs, n_idle) array
+        Orthonormal; L^-T times its complement are the tractions that exert no resultant.
+    strain : (n_traction_dofs, n_dofs) array
+        1/2 M + K.
+    hypersingular : (n_dofs, n_dofs) array
+        W.
+    work : Work
+        What they took.
+    """
+
+    single_layer: Cholesky
+    resultant: FloatArray
+    strain: FloatArray
+    hypersingular: FloatArray
+    work: Work
+
+    def strained(self, displacement: FloatArray | None = None) -> FloatArray:
+        """Return L^-1 (1/2 M + K) u without its part along `resultant`, for the columns of u (n_dofs, m) or of 1."""
+        strain = self.strain if displacement is None else multiply(self.strain, displacement)
+        strained = self.single_layer.solve_lower(strain)
+        if self.resultant.shape[1]:
+            strained -= multiply(self.resultant, multiply(self.resultant.T, strained))
+        return strained
+
+    def tractions(self, displacement: FloatArray) -> FloatArray:
+        """Return the traction dofs of the columns of (n_dofs, m) displacements."""
+        return self.single_layer.solve_upper(self.strained(displacement))
+
+    def beyond_hypersingular(self, displacement: FloatArray) -> FloatArray:
+        """Return (S - W) u for the columns of (n_dofs, m) displacements."""
+        return multiply(self.strain.T, self.tractions(displacement))
+
+    def apply(self, displacement: FloatArray) -> FloatArray:
+        """Return S u for the columns of (n_dofs, m) displacements."""
+        return multiply(self.hypersingular, displacement) + self.beyond_hypersingular(displacement)
+
+
+def assemble_layers(
+    displacements: BoundarySpace, tractions: BoundarySpace, material: Material, pressures: FloatArray
+) -> Layers:
+    """Assemble V, K and W of a map and factor V.
+
+    Parameters
+    ----------
+    displacements, tractions : BoundarySpace
+    material : Material
+    pressures : (n_traction_dofs, n_pressures) array
+        Uniform pressures as traction dofs hold them; V is not inverted on those of an incompressible body.
+
+    Returns
+    -------
+    Layers
+        On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n alone.
+    """
+    u, t, mesh = displacements, tractions, displacements.mesh
+    v, k, w = single_layer(t, t, material), double_layer(u, t, material), hypersingular(u, u, material)
+    n_pairs = assemble(v, k, w)
+    work = Work(
+        element_pairs=n_pairs,
+        single_layer=Entries.full(t.n_dofs, t.n_dofs),
+        double_layer=Entries.full(t.n_dofs, u.n_dofs),
+        hypersingular=Entries.full(u.n_dofs, u.n_dofs),
+    )
+    is_compressible = not (material.is_incompressible or mesh.is_exterior)
+    annihilated = mass(t, t).matrix() @ pressures[:, : 0 if is_compressible else None]
+    kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
+    factor = Cholesky(_without_kernel(v.matrix(), kernel), "the single layer operator")
+    del v  # matrices are dropped as soon as they are used: there is room for few of them at once
+    identity = mass(u, t).matrix()
+    motions = resting_motions(mesh, dof_points(u))
+    resultants = identity @ motions
+    strain = 0.5 * identity
+    del identity
+    strain += k.matrix()
+    del k
+    # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
+    at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
+    strain = _without(strain, at_rest)
+    hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
+    dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
+    idle = np.column_stack([resultants, annihilated, strain @ dilatation])
+    resultant, _ = np.linalg.qr(factor.solve_lower(idle))
+    work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
+    return Layers(factor, resultant, strain, hyper, work)
+
+
+def dilatation_of(space: BoundarySpace) -> FloatArray:
+    """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
+    return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
+
+
+def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return the matrix made to vanish on some orthonormal motions (n_dofs, n_motions)."""
+    if not motions.shape[1]:
+        return matrix
+    return matrix - multiply(multiply(matrix, motions), np.ascontiguousarray(motions.T))
+
+
+def _unit_vectors(chosen: BoolArray) -> FloatArray:
+    """Return the unit vectors (n, n_chosen) of some dofs."""
+    rows = np.flatnonzero(chosen)
+    vectors = np.zeros((chosen.size, rows.size))
+    vectors[rows, np.arange(rows.size)] = 1.0
+    return vectors
+
+
+def _without_kernel(matrix: FloatArray, directions: FloatArray) -> FloatArray:
+    """Add a mean eigenvalue along directions that the matrix may annihilate; they are projected out later."""
+    if not directions.shape[1]:
+        return matrix
+    unit, _ = np.linalg.qr(directions)
+    raised: FloatArray = matrix + np.trace(matrix) / len(matrix) * unit @ unit.T
+    return raised

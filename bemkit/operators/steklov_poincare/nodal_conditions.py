@@ -1,0 +1,187 @@
+"""What is known at the displacement nodes of a body: fixed, free or open directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import InputError
+from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.rigid_modes import possible_motions, rigid_motions
+
+SMOOTH = 0.07
+"""Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
+their sum then differ by the factor tan(15 deg)^2."""
+CONFLICT = 1e-9
+"""Relative difference of two prescribed displacements at one node that round-off may explain."""
+HELD = 1e-6
+"""A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
+from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
+with a million times the load holds nothing."""
+
+
+class ConflictingSupportsError(InputError):
+    """Two boundary parts prescribe different displacements at their common node."""
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """Prescribed displacement components on some elements.
+
+    Parameters
+    ----------
+    name : str
+        The boundary part, for messages.
+    elements : (m,) array
+        Element numbers.
+    directions : (m, k, 2) or (m, n_local, k, 2) array
+        k = 1 or 2 unit directions on each element (both axes of a clamp), or at each node of each element (the normal
+        of a roller, which turns along curved elements).
+    displacement : callable, optional
+        (n, 2) points [m] -> (n, 2) displacement [m]; its components along the directions are prescribed. Zero if left
+        out.
+    """
+
+    name: str
+    elements: IntArray
+    directions: FloatArray
+    displacement: Callable[[FloatArray], FloatArray] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class NodalConditions:
+    """The conditions at every displacement node, in a local frame.
+
+    Parameters
+    ----------
+    frame : (n_nodes, 2, 2) array
+        Rows are the two orthonormal directions of the node.
+    is_fixed : (n_nodes, 2) bool array
+        Directions whose displacement is prescribed.
+    displacement : (n_nodes, 2) array [m]
+        The prescribed values, zero elsewhere.
+    is_open : (n_nodes, 2) bool array
+        Directions that are kept as unknowns (contact); everything else is free: its force is known.
+    """
+
+    frame: FloatArray
+    is_fixed: BoolArray
+    displacement: FloatArray
+    is_open: BoolArray
+
+    @property
+    def is_free(self) -> BoolArray:
+        """Directions whose force is known, (n_nodes, 2)."""
+        free: BoolArray = ~(self.is_fixed | self.is_open)
+        return free
+
+
+def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditions:
+    """Collect the supports at the nodes of a space; every other direction is free.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        The displacement space.
+    supports : sequence of Support
+
+    Returns
+    -------
+    NodalConditions
+        Frames are the coordinate axes wherever the supports allow it.
+
+    Raises
+    ------
+    ConflictingSupportsError
+        If parts prescribe different displacements at a node they share.
+    """
+    n_nodes = space.n_dofs // 2
+    points = dof_points(space)
+    supports = [*supports, *_mirrors(space)]
+    matrix, right = np.zeros((n_nodes, 2, 2)), np.zeros((n_nodes, 2))
+    for support in supports:
+        own = _directions_of(space, support)
+        values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
+        matrix += own
+        right += np.einsum("nij,nj->ni", own, values)
+    size, vectors = np.linalg.eigh(matrix)
+    rank = (size > 1e-9).sum(axis=1)
+    inverse = np.where(size > 1e-9, 1.0 / np.where(size > 1e-9, size, 1.0), 0.0)
+    displacement = np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right)
+    _check_agreement(space, supports, points, displacement)
+
+    direction = vectors[:, :, 1]
+    is_x = np.abs(direction[:, 0]) >= np.abs(direction[:, 1])
+    direction = direction * np.sign(np.where(is_x, direction[:, 0], direction[:, 1]))[:, None]
+    x_axis = np.where(is_x[:, None], direction, np.stack([direction[:, 1], -direction[:, 0]], axis=1))
+    x_axis[rank != 1] = (1.0, 0.0)
+    frame = np.stack([x_axis, np.stack([-x_axis[:, 1], x_axis[:, 0]], axis=1)], axis=1)
+    is_fixed = np.stack([(rank == 2) | ((rank == 1) & is_x), (rank == 2) | ((rank == 1) & ~is_x)], axis=1)
+    local = np.where(is_fixed, np.einsum("nkc,nc->nk", frame, displacement), 0.0)
+    return NodalConditions(frame, is_fixed, local, np.zeros((n_nodes, 2), bool))
+
+
+def _mirrors(space: BoundarySpace) -> list[Support]:
+    """Return the supports that stand for symmetry lines: no displacement across them."""
+    held = vanishing_dofs(space).reshape(-1, 2)[space.element_dofs]
+    elements = np.flatnonzero(held.any(axis=(1, 2)))
+    if not elements.size:
+        return []
+    return [Support("symmetry line", elements, np.where(held[elements], 1.0, 0.0)[..., None] * np.eye(2))]
+
+
+def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
+    """Return the projector (n_nodes, 2, 2) on the directions that one support fixes at each node."""
+    outer = np.einsum("...ki,...kj->...ij", support.directions, support.directions)
+    matrix = np.zeros((space.n_dofs // 2, 2, 2))
+    for local, dofs in enumerate(space.element_dofs[support.elements].T):
+        np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
+    size, vectors = np.linalg.eigh(matrix)
+    keep = np.where(size > SMOOTH * size[:, 1:], 1.0, 0.0)
+    projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
+    return projector
+
+
+def _check_agreement(
+    space: BoundarySpace, supports: Sequence[Support], points: FloatArray, displacement: FloatArray
+) -> None:
+    for support in supports:
+        own = _directions_of(space, support)
+        values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
+        miss = np.abs(np.einsum("nij,nj->ni", own, values - displacement)).max(axis=1)
+        worst = int(np.argmax(miss))
+        if miss[worst] > CONFLICT * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
+            x, y = points[worst]
+            raise ConflictingSupportsError(
+                f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
+                f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
+            )
+
+
+def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
+    """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+    conditions : NodalConditions
+
+    Returns
+    -------
+    (n_motions, n_nodes, 2) array
+        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `possible_motions`.
+    """
+    points = dof_points(space)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
+    motions = motions[:, :, list(possible_motions(space.mesh))]
+    fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
+    if fixed.size:
+        _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
+        n_held = int(np.count_nonzero(sizes >= HELD * np.sqrt(len(fixed))))
+        motions = motions @ directions[n_held:].T
+    return motions.transpose(2, 0, 1)

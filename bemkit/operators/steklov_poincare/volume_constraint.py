@@ -1,0 +1,81 @@
+"""Solutions for the free displacements of a body under the uniform pressure that goes with its change of volume."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.linear.solvers import Factor
+from bemkit.operators.steklov_poincare.nodes import rotate_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """How the volume of a body changes; the pressure is one more unknown: ``change.T @ u == yields * pressure``.
+
+    Parameters
+    ----------
+    change : (n_dofs, 0 or 1) array
+        By displacements; the pressure exerts the forces ``change * pressure``. No column for an exterior.
+    yields : float
+        By a unit pressure; zero if the body is incompressible. Dividing by it instead would cost the digits of nearly
+        incompressible bodies.
+    """
+
+    change: FloatArray
+    yields: float
+
+    def in_frames(self, frame: FloatArray) -> Volume:
+        """Return the same for displacements in the frames of the nodes."""
+        return replace(self, change=rotate_rows(self.change, frame))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldVolume:
+    """Solves for the free displacements and the pressure.
+
+    Parameters
+    ----------
+    stiffness : Factor
+        Of the free directions.
+    volume : (n_free, 0 or 1) array
+        Their change of volume.
+    yields : float
+        See `Volume`.
+    """
+
+    stiffness: Factor
+    volume: FloatArray
+    yields: float
+
+    @cached_property
+    def _compliance(self) -> tuple[FloatArray, FloatArray]:
+        """Displacements under a unit pressure, and the volume that they yield."""
+        displacement = self.stiffness.solve(self.volume)
+        yielded = self.volume.T @ displacement + self.yields
+        if yielded.size and not yielded.min() > 0.0:
+            raise SingularMatrixError(
+                "the incompressible body (poisson_ratio 0.5) has no free boundary to make room: leave a part free"
+            )
+        return displacement, yielded
+
+    def solve(self, right: FloatArray, volume: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and pressure for given forces (n_free, ...) and changes of volume (0 or 1, ...)."""
+        free = self.stiffness.solve(right)
+        if not self.volume.shape[1]:
+            return free, np.zeros(volume.shape)
+        displacement, yielded = self._compliance
+        pressure = (self.volume.T @ free - volume) / yielded[0, 0]
+        return free - displacement @ pressure, pressure
+
+
+def room(volume: FloatArray) -> FloatArray:
+    """Return the changes of volume (n_dofs, 0 or 1) without round-off.
+
+    What tangential motions change the volume by is round-off, and no room for an incompressible body.
+    """
+    return np.where(np.abs(volume) > 1e-14 * np.abs(volume).max(initial=0.0), volume, 0.0)

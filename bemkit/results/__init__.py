@@ -1,0 +1,1 @@
+"""Solutions: fields, estimated error, warnings, tables, pictures and files."""

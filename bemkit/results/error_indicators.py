@@ -1,0 +1,212 @@
+"""How far a Galerkin solution is from the exact one, judged from the solution itself.
+
+The exact solution has continuous strains along the boundary wherever tractions are continuous, and smooth tractions
+between corners and ends of boundary parts. Strains of the computed displacements jump from element to element, and
+computed tractions are constant or linear on each of them: by as much as jumps and steps tell, element by element, they
+are wrong. Where displacements are given, as on clamped sides, all of the error is in the tractions.
+
+What is estimated is the error of displacements u_h and tractions t_h together, in the norm in which the Galerkin method
+is stable, <W (u - u_h), u - u_h> + <V (t - t_h), t - t_h>: it is a(u - u_h, u - u_h), twice the elastic energy of the
+difference, where t_h is the exact traction of u_h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.reflection import unfolded
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, break_nodes, dof_points
+from bemkit.operators.rigid_modes import without_motion
+
+STRAIN_CALIBRATION = 1.0 / 64.0
+"""Factor between jumps of strains and squared errors: on linear and quadratic elements, uniform and graded, the square
+root of the sum then lies between 0.5 and 2 times the error."""
+TRACTION_CALIBRATION = (1.0 / 100.0, 1.0 / 3600.0)
+"""The same for steps of constant tractions and bends of linear ones. On a line <V t, t> is E' |t|^2 / (1.1 |k|) at the
+wave number k, of saw teeth h^3 |step|^2 / 115 for each element and of parabolas h^3 |bend|^2 / 5000; unequal elements
+leave somewhat more."""
+STEEPEST = 6.0
+"""Largest ratio of successive steps towards a corner: that of tractions like d**-0.5 on equal elements."""
+
+
+def squared_errors(
+    mesh: BoundaryMesh,
+    make_space: Callable[[BoundaryMesh], BoundarySpace],
+    displacement: FloatArray,
+    traction: FloatArray,
+    plane_modulus: float,
+) -> FloatArray:
+    """Estimate the squared error of each element in the energy norm.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    make_space : callable
+        Gives the space of the displacements on a mesh, continuous and of degree 1 or 2; tractions have a degree less.
+    displacement : (n_scalar, 2) array [m]
+    traction : (n_elements, 2) array [Pa]
+        Means of the elements.
+    plane_modulus : float [Pa]
+        E'.
+
+    Returns
+    -------
+    (n_elements,) array [J/m]
+        With those of the images that a symmetry adds they add up to the estimate of a(u - u_h, u - u_h).
+    """
+    half, whole = make_space(mesh), make_space(mesh.whole)
+    moved = unfolded(half, whole, displacement)
+    loaded = unfolded(ConstantSpace(mesh), ConstantSpace(mesh.whole), traction)
+    errors = element_errors(whole, moved, plane_modulus)
+    errors += traction_errors(mesh.whole, loaded, whole.degree - 1, plane_modulus)
+    return errors[: mesh.n_elements]
+
+
+def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus: float) -> FloatArray:
+    """Estimate the squared error of each element in the energy norm that shows in the displacements.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        Continuous displacements of degree 1 or 2.
+    displacement : (n_scalar, 2) array [m]
+    plane_modulus : float [Pa]
+        E'.
+
+    Returns
+    -------
+    (n_elements,) array [J/m]
+
+    Notes
+    -----
+    At a node between elements of lengths a and b whose strains du/ds differ by j the estimate is E' h^2 |j|^2 / 64,
+    h = 2 a b / (a + b), half of it for either element. Corners and ends of boundary parts are left out: there strains
+    may jump. So is the rigid motion of the body, which curved elements hold only as an interpolant.
+    """
+    mesh = space.mesh
+    before, after = mesh.node_elements.T
+    at_start, at_end = _end_slopes(space, without_motion(mesh, dof_points(space), displacement))
+    jump = np.sum((at_start[after] - at_end[before]) ** 2, axis=1)
+    jump[break_nodes(mesh)] = 0.0
+    at_nodes = 0.5 * STRAIN_CALIBRATION * plane_modulus * _node_lengths(mesh) ** 2 * jump
+    errors: FloatArray = at_nodes[mesh.elements].sum(axis=1)
+    return errors
+
+
+def traction_errors(mesh: BoundaryMesh, traction: FloatArray, degree: int, plane_modulus: float) -> FloatArray:
+    """Estimate the squared error of each element in the energy norm that shows in the tractions.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    traction : (n_elements, 2) array [Pa]
+        Means of the elements.
+    degree : int
+        Of the tractions on an element: 0 or 1.
+    plane_modulus : float [Pa]
+        E'.
+
+    Returns
+    -------
+    (n_elements,) array [J/m]
+
+    Notes
+    -----
+    Constant tractions that step by j from an element to the next one have the error h^2 |j|^2 / (100 E'), linear ones
+    whose means bend by d, the second difference, h^2 |d|^2 / (3600 E'). Towards corners and ends of boundary parts,
+    where tractions may be singular, steps and bends are continued as a geometric sequence into the last element.
+    """
+    if degree == 0:
+        steps = _steps(mesh, traction)
+        at_nodes = 0.5 * (_node_lengths(mesh) * np.nan_to_num(steps)) ** 2
+        inside, last = at_nodes[mesh.elements].sum(axis=1), _into_the_last(mesh, steps, of_nodes=True)
+    else:
+        bends = _bends(mesh, traction)
+        inside, last = (mesh.lengths * np.nan_to_num(bends)) ** 2, _into_the_last(mesh, bends, of_nodes=False)
+    return np.asarray(TRACTION_CALIBRATION[degree] / plane_modulus * (inside + (mesh.lengths * last) ** 2))
+
+
+def blind_elements(mesh: BoundaryMesh, degree: int) -> BoolArray:
+    """Tell which elements have too few neighbours on their piece of the boundary to estimate the error of tractions.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    degree : int
+        Of the tractions on an element: 0 or 1.
+
+    Returns
+    -------
+    (n_elements,) bool array
+        Between corners and ends of parts there must be two elements for a step, three for a bend.
+    """
+    whole = mesh.whole
+    if degree == 0:
+        is_blind = np.asarray(break_nodes(whole)[whole.elements].all(axis=1))
+    else:
+        ones = 1.0 + _bends(whole, np.zeros((whole.n_elements, 2)))
+        is_blind = np.isnan(ones) & (_into_the_last(whole, ones, of_nodes=False) == 0.0)
+    return is_blind[: mesh.n_elements]
+
+
+def _node_lengths(mesh: BoundaryMesh) -> FloatArray:
+    """Return the harmonic mean (n_nodes,) of the lengths of the two elements that meet at each node."""
+    before, after = mesh.node_elements.T
+    lengths: FloatArray = 2.0 / (1.0 / mesh.lengths[before] + 1.0 / mesh.lengths[after])
+    return lengths
+
+
+def _steps(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
+    """Return the sizes (n_nodes,) of the steps from element to element; NaN at corners and ends of parts."""
+    before, after = mesh.node_elements.T
+    steps = np.linalg.norm(traction[after] - traction[before], axis=1)
+    return np.where(break_nodes(mesh), np.nan, steps)
+
+
+def _bends(mesh: BoundaryMesh, traction: FloatArray) -> FloatArray:
+    """Return the second differences (n_elements,) at each element; NaN at corners and ends of parts."""
+    before, after = mesh.node_elements.T
+    distance = 0.5 * (mesh.lengths[before] + mesh.lengths[after])
+    slope = (traction[after] - traction[before]) / distance[:, None]
+    start, end = mesh.elements.T
+    curvature = np.linalg.norm(slope[end] - slope[start], axis=1) / (0.5 * (distance[start] + distance[end]))
+    is_break = break_nodes(mesh)
+    return np.where(is_break[start] | is_break[end], np.nan, mesh.lengths**2 * curvature)
+
+
+def _into_the_last(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> FloatArray:
+    """Continue sizes of nodes or of elements into the last elements before corners and ends of parts; else zero."""
+    squares = np.zeros(mesh.n_elements)
+    is_break = break_nodes(mesh)
+    for near, far in ((0, 1), (1, 0)):  # pieces begin there, and end there
+        last = np.flatnonzero(is_break[mesh.elements[:, near]])
+        node = mesh.elements[last, far]
+        neighbour = mesh.node_elements[node, far]
+        next_node = mesh.elements[neighbour, far]
+        places = (node, next_node) if of_nodes else (neighbour, mesh.node_elements[next_node, far])
+        squares[last] += _continued(*(sizes[place] for place in places)) ** 2
+    return np.sqrt(squares)
+
+
+def _continued(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return what precedes two sizes as in a geometric sequence; the first again if the second is NaN."""
+    divisor = np.fmax(second, first / STEEPEST)
+    return np.nan_to_num(np.divide(first**2, divisor, out=np.zeros_like(first), where=divisor > 0.0))
+
+
+def _end_slopes(space: BoundarySpace, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return du/ds (n_elements, 2) at the start and at the end of each element."""
+    mesh = space.mesh
+    ends = np.array([-1.0, 1.0])
+    slopes = np.einsum("pq,epc->eqc", _derivative(space, ends), displacement[space.element_dofs])
+    slopes /= mesh.jacobian(np.arange(mesh.n_elements), ends)[:, :, None]
+    return slopes[:, 0], slopes[:, 1]
+
+
+def _derivative(space: BoundarySpace, xi: FloatArray) -> FloatArray:
+    """Differentiate the local basis: (n_local, n_points); central differences are exact up to degree 2."""
+    return 0.5 * (space.basis(xi + 1.0) - space.basis(xi - 1.0))

@@ -1,0 +1,397 @@
+"""Figures of a solution: the deformed body, and displacements, tractions and status along the contact boundary.
+
+Without contact, the tractions along the whole boundary instead; see `bemkit.results.boundary_figure`.
+
+Drawn with matplotlib's object interface, so that no display and no global state is involved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import floor, log10
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
+from bemkit.geometry.reflection import unfolded
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.results.boundary_figure import draw_boundary_traction
+from bemkit.results.solution import Solution
+from bemkit.scene.scene import ConstantCollocation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
+BLUE, ORANGE, VERMILION, GREY = "#0072B2", "#E69F00", "#D55E00", "#9A9A9A"
+STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
+_STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "slip": "#000000", "stick": "#FFFFFF"})
+
+_EXAGGERATION = 0.08
+"""The largest displacement is drawn about this long, in diameters of the body."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Names of units on the axes.
+
+    Parameters
+    ----------
+    length, stress : str
+    """
+
+    length: str = "m"
+    stress: str = "Pa"
+
+
+def save_figures(solution: Solution, folder: str | Path, *, units: Units | None = None) -> tuple[Path, ...]:
+    """Draw all figures into a folder, which is made if need be.
+
+    Parameters
+    ----------
+    solution : Solution
+    folder : str or Path
+    units : Units, optional
+        Metre and pascal by default.
+
+    Returns
+    -------
+    tuple of Path
+        ``deformation.png``, and for each contact part ``contact-displacement.png``, ``contact-traction.png`` and
+        ``contact-status.png``, numbered if there are several; without contact ``boundary-traction.png``.
+
+    Raises
+    ------
+    OutputFileError
+        If the folder or a file in it cannot be written.
+    """
+    units = Units() if units is None else units
+    target = Path(folder)
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputFileError(f"{target}: the folder cannot be made ({error.strerror}): choose another") from error
+    figures = {"deformation": draw_deformation(solution, units=units)}
+    parts = list(dict.fromkeys(solution.contact.part))
+    if not parts:
+        figures["boundary-traction"] = draw_boundary_traction(solution, length=units.length, stress=units.stress)
+    for number, part in enumerate(parts, start=1):
+        suffix = f"-{number}" if len(parts) > 1 else ""
+        figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
+        figures[f"contact-traction{suffix}"] = draw_contact_traction(solution, part, units=units)
+        figures[f"contact-status{suffix}"] = draw_contact_status(solution, part, units=units)
+    return tuple(_save(figure, target / f"{name}.png") for name, figure in figures.items())
+
+
+def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figure:
+    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
+
+    Parameters
+    ----------
+    solution : Solution
+    units : Units, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from matplotlib.figure import Figure
+
+    units = Units() if units is None else units
+    mesh = solution.mesh.whole
+    displacement = node_displacement(solution)
+    factor = exaggeration(mesh.diameter, displacement)
+    deformed = mesh.nodes + factor * displacement
+    figure = Figure(figsize=(5.6, 5.6), layout="constrained")
+    axes = figure.add_subplot()
+    for number, loop in enumerate(mesh.loops):
+        order = np.append(mesh.elements[loop, 0], mesh.elements[loop[0], 0])
+        initial, enlarged = ("initial", f"deformed, displacements \u00d7 {factor:g}") if number == 0 else (None, None)
+        axes.plot(*mesh.nodes[order].T, color=GREY, linestyle="--", linewidth=1.2, label=initial)
+        axes.plot(*deformed[order].T, color=BLUE, linewidth=1.8, label=enlarged)
+    if not mesh.is_exterior:
+        _fill(axes, [deformed[mesh.elements[loop, 0]] for loop in mesh.loops])
+    _draw_symmetry_lines(axes, solution.mesh.symmetry)
+    axes.set_aspect("equal")
+    axes.margins(0.08)
+    _draw_obstacles(axes, solution)
+    axes.set_xlabel(f"$x$ [{units.length}]")
+    axes.set_ylabel(f"$y$ [{units.length}]")
+    axes.set_title(solution.scene.title, parse_math=False, fontsize=11)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def draw_contact_displacement(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
+    """Draw normal and tangential displacement and the gap along one contact part, above its status.
+
+    Parameters
+    ----------
+    solution : Solution
+    part : str
+        Name of the contact part.
+    units : Units, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    units = Units() if units is None else units
+    contact, chosen = solution.contact, _rows(solution, part)
+    s = contact.s[chosen]
+    figure, axes = _contact_axes(solution, part, units, "Displacements on the contact boundary")
+    axes.plot(s, contact.u_n[chosen], color=BLUE, label="normal $u_n$", **_LINE)
+    axes.plot(s, contact.u_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label="tangential $u_t$")
+    gap = contact.gap[chosen]
+    if np.any(np.isfinite(gap) & (gap != 0.0)):
+        axes.plot(s, _near(gap, solution, chosen), color="black", linestyle=":", linewidth=1.2, label="gap $g$")
+    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
+    axes.set_ylabel(f"displacement [{units.length}]")
+    axes.legend(frameon=False)
+    return figure
+
+
+def draw_contact_traction(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
+    """Draw normal and tangential traction and the friction bound along one contact part, above its status.
+
+    Parameters
+    ----------
+    solution : Solution
+    part : str
+        Name of the contact part.
+    units : Units, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    units = Units() if units is None else units
+    contact, chosen = solution.contact, _rows(solution, part)
+    s = contact.s[chosen]
+    figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
+    axes.plot(s, contact.sigma_n[chosen], color=BLUE, label=r"normal $\sigma_n$", **_LINE)
+    axes.plot(
+        s, contact.sigma_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label=r"tangential $\sigma_t$"
+    )
+    law = _friction_law(solution)
+    if not law.is_frictionless:
+        bound = _friction_bound(solution, law)[chosen]
+        axes.plot(s, bound, color="black", linestyle=":", linewidth=1.2, label="friction bound")
+        axes.plot(s, -bound, color="black", linestyle=":", linewidth=1.2)
+    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
+    axes.set_ylabel(f"traction [{units.stress}]")
+    axes.legend(frameon=False)
+    return figure
+
+
+def draw_contact_status(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
+    """Draw clearance and contact pressure along one contact part, above its status.
+
+    Parameters
+    ----------
+    solution : Solution
+    part : str
+        Name of the contact part.
+    units : Units, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    units = Units() if units is None else units
+    contact, chosen = solution.contact, _rows(solution, part)
+    s = contact.s[chosen]
+    figure, axes = _contact_axes(solution, part, units, "Contact pressure and clearance")
+    pressure = axes.plot(s, -contact.sigma_n[chosen], color=BLUE, label=r"pressure $-\sigma_n$ (left)", **_LINE)
+    axes.set_ylabel(f"pressure [{units.stress}]")
+    right = axes.twinx()
+    right.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
+    clearance = _near(contact.clearance[chosen], solution, chosen)
+    opening = right.plot(
+        s, clearance, color=VERMILION, linestyle="--", linewidth=1.6, label="clearance $g - u_n$ (right)"
+    )
+    right.set_ylabel(f"clearance [{units.length}]")
+    for each in (axes, right):
+        bottom, top = each.get_ylim()
+        each.set_ylim(bottom, top + 0.15 * (top - bottom))  # room for the legend
+    axes.legend(handles=[*pressure, *opening], frameon=False, loc="upper center", ncols=2)
+    return figure
+
+
+def exaggeration(diameter: float, displacement: FloatArray) -> float:
+    """Choose the factor 1, 2 or 5 times a power of ten by which displacements are drawn.
+
+    Parameters
+    ----------
+    diameter : float [m]
+    displacement : (n, 2) array [m]
+
+    Returns
+    -------
+    float
+        1 if there is no displacement.
+    """
+    largest = float(np.hypot(*displacement.T).max())
+    if not 0.0 < largest < np.inf:
+        return 1.0
+    wanted = _EXAGGERATION * diameter / largest
+    power = 10.0 ** floor(log10(wanted))
+    return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= wanted or step == 1.0)
+
+
+def node_displacement(solution: Solution) -> FloatArray:
+    """Return the displacement at the mesh nodes.
+
+    Parameters
+    ----------
+    solution : Solution
+
+    Returns
+    -------
+    (n_nodes, 2) array [m]
+        At the nodes of ``solution.mesh.whole``: given there directly, or interpolated between the two elements that
+        meet.
+    """
+    mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
+    displacement = unfolded(make_space(solution.mesh), make_space(mesh), solution.boundary.displacement)
+    if isinstance(solution.scene.discretisation, ConstantCollocation):
+        before, after = mesh.node_elements.T
+        share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
+        return np.asarray(share * displacement[before] + (1.0 - share) * displacement[after])
+    return displacement[: mesh.n_nodes]
+
+
+_LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "markersize": 2.0})
+
+
+def _rows(solution: Solution, part: str) -> BoolArray:
+    return np.array([name == part for name in solution.contact.part])
+
+
+def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
+    """Blank out distances to the obstacle that would dwarf the displacements."""
+    contact = solution.contact
+    largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
+    return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
+
+
+def _friction_law(solution: Solution) -> FrictionLaw:
+    contact = solution.contact
+    return solution.scene.law_at(contact.part, np.stack([contact.x, contact.y], axis=1))
+
+
+def _friction_bound(solution: Solution, law: FrictionLaw) -> FloatArray:
+    bound = law.bound(np.minimum(solution.contact.sigma_n, 0.0))
+    is_closed = np.array([word != "separated" for word in solution.contact.status_words()])
+    return np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)
+
+
+def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
+    """Return a figure with a large panel above a strip that shows the status along the part."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    axes, strip = figure.subplots(2, 1, sharex=True, height_ratios=[9, 1])
+    _draw_status(strip, solution, part)
+    strip.set_xlabel(f"arc length $s$ along '{part}' [{units.length}]", parse_math="$" not in part)
+    for transition in solution.transitions:
+        if transition.part == part:
+            axes.axvline(transition.s, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
+    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
+    axes.tick_params(labelbottom=False)
+    axes.set_title(f"{subject}\n{solution.scene.title}", parse_math=False, fontsize=11)
+    return figure, axes
+
+
+def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
+    """Paint the status along a part; name it where there is room, and in a legend where there is none."""
+    from matplotlib.patches import Patch
+
+    chosen = _rows(solution, part)
+    length = float(solution.mesh.lengths[solution.mesh.part(part)].sum())
+    transitions = [transition for transition in solution.transitions if transition.part == part]
+    first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]
+    words = [first, *(transition.to_status for transition in transitions)]
+    edges = [0.0, *(transition.s for transition in transitions), length]
+    named = set()
+    for (begin, end), word in zip(pairwise(edges), words, strict=True):
+        strip.axvspan(begin, end, color=STATUS_COLOURS[word], linewidth=0)
+        if end - begin > 0.12 * length:
+            style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": _STATUS_TEXT[word]}
+            strip.text((begin + end) / 2.0, 0.5, word, **style)
+            named.add(word)
+    handles = [Patch(color=colour, label=word) for word, colour in STATUS_COLOURS.items() if word in {*words} - named]
+    if handles:
+        strip.figure.legend(handles=handles, loc="outside lower right", ncols=3, frameon=False)
+    strip.set_xlim(0.0, length)
+    strip.set_ylim(0.0, 1.0)
+    strip.set_yticks([])
+
+
+def _fill(axes: Axes, loops: list[FloatArray]) -> None:
+    """Fill the inside of closed loops; holes run the other way round and stay open."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    outline = Outline.make_compound_path(*(Outline(np.vstack([loop, loop[:1]]), closed=True) for loop in loops))
+    axes.add_patch(PathPatch(outline, facecolor="#DCEBF5", edgecolor="none", zorder=1))
+
+
+def _draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
+    style: dict[str, Any] = {"color": "black", "linestyle": "-.", "linewidth": 0.8}
+    if symmetry is not None and symmetry.x is not None:
+        axes.axvline(symmetry.x, **style)
+    if symmetry is not None and symmetry.y is not None:
+        axes.axhline(symmetry.y, **style)
+
+
+def _draw_obstacles(axes: Axes, solution: Solution) -> None:
+    """Draw the rigid obstacles whose shape is known, within the frame that the body has set."""
+    from matplotlib.patches import Circle as Disc
+    from matplotlib.patches import Polygon
+
+    frame = np.array([axes.get_xlim(), axes.get_ylim()])
+    reach = 4.0 * float(np.hypot(*(frame[:, 1] - frame[:, 0])))
+    style: dict[str, Any] = {
+        "facecolor": "#EDEDED",
+        "edgecolor": "#555555",
+        "hatch": "////",
+        "linewidth": 1.0,
+        "zorder": 0,
+    }
+    is_labelled = False
+    for part in solution.scene.contact_parts:
+        label = None if is_labelled else "obstacle"
+        match getattr(part.condition, "obstacle", None):
+            case HalfPlane(point=point, normal=normal):
+                inward = -np.array(normal) / np.hypot(*normal)
+                along = np.array([-inward[1], inward[0]])
+                centre = np.array(point) + ((frame.mean(axis=1) - np.array(point)) @ along) * along
+                corners = [centre - reach * along, centre + reach * along]
+                corners += [corner + reach * inward for corner in reversed(corners)]
+                axes.add_patch(Polygon(corners, label=label, **style))
+            case Circle(centre=centre, radius=radius):
+                axes.add_patch(Disc(centre, radius, label=label, **style))
+            case Cavity(centre=centre, radius=radius):
+                axes.add_patch(Disc(centre, radius, label=label, fill=False, edgecolor="#555555", linewidth=1.0))
+            case _:
+                continue
+        is_labelled = True
+    axes.set_xlim(*frame[0])
+    axes.set_ylim(*frame[1])
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    target = check_target(path, "figure", lambda existing: existing.read_bytes()[:4] == b"\x89PNG")
+    with replacing(target) as temporary:
+        figure.savefig(temporary, format="png", dpi=150)
+    return path

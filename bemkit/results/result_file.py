@@ -1,0 +1,277 @@
+"""Result files: HDF5 with a versioned layout, written atomically, safe to read.
+
+A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
+stranger runs no code. The layout, version 1:
+
+    /                attributes format = "bemkit-result" and schema_version
+    /scene           text, the scene as TOML
+    /provenance, /summary, /certificate, /timings, /memory     attributes
+    /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
+                     with a symmetry also symmetry_x, symmetry_y;
+                     with curved elements also element_curve and element_span
+    /boundary        points, displacement, centres, traction
+    /contact, /transitions, /history, /plan, /work    tables: one dataset per column, all of one length;
+                     those of plan and work with numbers as attributes
+    /warnings, /plan/warnings    texts, one sentence each; a file without them has none
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.atomic_files import OutputFileError, check_target
+from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
+from bemkit.results.plan_file import read_plan, read_work, write_plan, write_work
+from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
+from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns, write_csv
+from bemkit.scene.scene import Scene
+from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
+from bemkit.solvers.base import Status, StepRecord
+from bemkit.version import __version__
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_csv", "write_result"]
+
+FORMAT = "bemkit-result"
+SCHEMA_VERSION = 1
+
+_COUNTS = ("linear_solves", "outer_steps")
+_FORCES = ("force_normal", "force_tangential", "energy")
+_NUMBERS = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "weight")
+_BOUNDARY = ("points", "displacement", "centres", "traction")
+
+
+def check_result_target(path: str | Path) -> Path:
+    """Find out, before any work is done, whether a result can be written to a file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    OutputFileError
+        If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
+    """
+    return check_target(Path(path), "bemkit result", _is_result)
+
+
+def write_result(path: str | Path, solution: Solution) -> None:
+    """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    solution : Solution
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written, or a file that is not a bemkit result stands in the way.
+    SceneError
+        If the scene holds a Python function, which a file cannot hold.
+    """
+    target = check_result_target(path)
+    text = scene_to_toml(solution.scene)
+    with created(target) as file:
+        write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
+        write_text(file, "scene", text)
+        write_attributes(file.create_group("provenance"), provenance())
+        write_attributes(file.create_group("summary"), _summary(solution))
+        write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
+        write_attributes(file.create_group("timings"), solution.timings)
+        _write_mesh(file.create_group("mesh"), solution.mesh)
+        for name in _BOUNDARY:
+            file.create_dataset(f"boundary/{name}", data=getattr(solution.boundary, name))
+        contact = {"part": list(solution.contact.part), **solution.contact.columns()}
+        write_table(file.create_group("contact"), contact)
+        write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
+        write_table(file.create_group("history"), history_columns(solution.history))
+        write_plan(file.create_group("plan"), solution.plan)
+        write_work(file.create_group("work"), solution.work)
+        write_attributes(file.create_group("memory"), solution.memory)
+        write_texts(file, "warnings", solution.warnings)
+
+
+def read_result(path: str | Path) -> Solution:
+    """Read a solution from a result file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ResultFileError
+        If the file is not a complete bemkit result of a known version.
+    """
+    with opened(Path(path)) as reader:
+        _check_version(reader)
+        try:
+            scene = scene_from_toml(reader.text("scene", MAX_BYTES), name="scene inside")
+        except SceneError as error:
+            raise reader.error(str(error)) from error
+        try:
+            solution = _read_solution(reader, scene)
+        except (ValueError, KeyError, OverflowError) as error:
+            raise reader.error(f"inconsistent content ({error})") from error
+    return solution
+
+
+def provenance() -> dict[str, str]:
+    """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
+    return {
+        "bemkit": __version__,
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
+        "platform": f"{platform.system()} {platform.machine()}",
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _is_result(path: Path) -> bool:
+    try:
+        with opened(path) as reader:
+            _check_version(reader)
+    except ResultFileError:
+        return False
+    return True
+
+
+def _check_version(reader: Reader) -> None:
+    marks = reader.attributes("/")
+    if marks.get("format") != FORMAT:
+        raise reader.error("an HDF5 file, but not a bemkit result: give a file written by 'bemkit run -o'")
+    version = marks.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise reader.error(
+            f"has layout version {version}, this bemkit {__version__} reads version {SCHEMA_VERSION}: "
+            "use the bemkit that wrote it, or run its scene again"
+        )
+
+
+def _summary(solution: Solution) -> dict[str, Any]:
+    numbers = {name: getattr(solution, name) for name in (*_COUNTS, *_FORCES)}
+    return {"status": solution.status.name, "message": solution.message, **numbers}
+
+
+def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
+    lines = {} if mesh.symmetry is None else {"symmetry_x": mesh.symmetry.x, "symmetry_y": mesh.symmetry.y}
+    lines = {name: place for name, place in lines.items() if place is not None}
+    write_attributes(group, {"is_exterior": int(mesh.is_exterior), **lines})
+    group["nodes"] = mesh.nodes
+    group["elements"] = mesh.elements.astype(np.int64)
+    if mesh.element_curve is not None and mesh.element_span is not None:
+        group["element_curve"] = mesh.element_curve.astype(np.int64)
+        group["element_span"] = mesh.element_span
+    counts = np.array([len(elements) for elements in mesh.parts.values()], dtype=np.int64)
+    write_table(group.create_group("parts"), {"name": list(mesh.parts), "n_elements": counts})
+    group["part_elements"] = np.concatenate([np.zeros(0, np.int64), *mesh.parts.values()]).astype(np.int64)
+
+
+def _read_mesh(reader: Reader, scene: Scene) -> BoundaryMesh:
+    parts_table = reader.table("mesh/parts", texts=("name",), integers=("n_elements",))
+    ends = np.cumsum(parts_table["n_elements"])
+    pieces = np.split(reader.integers("mesh/part_elements"), ends)
+    is_curved = reader.has("mesh/element_curve")
+    marks = reader.attributes("mesh")
+    x, y = marks.get("symmetry_x"), marks.get("symmetry_y")
+    return BoundaryMesh(
+        nodes=reader.floats("mesh/nodes"),
+        elements=reader.integers("mesh/elements"),
+        parts=dict(zip(parts_table["name"], pieces, strict=False)),
+        # the file names curves by their number in the outline; the outline itself is in the scene
+        curves=scene.build_mesh().curves if is_curved else (),
+        element_curve=reader.integers("mesh/element_curve") if is_curved else None,
+        element_span=reader.floats("mesh/element_span") if is_curved else None,
+        is_exterior=bool(marks["is_exterior"]),
+        symmetry=None if x is None and y is None else Symmetry(x=x, y=y),
+    )
+
+
+def _read_solution(reader: Reader, scene: Scene) -> Solution:
+    summary = reader.attributes("summary")
+    mesh = _read_mesh(reader, scene)
+    columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
+    boundary = BoundaryFields(*(reader.floats(f"boundary/{name}") for name in _BOUNDARY))
+    if len(boundary.centres) != mesh.n_elements:
+        raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
+    return Solution(
+        scene=scene,
+        mesh=mesh,
+        status=Status[str(summary["status"])],
+        certificate=Certificate(**_numbers(reader, "certificate", CERTIFICATE_ENTRIES)),
+        contact=ContactTable(**{**columns, "part": tuple(columns["part"])}),
+        boundary=boundary,
+        history=_read_history(reader),
+        linear_solves=int(summary["linear_solves"]),
+        outer_steps=int(summary["outer_steps"]),
+        force_normal=float(summary["force_normal"]),
+        force_tangential=float(summary["force_tangential"]),
+        energy=float(summary["energy"]),
+        transitions=_read_transitions(reader),
+        timings={name: float(value) for name, value in reader.attributes("timings").items()},
+        plan=read_plan(reader, scene),
+        work=read_work(reader),
+        memory={name: int(value) for name, value in reader.attributes("memory").items()},
+        message=str(summary["message"]),
+        warnings=reader.texts("warnings"),
+    )
+
+
+def _numbers(reader: Reader, group: str, names: Sequence[str]) -> dict[str, float]:
+    attributes = reader.attributes(group)
+    return {name: float(attributes[name]) for name in names}
+
+
+def _transition_columns(transitions: Sequence[Transition]) -> dict[str, Any]:
+    rows = [transition.as_dict() for transition in transitions]
+    texts = {name: [str(row[name]) for row in rows] for name in ("part", "from", "to")}
+    return texts | {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
+
+
+def _read_transitions(reader: Reader) -> tuple[Transition, ...]:
+    columns = reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s"))
+    return tuple(
+        Transition(row["part"], float(row["x"]), float(row["y"]), float(row["s"]), row["from"], row["to"])
+        for row in _rows(columns)
+    )
+
+
+def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
+    floats = ("relative_change", *CERTIFICATE_ENTRIES)
+    columns = reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS)
+    return tuple(
+        StepRecord(
+            **{name: int(row[name]) for name in RECORD_COUNTS},
+            certificate=Certificate(**{name: float(row[name]) for name in CERTIFICATE_ENTRIES}),
+            relative_change=float(row["relative_change"]),
+            message=row["message"],
+        )
+        for row in _rows(columns)
+    )
+
+
+def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]

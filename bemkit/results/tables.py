@@ -1,0 +1,147 @@
+"""Results as text: CSV tables and the JSON summary."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from types import MappingProxyType
+from typing import IO, Any
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.certificate import Certificate
+from bemkit.errors import InputError
+from bemkit.results.solution import Solution
+from bemkit.solvers.base import StepRecord
+
+TABLES = ("contact", "boundary", "history")
+CSV_STARTS: Mapping[str, str] = MappingProxyType(
+    {"contact": "x,y,s,u_n,", "boundary": "element,part,x,", "history": "step,linear_solves,"}
+)
+"""How the first line of each table begins, by which its files are recognised."""
+
+CERTIFICATE_ENTRIES = tuple(entry.name for entry in fields(Certificate))
+RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed")
+_CONTACT = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
+
+
+def write_csv(solution: Solution, table: str, stream: IO[str]) -> None:
+    """Write one table of a solution as comma-separated values with a header line.
+
+    Parameters
+    ----------
+    solution : Solution
+    table : str
+        ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
+        ``"history"``: one row per step of the solver.
+    stream : text file
+
+    Raises
+    ------
+    ValueError
+        If there is no table of that name.
+    """
+    if table not in TABLES:
+        raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
+    columns = _columns(solution, table)
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(_plain(column) for column in columns.values()), strict=True))
+
+
+def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
+    """Return the convergence history as columns, the certificate's entries among them.
+
+    Parameters
+    ----------
+    history : sequence of StepRecord
+
+    Returns
+    -------
+    dict of str to array or list of str
+    """
+    columns: dict[str, Any] = {
+        name: np.array([getattr(record, name) for record in history], dtype=np.int64) for name in RECORD_COUNTS
+    }
+    columns["relative_change"] = np.array([record.relative_change for record in history], dtype=float)
+    for name in CERTIFICATE_ENTRIES:
+        columns[name] = np.array([getattr(record.certificate, name) for record in history], dtype=float)
+    columns["message"] = [record.message for record in history]
+    return columns
+
+
+def to_json(solution: Solution) -> str:
+    """Return the summary as one JSON object; numbers that are not finite become null."""
+    return json.dumps(finite_only(solution.summary()), indent=2, allow_nan=False)
+
+
+def element_displacement(solution: Solution) -> FloatArray:
+    """Return the displacement at the element centres.
+
+    Parameters
+    ----------
+    solution : Solution
+
+    Returns
+    -------
+    (n_elements, 2) array [m]
+        Given there directly, or interpolated.
+    """
+    space = solution.scene.discretisation.displacement_space(solution.mesh)
+    at_centre = space.basis(np.zeros(1))[:, 0]
+    return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))
+
+
+def _columns(solution: Solution, table: str) -> dict[str, Any]:
+    match table:
+        case "contact":
+            contact = solution.contact
+            columns = {name: getattr(contact, name) for name in _CONTACT}
+            return columns | {"status": contact.status_words(), "part": list(contact.part)}
+        case "boundary":
+            return _boundary_columns(solution)
+        case _:
+            columns = dict(history_columns(solution.history))
+            columns["worst"] = np.array([record.certificate.worst for record in solution.history])
+            return columns
+
+
+def _boundary_columns(solution: Solution) -> dict[str, Any]:
+    names = [""] * solution.mesh.n_elements
+    for name, elements in solution.mesh.parts.items():
+        for element in elements.tolist():
+            names[element] = name
+    centres, traction = solution.boundary.centres, solution.boundary.traction
+    displacement = element_displacement(solution)
+    return {
+        "element": np.arange(solution.mesh.n_elements),
+        "part": names,
+        "x": centres[:, 0],
+        "y": centres[:, 1],
+        "u_x": displacement[:, 0],
+        "u_y": displacement[:, 1],
+        "t_x": traction[:, 0],
+        "t_y": traction[:, 1],
+    }
+
+
+def _plain(column: Any) -> list[Any]:
+    values: list[Any] = column.tolist() if isinstance(column, np.ndarray) else list(column)
+    return values
+
+
+def finite_only(value: Any) -> Any:
+    """Return tables, lists and numbers as JSON can hold them: numbers that are not finite become None."""
+    if isinstance(value, Mapping):
+        return {key: finite_only(item) for key, item in value.items()}
+    if isinstance(value, str):
+        return value
+    if isinstance(value, Iterable):
+        return [finite_only(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

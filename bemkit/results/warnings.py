@@ -1,0 +1,125 @@
+"""What a solution that is certified may still leave in doubt, in sentences for its reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import break_nodes
+from bemkit.results.error_indicators import blind_elements
+from bemkit.results.solution import ContactTable, Solution, are_neighbours
+from bemkit.scene.scene import Clamped, ConstantCollocation, PrescribedDisplacement, Roller
+
+LARGEST_ERROR = 0.05
+"""Estimated relative error above which a solution carries a warning."""
+LARGEST_SHARE_ALONE = 0.2
+"""Share of the boundary without an estimate above which the estimate of the whole says too little."""
+LARGEST_TURN = 50.0
+"""Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
+the estimate says 3 %; of 45 degrees it says enough."""
+FEWEST_NODES = 4
+"""Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
+
+
+def find_warnings(solution: Solution) -> tuple[str, ...]:
+    """Say what is doubtful about a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each doubt: what it is, its value and the remedy. Those of the plan come first.
+    """
+    if not solution.is_certified:
+        return solution.plan.warnings
+    return (*solution.plan.warnings, *_error(solution), *_coarse_curves(solution.mesh), *_narrow_zones(solution))
+
+
+def _error(solution: Solution) -> Iterator[str]:
+    """Doubt an estimated error that is large, and one that could not be made."""
+    if isinstance(solution.scene.discretisation, ConstantCollocation):
+        return
+    error = solution.estimated_error
+    if error is None:
+        energy = f"the elastic energy, {solution.energy:.1e} J/m, is not positive"
+        yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
+    elif error > LARGEST_ERROR:
+        yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
+    if (share := _share_alone(solution.mesh)) > LARGEST_SHARE_ALONE:
+        yield (
+            f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
+            "no error can be estimated: use more elements."
+        )
+    is_blind = blind_elements(solution.mesh, solution.plan.decisions.traction_degree)
+    for part in solution.scene.parts:
+        elements = solution.mesh.part(part.name)
+        if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
+            count = "1 element" if elements.size == 1 else f"{elements.size} elements"
+            yield (
+                f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
+                "use more elements there."
+            )
+
+
+def _share_alone(mesh: BoundaryMesh) -> float:
+    """Return the share of the boundary on elements without a neighbour on their piece, whose strains meet no others."""
+    whole = mesh.whole
+    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
+    return float(whole.lengths[is_alone].sum() / whole.lengths.sum())
+
+
+def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
+    """Doubt elements that go around a large part of a circle: their error is not yet that of short elements."""
+    curved = np.flatnonzero(~mesh.is_straight)
+    if not curved.size:
+        return
+    before, middle, after = np.moveaxis(mesh.normals_at(curved, np.array([-1.0, 0.0, 1.0])), 1, 0)
+    cosines = np.stack([np.sum(before * middle, axis=1), np.sum(middle * after, axis=1)])
+    turn = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).sum(axis=0)
+    if turn.max() > LARGEST_TURN:
+        x, y = mesh.centres[curved[np.argmax(turn)]]
+        yield (
+            f"The boundary turns by {turn.max():.0f} degrees on one element, near ({x:.4g}, {y:.4g}), where no error "
+            "estimate holds: use more elements there."
+        )
+
+
+def _narrow_zones(solution: Solution) -> Iterator[str]:
+    """Doubt zones of contact, stick and slip of few nodes; of parts without friction zones of contact alone."""
+    words = np.array(solution.contact.status_words(), dtype=object)
+    is_closed = words != "separated"
+    for part in dict.fromkeys(solution.contact.part):
+        own = np.array([name == part for name in solution.contact.part])
+        kinds = {"contact": own & is_closed}
+        if not solution.scene.laws[part].is_frictionless:
+            kinds |= {word: own & (words == word) for word in ("stick", "slip")}
+        reported = np.zeros(own.size, bool)
+        for kind, chosen in kinds.items():
+            narrow = [zone for zone in _zones(solution.contact, chosen) if zone.size < FEWEST_NODES]
+            narrow = [zone for zone in narrow if not reported[zone].all()]
+            if narrow:
+                reported[np.concatenate(narrow)] = True
+                yield _narrow(part, kind, [solution.contact.s[zone] for zone in narrow])
+
+
+def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
+    """Return the runs of chosen nodes that follow each other on one piece of a part."""
+    nodes = np.flatnonzero(chosen)
+    is_end = [nodes[k + 1] != nodes[k] + 1 or not are_neighbours(contact, int(nodes[k])) for k in range(nodes.size - 1)]
+    return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
+
+
+def _narrow(part: str, kind: str, zones: Sequence[FloatArray]) -> str:
+    nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
+    n_more, middle = len(zones) - 1, float(zones[0].mean())
+    more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
+    return (
+        f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: use more elements there, or give "
+        "an accuracy."
+    )

@@ -1,0 +1,67 @@
+"""Nested iteration: solve on a coarse mesh first, and start each finer mesh from the solution before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from bemkit.errors import InputError
+from bemkit.plan import check_elements
+from bemkit.results.solution import Solution
+from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.run import run
+from bemkit.scene.scene import Scene
+from bemkit.solvers.base import StepRecord
+
+
+class CascadeError(InputError):
+    """A scene that cannot be solved on one mesh after the other."""
+
+
+def run_cascade(
+    scene: Scene, *, coarsest: int = 40, callback: Callable[[StepRecord], None] | None = None
+) -> tuple[Solution, ...]:
+    """Solve a scene on meshes of growing size, ending with its own.
+
+    The number of linear solves on the finest mesh then hardly depends on its size, and the coarser meshes together
+    cost less than a sixth of it.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a single load factor.
+    coarsest : int
+        The number of elements is halved as long as it stays at least this large.
+    callback : callable, optional
+        Receives a record of every step on every mesh.
+
+    Returns
+    -------
+    tuple of Solution
+        From the coarsest mesh to the scene's own, which comes last. A mesh that fails starts the next one cold.
+
+    Raises
+    ------
+    CascadeError
+        If the scene has a load history, whose memory belongs to one mesh, or no contact.
+    ValueError
+        If `coarsest` is too small for any mesh, or for the reasons of `bemkit.run`.
+    """
+    if coarsest < 3:
+        raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
+    if not scene.contact_parts:
+        raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
+    if len(scene.load_factors) > 1:
+        raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
+    if scene.mesh.accuracy is not None:
+        return run_adaptive(scene, callback=callback)
+    check_elements(scene)
+    counts = [scene.mesh.n_elements]
+    while counts[-1] // 2 >= coarsest:
+        counts.append(counts[-1] // 2)
+    solutions: list[Solution] = []
+    for count in reversed(counts):
+        level = scene if count == counts[0] else replace(scene, mesh=replace(scene.mesh, elements=count))
+        start = solutions[-1] if solutions and solutions[-1].is_converged else None
+        solutions.append(run(level, start=start, callback=callback))
+    return tuple(solutions)

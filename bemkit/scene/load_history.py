@@ -1,0 +1,82 @@
+"""Load histories: one scene after the other, with slip counted from the end of the step before.
+
+The static law judges slip by the total displacement, as if the whole load came at once. Real loads grow, and friction
+remembers: under the incremental law a point that stuck under the first tenth of the load keeps that place as its new
+origin. For a cylinder pressed into a block the two laws differ by a factor of two in the size of the stick zone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from bemkit.arrays import FloatArray
+from bemkit.formulas import Expression, ScalarField
+from bemkit.scene.scene import Condition, PrescribedDisplacement, Pressure, Scene, Traction
+
+
+def load_steps(scene: Scene) -> tuple[Scene, ...]:
+    """Return the steps of a scene's load history, each a scene of its own with a single load.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Scene
+        As many as there are load factors.
+    """
+    if scene.load_factors == (1.0,):
+        return (scene,)
+    return tuple(with_scaled_loads(scene, factor) for factor in scene.load_factors)
+
+
+def with_scaled_loads(scene: Scene, factor: float) -> Scene:
+    """Return a scene whose tractions, pressures and prescribed displacements are multiplied by a number.
+
+    Parameters
+    ----------
+    scene : Scene
+    factor : float
+
+    Returns
+    -------
+    Scene
+        With the load factor 1; obstacles and the law are unchanged.
+    """
+    parts = tuple(replace(part, condition=_scaled(part.condition, factor)) for part in scene.parts)
+    return replace(scene, parts=parts, load_factors=(1.0,))
+
+
+@dataclass(frozen=True)
+class _ScaledFunction:
+    """A function of the coordinates times a number."""
+
+    function: Callable[[FloatArray, FloatArray], FloatArray]
+    factor: float
+
+    def __call__(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        return self.factor * self.function(x, y)
+
+
+def _scaled(condition: Condition, factor: float) -> Condition:
+    match condition:
+        case _ if factor == 1.0:
+            return condition
+        case Traction(x, y):
+            return Traction(_times(factor, x), _times(factor, y))
+        case Pressure(pressure, shear):
+            return Pressure(_times(factor, pressure), _times(factor, shear))
+        case PrescribedDisplacement(x, y):
+            scaled = [None if value is None else _times(factor, value) for value in (x, y)]
+            return PrescribedDisplacement(*scaled)
+    return condition
+
+
+def _times(factor: float, value: ScalarField) -> ScalarField:
+    if isinstance(value, Expression):
+        return Expression(f"{factor!r} * ({value.text})")
+    if callable(value):
+        return _ScaledFunction(value, factor)
+    return factor * value

@@ -1,0 +1,118 @@
+"""How the boundary of a scene is divided into elements."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from bemkit.errors import InputError
+from bemkit.geometry.grading import Grading, Uniform
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import discretise
+from bemkit.geometry.meshing.partition import Partition, first_partition
+from bemkit.geometry.outline import Outline
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.symmetry import Symmetry
+
+DEFAULT_ELEMENTS = 320
+"""Elements where neither a number nor an accuracy is given."""
+FIRST_ELEMENTS = 40
+"""About the size of the first mesh where the accuracy decides."""
+MOST_ELEMENTS = 1500
+"""Where the search for an accuracy ends unless another number is given."""
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """How the boundary is divided: into a number of elements, or until an accuracy is reached.
+
+    Parameters
+    ----------
+    elements : int, optional
+        Number of boundary elements in total; 320 if neither this nor an accuracy is given. Of a scene with a symmetry
+        these are the elements of the whole body, of which a half or a quarter carries unknowns.
+    grading : Grading
+        Distribution along each piece between corners and ends of parts.
+    density : mapping of str to float
+        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
+    accuracy : float, optional
+        Wanted error in the energy norm relative to the solution, instead of a number of elements. Meshes then follow
+        the solution: see `bemkit.runs.adaptive.run_adaptive`.
+    most_elements : int, optional
+        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Of a scene with
+        a symmetry these are the elements with unknowns.
+    most_seconds : float, optional [s]
+        No mesh is begun that would take longer, all meshes counted; no limit if left out.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, or one is given that does not go with the others.
+    """
+
+    elements: int | None = None
+    grading: Grading = field(default_factory=Uniform)
+    density: Mapping[str, float] = field(default_factory=dict)
+    accuracy: float | None = None
+    most_elements: int | None = None
+    most_seconds: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.accuracy is None:
+            self._check_without_accuracy()
+            return
+        if self.elements is not None:
+            raise InputError(
+                f"elements is {self.elements} and accuracy is {self.accuracy}: give one of them, the other follows"
+            )
+        if self.grading != Uniform() or self.density:
+            raise InputError(f"accuracy is {self.accuracy}: leave out grading and density, they follow the solution")
+        if not 0.0 < self.accuracy < 1.0:
+            raise InputError(f"accuracy is {self.accuracy}: give a relative error between 0 and 1, such as 1e-3")
+        if self.most_elements is not None and not FIRST_ELEMENTS <= self.most_elements <= 1_000_000:
+            raise InputError(f"most_elements is {self.most_elements}: give a number from {FIRST_ELEMENTS} to 1000000")
+        if self.most_seconds is not None and not self.most_seconds > 0.0:
+            raise InputError(f"most_seconds is {self.most_seconds}: give a positive time")
+
+    def _check_without_accuracy(self) -> None:
+        for name in ("most_elements", "most_seconds"):
+            if getattr(self, name) is not None:
+                raise InputError(f"{name} is {getattr(self, name)}: it limits an accuracy, which is not given")
+        if self.elements is None:
+            object.__setattr__(self, "elements", DEFAULT_ELEMENTS)
+        elif not 3 <= self.elements <= 1_000_000:
+            raise InputError(f"elements is {self.elements}: give a number from 3 to 1000000")
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements to begin with: `elements`, or those of the first mesh if the accuracy decides."""
+        return FIRST_ELEMENTS if self.elements is None else self.elements
+
+    def first_partition(
+        self,
+        outline: Outline,
+        parts: Mapping[str, Selection],
+        contact: Collection[str],
+        symmetry: Symmetry | None = None,
+    ) -> Partition:
+        """Divide an outline for the first time if the accuracy decides; `contact` names the contact parts."""
+        return first_partition(outline, parts, FIRST_ELEMENTS, even=contact, symmetry=symmetry)
+
+    def divide(
+        self,
+        outline: Outline,
+        parts: Mapping[str, Selection],
+        contact: Collection[str],
+        symmetry: Symmetry | None = None,
+    ) -> BoundaryMesh:
+        """Divide an outline, for the first time if the accuracy decides; `contact` names the contact parts."""
+        if self.elements is None:
+            return self.first_partition(outline, parts, contact, symmetry).mesh
+        return discretise(
+            outline,
+            n_elements=self.elements,
+            parts=parts,
+            grading=self.grading,
+            density=self.density,
+            symmetry=symmetry,
+        )

@@ -1,0 +1,183 @@
+"""The words by which scene files name classes, and the entry points by which other packages add words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, is_dataclass
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+
+from bemkit.errors import InputError
+from bemkit.formulas import closest, shorten
+
+
+@dataclass(frozen=True)
+class Family:
+    """Classes of one role and the words that name them in scene files.
+
+    Parameters
+    ----------
+    role : str
+        What the classes are, for messages: "friction law".
+    built_in : mapping of str to str
+        Word to ``"module:Class"``; a module is imported when its word is first met.
+    group : str
+        Name of the entry-point group by which installed packages add classes; empty if there is none.
+    """
+
+    role: str
+    built_in: Mapping[str, str] = field(repr=False)
+    group: str = ""
+
+    def find(self, kind: str) -> type:
+        """Return the class that a word names.
+
+        Raises
+        ------
+        ValueError
+            If nothing of that name is built in or installed, listing the known words; or if what is installed under
+            the name cannot be imported or is not a dataclass.
+        """
+        if kind in self.built_in:
+            return self._load(EntryPoint(kind, self.built_in[kind], self.group))
+        installed = self._installed()
+        if kind in installed:
+            return self._load(installed[kind])
+        known = [*self.built_in, *installed]
+        raise InputError(
+            f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{closest(kind, known)}"
+        )
+
+    def kind_of(self, value: object) -> str:
+        """Return the word that names the class of a value.
+
+        Raises
+        ------
+        ValueError
+            If the class has no word, so that it cannot be written to a scene file.
+        """
+        name = f"{type(value).__module__}:{type(value).__qualname__}"
+        for kind, reference in self.built_in.items():
+            if reference == name:
+                return kind
+        for kind, point in self._installed().items():
+            if kind not in self.built_in and self._load(point) is type(value):
+                return kind
+        hint = f"register it under the entry-point group '{self.group}'" if self.group else "use a built-in one"
+        raise InputError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
+
+    def _installed(self) -> dict[str, EntryPoint]:
+        return {point.name: point for point in entry_points(group=self.group)} if self.group else {}
+
+    def _load(self, point: EntryPoint) -> type:
+        try:
+            loaded = point.load()
+        except (ImportError, AttributeError) as error:
+            raise InputError(f"{self.role} '{point.name}' ({point.value}) cannot be loaded: {error}") from error
+        if not (isinstance(loaded, type) and is_dataclass(loaded)):
+            raise InputError(f"{self.role} '{point.name}' ({point.value}) is not a dataclass: make it one")
+        return loaded
+
+
+SHAPES = Family(
+    "shape",
+    MappingProxyType(
+        {
+            "rectangle": "bemkit.geometry.shapes:Rectangle",
+            "polygon": "bemkit.geometry.shapes:Polygon",
+            "disk": "bemkit.geometry.shapes:Disk",
+            "sector": "bemkit.geometry.shapes:Sector",
+            "ring": "bemkit.geometry.shapes:Ring",
+            "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
+            "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
+        }
+    ),
+    "bemkit.shapes",
+)
+
+GRADINGS = Family(
+    "grading",
+    MappingProxyType(
+        {
+            "uniform": "bemkit.geometry.grading:Uniform",
+            "algebraic": "bemkit.geometry.grading:Algebraic",
+            "geometric": "bemkit.geometry.grading:Geometric",
+        }
+    ),
+)
+
+CONDITIONS = Family(
+    "condition",
+    MappingProxyType(
+        {
+            "clamped": "bemkit.scene.scene:Clamped",
+            "roller": "bemkit.scene.scene:Roller",
+            "displacement": "bemkit.scene.scene:PrescribedDisplacement",
+            "traction": "bemkit.scene.scene:Traction",
+            "pressure": "bemkit.scene.scene:Pressure",
+            "contact": "bemkit.scene.scene:Contact",
+        }
+    ),
+)
+
+OBSTACLES = Family(
+    "obstacle",
+    MappingProxyType(
+        {
+            "half-plane": "bemkit.contact.obstacle:HalfPlane",
+            "circle": "bemkit.contact.obstacle:Circle",
+            "cavity": "bemkit.contact.obstacle:Cavity",
+            "polygon": "bemkit.contact.obstacle:PolygonalObstacle",
+            "gap": "bemkit.contact.obstacle:Gap",
+        }
+    ),
+    "bemkit.obstacles",
+)
+
+LAWS = Family(
+    "friction law",
+    MappingProxyType(
+        {
+            "frictionless": "bemkit.contact.laws:Frictionless",
+            "tresca": "bemkit.contact.laws:Tresca",
+            "coulomb": "bemkit.contact.laws:Coulomb",
+            "cohesive-coulomb": "bemkit.contact.laws:CohesiveCoulomb",
+        }
+    ),
+    "bemkit.laws",
+)
+
+DISCRETISATIONS = Family(
+    "discretisation",
+    MappingProxyType(
+        {
+            "linear": "bemkit.scene.discretisation:LinearGalerkin",
+            "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
+            "constant": "bemkit.scene.discretisation:ConstantCollocation",
+        }
+    ),
+)
+
+LINEAR_SOLVERS = Family(
+    "linear solver",
+    MappingProxyType(
+        {
+            "automatic": "bemkit.operators.linear.solvers:Automatic",
+            "direct": "bemkit.operators.linear.solvers:DenseCholesky",
+            "krylov": "bemkit.operators.linear.solvers:Krylov",
+        }
+    ),
+)
+
+SOLVERS = Family(
+    "solver",
+    MappingProxyType(
+        {
+            "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
+            "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
+            "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
+            "lemke": "bemkit.testing.lemke:LemkePivoting",
+        }
+    ),
+    "bemkit.solvers",
+)

@@ -1,0 +1,386 @@
+"""What the user states: the body, its boundary parts, loads, obstacles, the friction law, mesh and solver.
+
+Everything here is a frozen value. A scene can be written in Python or as a TOML file (`bemkit.scene.toml`), and either
+form can be turned into the other. All quantities are in one consistent set of units, for example m, N and Pa.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.laws import FrictionLaw, Frictionless
+from bemkit.contact.obstacle import Obstacle
+from bemkit.contact.piecewise_law import PartwiseLaw
+from bemkit.contact.problem import LawError
+from bemkit.errors import InputError
+from bemkit.formulas import Expression, ScalarField, check_field, closest, evaluate_field
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.shapes import Shape
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverWish
+from bemkit.operators.material import Material
+from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
+from bemkit.scene.discretisation import Discretisation as Discretisation
+from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
+from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
+from bemkit.scene.mesh_options import MeshOptions as MeshOptions
+from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.ssn import SemismoothNewton
+
+Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
+"""A condition on the coordinates, such as ``Expression("x > 0.5")``."""
+
+
+LARGEST_KRYLOV_ERROR = 1e-4
+"""Largest relative error of conjugate gradients: energies and forces on the contact boundary err by its square."""
+
+
+class NoContactError(InputError):
+    """A question about contact, asked of a scene without any."""
+
+
+@dataclass(frozen=True)
+class Clamped:
+    """Both displacement components are zero."""
+
+
+@dataclass(frozen=True)
+class Roller:
+    """The normal displacement and the tangential traction are zero (also the condition on a symmetry line)."""
+
+
+@dataclass(frozen=True)
+class PrescribedDisplacement:
+    """Displacement components are given; a component that is left out is free of traction.
+
+    Parameters
+    ----------
+    x, y : float, Expression, callable or None [m]
+
+    Raises
+    ------
+    ValueError
+        If both are left out, or one is not a finite number, a formula or a function.
+    """
+
+    x: ScalarField | None = None
+    y: ScalarField | None = None
+
+    def __post_init__(self) -> None:
+        if self.x is None and self.y is None:
+            raise InputError("neither x nor y is given: give at least one displacement component, such as y = -0.01")
+        for name in ("x", "y"):
+            if getattr(self, name) is not None:
+                check_field(getattr(self, name), name)
+
+    @property
+    def is_prescribed(self) -> tuple[bool, bool]:
+        """Which of the components x and y are given."""
+        return self.x is not None, self.y is not None
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement at (n, 2) points [m] as an (n, 2) array [m]; free components are zero."""
+        components = [np.zeros(len(points)) if value is None else evaluate_field(value, points) for value in self._xy]
+        return np.stack(components, axis=1)
+
+    @property
+    def _xy(self) -> tuple[ScalarField | None, ScalarField | None]:
+        return self.x, self.y
+
+
+@dataclass(frozen=True)
+class Traction:
+    """A load per area in the directions x and y.
+
+    Parameters
+    ----------
+    x, y : float, Expression or callable [Pa]
+
+    Raises
+    ------
+    ValueError
+        If one is not a finite number, a formula or a function.
+    """
+
+    x: ScalarField = 0.0
+    y: ScalarField = 0.0
+
+    def __post_init__(self) -> None:
+        check_field(self.x, "x")
+        check_field(self.y, "y")
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the traction at (n, 2) points [m] as an (n, 2) array [Pa]; the normals do not matter."""
+        return np.stack([evaluate_field(self.x, points), evaluate_field(self.y, points)], axis=1)
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """A load against the outward normal, and optionally along the boundary.
+
+    Parameters
+    ----------
+    pressure : float, Expression or callable [Pa]
+        Positive when it pushes the body inwards.
+    shear : float, Expression or callable [Pa]
+        Positive along the anticlockwise traversal of the boundary.
+
+    Raises
+    ------
+    ValueError
+        If one is not a finite number, a formula or a function.
+    """
+
+    pressure: ScalarField
+    shear: ScalarField = 0.0
+
+    def __post_init__(self) -> None:
+        check_field(self.pressure, "pressure")
+        check_field(self.shear, "shear")
+
+    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
+        tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+        pressure = evaluate_field(self.pressure, points)[:, None]
+        return evaluate_field(self.shear, points)[:, None] * tangents - pressure * normals
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The part may touch a rigid obstacle.
+
+    Parameters
+    ----------
+    obstacle : Obstacle
+    law : FrictionLaw, optional
+        The friction law on this part; the scene's law if left out.
+    """
+
+    obstacle: Obstacle
+    law: FrictionLaw | None = None
+
+
+Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
+
+
+@dataclass(frozen=True)
+class Part:
+    """A named piece of the boundary with its condition.
+
+    Parameters
+    ----------
+    name : str
+    condition : Condition
+    sides : tuple of str
+        Names of sides of the shape; empty means all sides.
+    where : Expression, callable or None
+        Keeps only the points where it is true; the ends are found to round-off and become mesh nodes.
+
+    Raises
+    ------
+    ValueError
+        If the name is empty, or `where` is not a condition.
+    """
+
+    name: str
+    condition: Condition
+    sides: tuple[str, ...] = ()
+    where: Region | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name or not self.name.isprintable():
+            raise InputError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
+        if isinstance(self.where, Expression) and not self.where.is_condition:
+            raise InputError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
+
+    @property
+    def selection(self) -> Selection:
+        """The piece of the outline that the part covers."""
+        return Selection(sides=self.sides, where=self.where)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One body with its supports, loads and contacts: everything that determines the solution.
+
+    Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity alone.
+
+    Parameters
+    ----------
+    title : str
+    shape : Shape
+    material : Material
+    parts : tuple of Part
+        They must not overlap (checked when the boundary is divided).
+    law : FrictionLaw
+        On all contact parts that have no law of their own.
+    load_factors : tuple of float
+        The load history: all tractions, pressures and prescribed displacements times these numbers, one step after
+        the other. A single number (the default is 1) is the static law, which judges slip by the total displacement;
+        with several, slip counts from the end of the step before (the incremental law).
+    symmetry : Symmetry, optional
+        Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
+        x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
+    discretisation : Discretisation
+    linear_solver : LinearSolver or Automatic
+        How the displacements of the body away from the contact boundary are solved for.
+    mesh : MeshOptions
+    solver : ContactSolver
+    description, reference : str
+        For the reader: what the scene shows and where it comes from.
+
+    Raises
+    ------
+    ValueError
+        If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
+        finite, an accuracy is asked of collocation or of a load history, conjugate gradients are asked of collocation,
+        or a law with friction or a solver is given without any contact.
+    GeometryError
+        If the outline of the shape is not a valid boundary.
+    """
+
+    title: str
+    shape: Shape
+    material: Material
+    parts: tuple[Part, ...]
+    law: FrictionLaw = field(default_factory=Frictionless)
+    load_factors: tuple[float, ...] = (1.0,)
+    symmetry: Symmetry | None = None
+    discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    linear_solver: LinearSolverWish = field(default_factory=Automatic)
+    mesh: MeshOptions = field(default_factory=MeshOptions)
+    solver: ContactSolver = field(default_factory=SemismoothNewton)
+    description: str = ""
+    reference: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.title or not self.title.isprintable():
+            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        repeated = [name for name, count in Counter(part.name for part in self.parts).items() if count > 1]
+        if repeated:
+            raise InputError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
+        if not self.contact_parts:
+            self._check_without_contact()
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        if isinstance(self.linear_solver, Krylov):
+            self._check_krylov(self.linear_solver)
+        if self.mesh.accuracy is not None:
+            self._check_accuracy(self.mesh.accuracy)
+        names = [side.name for loop in self.shape.outline().loops for side in loop]
+        for part in self.parts:
+            for side in part.sides:
+                if side not in names:
+                    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+                    raise InputError(
+                        f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
+                    )
+
+    def _check_without_contact(self) -> None:
+        for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
+            if getattr(self, name) != default:
+                raise InputError(
+                    f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
+                    "part the condition 'contact' with an obstacle"
+                )
+
+    def _check_krylov(self, solver: Krylov) -> None:
+        if isinstance(self.discretisation, ConstantCollocation):
+            raise InputError(
+                f"linear_solver is {solver}, which needs symmetric equations, and those of collocation are not: choose "
+                "the discretisation 'linear' or 'quadratic', or leave the linear solver out"
+            )
+        if (error := solver.error_at(self.material)) > LARGEST_KRYLOV_ERROR:
+            raise InputError(
+                f"linear_solver is {solver} at the Poisson ratio {self.material.poisson_ratio}, where its rtol leaves "
+                f"errors of {error:.0e}: choose 'direct', or leave the linear solver out"
+            )
+
+    def _check_accuracy(self, accuracy: float) -> None:
+        if isinstance(self.discretisation, ConstantCollocation):
+            raise InputError(
+                f"mesh.accuracy is {accuracy}: collocation has no error estimate: choose the discretisation "
+                "'quadratic' or 'linear', or give elements"
+            )
+        if len(self.load_factors) > 1:
+            raise InputError(
+                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
+                "belongs to one mesh: give elements"
+            )
+
+    @property
+    def contact_parts(self) -> tuple[Part, ...]:
+        """The parts that may touch an obstacle."""
+        return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    @property
+    def laws(self) -> dict[str, FrictionLaw]:
+        """The friction law of each contact part, by name."""
+        own = {part.name: part.condition.law for part in self.parts if isinstance(part.condition, Contact)}
+        return {name: self.law if law is None else law for name, law in own.items()}
+
+    @property
+    def selections(self) -> dict[str, Selection]:
+        """The pieces of the outline that the parts cover, by name."""
+        return {part.name: part.selection for part in self.parts}
+
+    def law_at(self, parts: Sequence[str], points: FloatArray, is_held: BoolArray | None = None) -> FrictionLaw:
+        """Return the friction law of given contact nodes, every coefficient in numbers.
+
+        Parameters
+        ----------
+        parts : sequence of n_contact str
+            The contact part that each node belongs to.
+        points : (n_contact, 2) array [m]
+        is_held : (n_contact,) bool array, optional
+            Nodes without friction, whatever their part. None by default.
+
+        Returns
+        -------
+        FrictionLaw
+
+        Raises
+        ------
+        LawError
+            If a coefficient is not finite or negative somewhere; the message names the part.
+        """
+        held = np.zeros(len(parts), bool) if is_held is None else is_held
+        laws: list[FrictionLaw] = [Frictionless()] if held.any() else []
+        nodes = [np.flatnonzero(held)] if held.any() else []
+        for name, law in self.laws.items():
+            own = np.flatnonzero(np.array([part == name for part in parts], bool) & ~held)
+            try:
+                laws.append(law.at(points[own]))
+            except ValueError as error:
+                raise LawError(f"part {name!r}: friction law: {error}") from error
+            nodes.append(own)
+        if len(laws) == 1 or all(law is laws[0] for law in laws):
+            return laws[0]
+        return PartwiseLaw(laws, nodes)
+
+    def build_mesh(self) -> BoundaryMesh:
+        """Divide the boundary into elements, with one mesh part for each part of the scene.
+
+        Returns
+        -------
+        BoundaryMesh
+
+        Raises
+        ------
+        GeometryError
+            If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
+        """
+        names = [part.name for part in self.contact_parts]
+        mesh = self.mesh.divide(self.shape.outline(), self.selections, names, self.symmetry)
+        if self.symmetry is not None:
+            from bemkit.scene.symmetry import check_symmetry  # which compares the conditions defined here
+
+            check_symmetry(self, mesh)
+        return mesh

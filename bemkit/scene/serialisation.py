@@ -1,0 +1,394 @@
+"""Plain tables (from TOML) to frozen dataclasses and back.
+
+cattrs does the walking. Added here are strict numbers, formulas, arrays, and classes named by a word: either the word
+alone (``solver = "semismooth-newton"``) or a table with its options (``{ kind = "tresca", bound_value = 0.5 }``).
+"""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from enum import Enum
+from functools import cache
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from cattrs import AttributeValidationNote, BaseValidationError, Converter, ForbiddenExtraKeysError
+from cattrs.gen import make_dict_structure_fn
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import Obstacle
+from bemkit.errors import BemkitError, InputError
+from bemkit.formulas import Expression, closest, shorten
+from bemkit.geometry.grading import Grading
+from bemkit.geometry.shapes import Shape
+from bemkit.operators.linear.solvers import LinearSolverWish
+from bemkit.scene.registry import (
+    CONDITIONS,
+    DISCRETISATIONS,
+    GRADINGS,
+    LAWS,
+    LINEAR_SOLVERS,
+    OBSTACLES,
+    SHAPES,
+    SOLVERS,
+    Family,
+)
+from bemkit.scene.scene import Condition, Discretisation, Part
+from bemkit.solvers.base import ContactSolver
+
+T = TypeVar("T")
+
+_FAMILIES: tuple[tuple[Any, Family], ...] = (
+    (Shape, SHAPES),
+    (Grading, GRADINGS),
+    (Condition, CONDITIONS),
+    (Obstacle, OBSTACLES),
+    (FrictionLaw, LAWS),
+    (Discretisation, DISCRETISATIONS),
+    (LinearSolverWish, LINEAR_SOLVERS),
+    (ContactSolver, SOLVERS),
+)
+
+_PARTS = tuple[Part, ...]
+
+_MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
+    {
+        "title": "add a line such as title = 'Block on a foundation'",
+        "shape": "add a table [shape] with kind = 'rectangle', width = 1.0, height = 1.0, or another shape",
+        "material": "add a table [material] with youngs_modulus and poisson_ratio",
+        "parts": "add tables [parts.NAME] with sides and condition",
+        "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
+        "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
+    }
+)
+
+
+class StructureError(InputError):
+    """A table that does not describe the wanted object; the message is ``key: value: remedy``."""
+
+
+class UnstructureError(InputError):
+    """An object that cannot be written as a table."""
+
+
+class _LocatedError(BemkitError):
+    """An error met below a key."""
+
+    def __init__(self, key: str, cause: Exception) -> None:
+        super().__init__(key)
+        self.key = key
+        self.cause = cause
+
+
+def structure(table: object, wanted: type[T]) -> T:
+    """Turn a table into an object.
+
+    Parameters
+    ----------
+    table : dict, list, str, number or bool
+    wanted : type
+
+    Returns
+    -------
+    object of the wanted type
+
+    Raises
+    ------
+    StructureError
+        Naming the key, the value and the remedy.
+    """
+    try:
+        return _converter().structure(table, wanted)
+    except RecursionError:
+        raise StructureError("nested too deeply: simplify it") from None
+    except Exception as error:  # whatever a constructor raised, it rejects what the user wrote
+        raise StructureError(_explain(error, "")) from error
+
+
+def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaults: bool = False) -> Any:
+    """Turn an object into numbers, texts, lists and tables, leaving out what has its default value.
+
+    Parameters
+    ----------
+    value : object
+    declared : type
+        The type under which the object is held: decides whether its class must be named by a word.
+    path : str
+        Where the object is, for messages.
+    keep_defaults : bool
+        Whether the object's own fields are written even where they have their default value.
+
+    Returns
+    -------
+    dict, list, str, number or bool
+
+    Raises
+    ------
+    UnstructureError
+        If there is a Python function inside, or an object of a class without a word.
+    """
+    if isinstance(value, Expression):
+        return value.text
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, tuple | list):
+        inner = get_args(declared)[0] if get_args(declared) else None
+        return [unstructure(item, inner, f"{path}[{index}]") for index, item in enumerate(value)]
+    if isinstance(value, Mapping):
+        inner = get_args(declared)[1] if get_args(declared) else None
+        return {key: unstructure(item, inner, f"{path}.{key}") for key, item in value.items()}
+    if is_dataclass(value):
+        return _unstructure_dataclass(value, declared, path, keep_defaults)
+    if callable(value):
+        raise UnstructureError(f"{path}: a Python function cannot be written to TOML: use Expression('...') instead")
+    raise UnstructureError(
+        f"{path}: {shorten(repr(value))} cannot be written to TOML: use numbers, texts or Expression"
+    )
+
+
+def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: bool) -> Any:
+    hints = get_type_hints(type(value))
+    prefix = f"{path}." if path else ""
+    table = {
+        entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
+        for entry, content in _written_fields(value, keep_defaults)
+    }
+    family = _family(declared)
+    if family is None:
+        return table
+    try:
+        kind = family.kind_of(value)
+    except InputError as error:
+        raise UnstructureError(f"{path}: {error}") from error
+    return {"kind": kind, **table} if table else kind
+
+
+def _written_fields(value: Any, keep_defaults: bool) -> Iterator[tuple[Field[Any], Any]]:
+    for entry in fields(value):
+        content = getattr(value, entry.name)
+        # the number of elements is always written: nobody should have to look up how fine a mesh was
+        is_kept = keep_defaults or entry.name == "elements" or not _is_default(content, entry)
+        if entry.init and content is not None and is_kept:
+            yield entry, content
+
+
+def _is_default(content: object, entry: Field[Any]) -> bool:
+    if entry.default is MISSING and entry.default_factory is MISSING:
+        return False
+    default = entry.default if entry.default_factory is MISSING else entry.default_factory()
+    return type(content) is type(default) and bool(np.all(content == default))
+
+
+@cache
+def _converter() -> Converter:
+    converter = Converter(forbid_extra_keys=True, detailed_validation=True)
+
+    def add(is_meant: Callable[[Any], bool], hook: Callable[[Any, Any], Any]) -> None:
+        converter.register_structure_hook_func(is_meant, hook)
+
+    converter.register_structure_hook(float, lambda value, _: _number(value))
+    converter.register_structure_hook(int, lambda value, _: _integer(value))
+    converter.register_structure_hook(bool, lambda value, _: _exactly(value, bool, "true or false"))
+    converter.register_structure_hook(str, lambda value, _: _exactly(value, str, "a text in quotation marks"))
+    add(lambda wanted: get_origin(wanted) is np.ndarray, lambda value, _: _array(value))
+    add(lambda wanted: get_origin(wanted) is tuple, lambda value, wanted: _tuple(converter, value, wanted))
+    add(lambda wanted: get_origin(wanted) is Mapping, lambda value, wanted: _mapping(converter, value, wanted))
+    add(lambda wanted: _is_class(wanted, Enum), lambda value, wanted: _enum(value, wanted))
+    add(lambda wanted: bool(_options(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
+    converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
+    add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
+    add(lambda wanted: _family(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
+    add(lambda wanted: wanted == _PARTS, lambda value, _: _parts(converter, value))
+    return converter
+
+
+def _family(declared: Any) -> Family | None:
+    options = _options(declared)
+    declared = options[0] if len(options) == 1 else declared
+    return next((family for wanted, family in _FAMILIES if declared == wanted), None)
+
+
+def _is_class(wanted: Any, parent: type) -> bool:
+    return isinstance(wanted, type) and issubclass(wanted, parent)
+
+
+def _number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"{_show(value)} is not a number: give a number such as 0.5")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.nan
+    if math.isnan(number):
+        raise InputError(f"{_show(value)} is not a usable number: give a number such as 0.5")
+    return number
+
+
+def _integer(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise InputError(f"{_show(value)} is not a whole number: give one such as 320")
+    return value
+
+
+def _exactly(value: object, wanted: type[T], description: str) -> T:
+    if not isinstance(value, wanted):
+        raise InputError(f"{_show(value)} does not fit: give {description}")
+    return value
+
+
+def _array(value: object) -> FloatArray:
+    items = _exactly(value, list, "a list of numbers")
+    return np.array([_array(item) if isinstance(item, list) else _number(item) for item in items], dtype=float)
+
+
+def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
+    items = _exactly(value, list, "a list in square brackets")
+    inner = get_args(wanted)
+    if len(inner) == 2 and inner[1] is Ellipsis:
+        inner = (inner[0],) * len(items)
+    if len(items) != len(inner):
+        raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
+    return tuple(
+        _at(f"[{index}]", converter.structure, item, kind)
+        for index, (item, kind) in enumerate(zip(items, inner, strict=True))
+    )
+
+
+def _mapping(converter: Converter, value: object, wanted: Any) -> dict[str, Any]:
+    table = _exactly(value, dict, "a table")
+    return {key: _at(key, converter.structure, item, get_args(wanted)[1]) for key, item in table.items()}
+
+
+def _enum(value: object, wanted: type[Enum]) -> Enum:
+    words = [str(member.value) for member in wanted]
+    for member in wanted:
+        if member.value == value:
+            return member
+    raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
+
+
+def _options(wanted: Any) -> tuple[Any, ...]:
+    """Return the alternatives of a union that a table can hold."""
+    if get_origin(wanted) not in (Union, types.UnionType):
+        return ()
+    return tuple(option for option in get_args(wanted) if option is not type(None) and not _is_callable(option))
+
+
+def _is_callable(wanted: Any) -> bool:
+    return get_origin(wanted) is Callable
+
+
+def _one_of(converter: Converter, value: object, wanted: Any) -> Any:
+    options = _options(wanted)
+    for option in options:
+        if _fits(value, option):
+            return converter.structure(value, option)
+    raise InputError(f"{_show(value)} does not fit: give {' or '.join(_name(option) for option in options)}")
+
+
+def _fits(value: object, option: Any) -> bool:
+    """Tell whether a value of this TOML type can become the alternative."""
+    match value:
+        case bool():
+            return option is bool
+        case int() | float():
+            return option is float or (option is int and isinstance(value, int))
+        case str():
+            return option is str or option is Expression or _is_class(option, Enum) or _family(option) is not None
+        case list():
+            return get_origin(option) in (tuple, np.ndarray)
+        case dict():
+            return is_dataclass(option) or _family(option) is not None
+    return False
+
+
+def _name(option: Any) -> str:
+    names = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", Expression: "a formula"}
+    family = _family(option)
+    if family is not None:
+        return f"a {family.role}"
+    return names.get(option, "a list" if get_origin(option) in (tuple, np.ndarray) else "a table")
+
+
+def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], Any]:
+    structure_fields = make_dict_structure_fn(wanted, converter)
+
+    def hook(value: object, _: Any) -> Any:
+        return structure_fields(_exactly(value, dict, "a table of keys and values"), wanted)
+
+    return hook
+
+
+def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
+    family = _family(wanted)
+    if family is None:  # the hook is chosen by this very test
+        raise TypeError(f"{wanted} is not a tagged type")
+    if isinstance(value, str):
+        value = {"kind": value}
+    table = _exactly(value, dict, f"a {family.role} as a word or as a table with its kind")
+    if "kind" not in table:
+        raise InputError(f"kind is missing: add kind = one of {', '.join(family.built_in)}")
+    kind = _at("kind", _exactly, table["kind"], str, "a text")
+    found = _at("kind", family.find, kind)
+    return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
+
+
+def _parts(converter: Converter, value: object) -> tuple[Part, ...]:
+    tables = _exactly(value, dict, "a table of parts: write [parts.NAME]")
+    return tuple(_at(name, _part, converter, name, table) for name, table in tables.items())
+
+
+def _part(converter: Converter, name: str, value: object) -> Part:
+    table = _exactly(value, dict, "a table with sides and condition")
+    if "name" in table:
+        raise InputError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
+    return converter.structure({"name": name, **table}, Part)
+
+
+def _at(key: str, function: Callable[..., T], *arguments: Any) -> T:
+    """Call the function; an error in it is an error at this key."""
+    try:
+        return function(*arguments)
+    except RecursionError:
+        raise
+    except Exception as error:
+        raise _LocatedError(key, error) from error
+
+
+def _explain(error: BaseException, path: str) -> str:
+    """Turn the first of the errors found into ``key: value: remedy``."""
+    note = next((note for note in getattr(error, "__notes__", ()) if isinstance(note, AttributeValidationNote)), None)
+    if note is not None:
+        path = _join(path, note.name)
+        if isinstance(error, KeyError):
+            remedy = _MISSING_REMEDIES.get(note.name, f"add {note.name} = ...")
+            return f"{path}: missing: {remedy}"
+    if isinstance(error, BaseValidationError):
+        # an unknown key comes first: it is often the reason why another one is missing
+        found = sorted(error.exceptions, key=lambda inner: not isinstance(inner, ForbiddenExtraKeysError))
+        return _explain(found[0], path)
+    if isinstance(error, _LocatedError):
+        return _explain(error.cause, _join(path, error.key))
+    if isinstance(error, ForbiddenExtraKeysError):
+        key = min(error.extra_fields)
+        names = [entry.name for entry in fields(error.cl) if entry.init]
+        known = f"the keys are {', '.join(names)}" if names else "there are no keys here"
+        return f"{_join(path, shorten(key)[1:-1])}: unknown key: {known}{closest(key, names)}"
+    return f"{path}: {error}" if path else str(error)
+
+
+def _join(path: str, key: str) -> str:
+    return f"{path}.{key}" if path and not key.startswith("[") else f"{path}{key}"
+
+
+def _show(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:60] + "..."

@@ -1,0 +1,218 @@
+"""Whether a scene is symmetric about a line: its shape, conditions, loads, obstacles and friction laws.
+
+Points of the boundary are reflected; each image must lie on the boundary of the whole body, and what acts there must be
+the image of what acts at the point. Friction is symmetric where its bound is: slip is reflected with the body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.obstacle import measure_contact
+from bemkit.errors import InputError
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.scene.scene import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Scene, Traction
+
+_PER_PIECE = 4
+"""Elements of each piece of the boundary in the coarse mesh on which images are looked for."""
+_PLACES = np.array([-0.9, -0.37, 0.31, 0.8])
+"""Where on an element: at no end, where parts change, and at places that are not symmetric themselves."""
+_TOLERANCE = 1e-9
+"""Difference, relative to the size of what is compared, that round-off and digits left out may explain."""
+_PRESSURES = (1e-6, 1e-4, 1e-2, 1.0)
+"""In units of E': where the bounds of friction laws are compared."""
+
+
+class AsymmetricSceneError(GeometryError):
+    """A scene that is not symmetric about a line it names."""
+
+
+def check_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
+    """Raise unless a scene is symmetric about the lines it names, and so is its mesh.
+
+    Parameters
+    ----------
+    scene : Scene
+    mesh : BoundaryMesh
+        Of one side of the lines; conditions are compared on all its elements.
+
+    Raises
+    ------
+    AsymmetricSceneError
+        Naming the first thing found that has no image, and both places.
+    """
+    if scene.symmetry != mesh.symmetry:
+        raise AsymmetricSceneError(
+            f"symmetry: the scene has {scene.symmetry or 'none'}, the mesh {mesh.symmetry or 'none'}: give both the "
+            "same, or let the scene build its mesh"
+        )
+    if scene.symmetry is None:
+        return
+    lines = scene.symmetry.lines
+    whole = _Whole.of(scene)
+    for samples in (_samples(whole.mesh), _samples(mesh)):
+        for line in lines:
+            difference = whole.difference(line, samples)
+            if difference is not None:
+                raise AsymmetricSceneError(
+                    f"symmetry: the scene is not symmetric about {line}: {difference}: correct the scene or the line, "
+                    "or leave the symmetry out"
+                )
+
+
+def find_symmetry(scene: Scene) -> Symmetry | None:
+    """Find the lines through the middle of a body, along x and y, about which a scene is symmetric.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Symmetry or None
+        A proposal: a few points of each piece of the boundary are compared, `check_symmetry` compares all elements.
+        None if there is no such line, or a formula cannot be evaluated.
+    """
+    outline = scene.shape.outline()
+    if outline.is_exterior:
+        return None
+    try:
+        whole = _Whole.of(scene)
+        samples = _samples(whole.mesh)
+        x, y = whole.mesh.centre.tolist()
+        has_x, has_y = (whole.difference(line, samples) is None for line in (Symmetry(x=x), Symmetry(y=y)))
+    except InputError:  # the model says better what is wrong
+        return None
+    return Symmetry(x if has_x else None, y if has_y else None) if has_x or has_y else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Points of a boundary (n, 2), the outward normals there, and the part of each, "" for free boundary."""
+
+    points: FloatArray
+    normals: FloatArray
+    parts: tuple[str, ...]
+
+    def take(self, rows: IntArray) -> _Samples:
+        return _Samples(self.points[rows], self.normals[rows], tuple(self.parts[row] for row in rows.tolist()))
+
+
+def _samples(mesh: BoundaryMesh) -> _Samples:
+    elements = np.arange(mesh.n_elements)
+    names = _part_names(mesh)
+    return _Samples(
+        mesh.points(elements, _PLACES).reshape(-1, 2),
+        mesh.normals_at(elements, _PLACES).reshape(-1, 2),
+        tuple(names[element] for element in np.repeat(elements, _PLACES.size).tolist()),
+    )
+
+
+def _part_names(mesh: BoundaryMesh) -> list[str]:
+    names = [""] * mesh.n_elements
+    for name, members in mesh.parts.items():
+        for element in members.tolist():
+            names[element] = name
+    return names
+
+
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """A scene with a coarse mesh of its whole body."""
+
+    scene: Scene
+    mesh: BoundaryMesh
+
+    @classmethod
+    def of(cls, scene: Scene) -> _Whole:
+        division = divide(scene.shape.outline(), scene.selections)
+        positions = np.linspace(0.0, 1.0, _PER_PIECE + 1)
+        return cls(scene, division.mesh([piece.at(positions) for piece in division.pieces]))
+
+    def difference(self, line: Symmetry, samples: _Samples) -> str | None:
+        """Say what is not symmetric about a line, or return None."""
+        from bemkit.operators.somigliana.locate import Locator  # only scenes with a symmetry need it
+
+        signs = line.images[1]
+        points = line.reflected(samples.points, signs)
+        location = Locator(self.mesh).locate(points)
+        away = np.hypot(*(self._points(location.element, location.xi) - points).T)
+        k = int(np.argmax(away))
+        if away[k] > _TOLERANCE * self.mesh.diameter:
+            return (
+                f"the image {format_point(points[k])} of the boundary point {format_point(samples.points[k])} lies "
+                f"{away[k]:.3g} away from the boundary"
+            )
+        names = _part_names(self.mesh)
+        images = _Samples(points, signs * samples.normals, tuple(names[e] for e in location.element.tolist()))
+        pairs = list(zip(samples.parts, images.parts, strict=True))
+        for pair in dict.fromkeys(pairs):
+            rows = np.flatnonzero([other == pair for other in pairs])
+            found = self._compare(samples.take(rows), images.take(rows), signs)
+            if found is not None:
+                return found
+        return None
+
+    def _points(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        points = np.empty((len(elements), 2))
+        for element in np.unique(elements):
+            rows = np.flatnonzero(elements == element)
+            points[rows] = self.mesh.points(np.array([element]), xi[rows])[0]
+        return points
+
+    def _compare(self, here: _Samples, there: _Samples, signs: FloatArray) -> str | None:
+        """Compare what acts at points of one part with what acts at their images in one part."""
+        parts = {part.name: part for part in self.scene.parts}
+        kind, own = _acting(self.scene, parts.get(here.parts[0]), here)
+        kind_there, images = _acting(self.scene, parts.get(there.parts[0]), there)
+        places = (format_point(here.points[0]), format_point(there.points[0]))
+        if kind != kind_there:
+            return f"the boundary is {kind} at {places[0]} and {kind_there} at its image {places[1]}"
+        for name, values in own.items():
+            expected = values * signs if values.shape[1] == 2 else values
+            size = max(_largest(values), _largest(images[name]), self.mesh.diameter if name == "gap" else 0.0)
+            same = expected == images[name]  # infinite gaps
+            off = np.abs(np.where(same, 0.0, expected) - np.where(same, 0.0, images[name])).max(axis=1)
+            k = int(np.argmax(off))
+            if not off[k] <= _TOLERANCE * size:
+                return (
+                    f"the {name} is {_text(values[k])} at {format_point(here.points[k])} and {_text(images[name][k])} "
+                    f"at its image {format_point(there.points[k])}"
+                )
+        return None
+
+
+def _acting(scene: Scene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:
+    """Return the kind of condition in a part and its values (n, 1), or (n, 2) for vectors, by name."""
+    points, normals = samples.points, samples.normals
+    match None if part is None else part.condition:
+        case Contact(obstacle=obstacle, law=own_law):
+            law = (scene.law if own_law is None else own_law).at(points)
+            pressures = [np.full(len(points), -p * scene.material.plane_modulus) for p in _PRESSURES]
+            bounds = {f"friction bound at the pressure {-p[0]:.3g}": law.bound(p)[:, None] for p in pressures}
+            gap, direction = measure_contact(obstacle, points, normals)
+            return "in contact", {"gap": gap[:, None], "direction of contact": direction, **bounds}
+        case Traction() | Pressure() as load:
+            return "free or loaded", {"traction": load.at(points, normals)}
+        case PrescribedDisplacement() as motion:
+            given = " and ".join(name for name, is_given in zip("xy", motion.is_prescribed, strict=True) if is_given)
+            return f"displaced along {given}", {"displacement": motion.at(points)}
+        case Clamped():
+            return "clamped", {}
+        case Roller():
+            return "on rollers", {}
+    return "free or loaded", {"traction": np.zeros_like(points)}
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+
+
+def _text(values: FloatArray) -> str:
+    return format_point(values) if len(values) == 2 else f"{values[0]:.9g}"

@@ -1,0 +1,195 @@
+"""Scene files: TOML in, `Scene` out, and back.
+
+Every complaint is a `SceneError` of one line that names the file, the key, the value and the remedy.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields, replace
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Any, cast
+
+from bemkit.errors import InputError
+from bemkit.formulas import closest
+from bemkit.printable import printable
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.registry import SOLVERS
+from bemkit.scene.scene import Discretisation, Scene
+from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
+from bemkit.scene.shipped import shipped_files
+from bemkit.solvers.base import ContactSolver
+
+MAX_BYTES = 1_000_000
+
+# the order of keys in files that are written, as a reader wants it
+_SCENE_KEYS = (
+    *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
+    *("load_factors", "symmetry", "law", "shape", "material", "mesh", "parts"),
+)
+_PART_KEYS = ("sides", "where", "condition")
+
+
+class SceneError(InputError):
+    """A scene that cannot be read, understood or written; one line with file, key, value and remedy."""
+
+
+def load_scene(source: str | Path) -> Scene:
+    """Read a scene file, or a scene that is shipped with bemkit.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a TOML file, or the name of a shipped scene such as ``"paper-1"``.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If there is no such file or scene, or its content is not a valid scene.
+    """
+    shipped = shipped_files()
+    name = printable(str(source))[:200] or "''"
+    file: Traversable = shipped[str(source)] if str(source) in shipped else Path(source)
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        names = list(shipped)
+        raise SceneError(
+            f"{name}: no such file or shipped scene: the shipped scenes are {', '.join(names)}{closest(name, names)}"
+        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SceneError(f"{name}: cannot be read ({reason}): give the path of a TOML file") from error
+    if len(content) > MAX_BYTES:
+        raise SceneError(f"{name}: larger than {MAX_BYTES} bytes: a scene file is a short text")
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise SceneError(f"{name}: not UTF-8 text: give a TOML file") from None
+    return scene_from_toml(text, name=name)
+
+
+def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
+    """Turn TOML text into a scene.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        Where the text comes from, for messages.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If the text is not TOML, or not a valid scene.
+    """
+    try:
+        table = tomllib.loads(text.removeprefix("\ufeff"))  # the byte order mark that some editors write
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{name}: not valid TOML: {printable(str(error))}") from None
+    except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
+        raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
+    try:
+        return structure(table, Scene)
+    except StructureError as error:
+        raise SceneError(f"{name}: {printable(str(error))}") from error
+
+
+def scene_to_toml(scene: Scene) -> str:
+    """Write a scene as TOML text, leaving out what has its default value.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    str
+        Text from which `scene_from_toml` makes an equal scene.
+
+    Raises
+    ------
+    SceneError
+        If the scene holds a Python function, or an object of a class that scene files have no name for.
+    """
+    import tomli_w
+
+    try:
+        table = unstructure(scene, keep_defaults=True)
+    except UnstructureError as error:
+        raise SceneError(str(error)) from error
+    if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
+        del table["law"], table["solver"]
+    table["parts"] = {part["name"]: _ordered(part, _PART_KEYS) for part in table["parts"]}
+    return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
+
+
+def with_overrides(
+    scene: Scene,
+    *,
+    elements: int | None = None,
+    accuracy: float | None = None,
+    discretisation: str | None = None,
+    solver: str | None = None,
+    rho: float | None = None,
+) -> Scene:
+    """Change a scene by the words and numbers of the command line; what is None stays.
+
+    Parameters
+    ----------
+    scene : Scene
+    elements : int, optional
+    accuracy : float, optional
+        Instead of a number of elements.
+    discretisation, solver : str, optional
+        Words as in scene files.
+    rho : float, optional
+        Penalty of the solver in units of E'/L; sets all penalties it has.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        If a word is unknown, a number out of range, or the solver has no penalty.
+    """
+    if elements is not None and accuracy is not None:
+        raise SceneError(f"elements is {elements} and accuracy is {accuracy}: give one of them, the other follows")
+    try:
+        if elements is not None:
+            options = MeshOptions() if scene.mesh.elements is None else scene.mesh
+            scene = replace(scene, mesh=replace(options, elements=elements))
+        if discretisation is not None:
+            scene = replace(scene, discretisation=structure(discretisation, cast(Any, Discretisation)))
+        if accuracy is not None:
+            scene = replace(scene, mesh=MeshOptions(accuracy=accuracy))
+        if solver is not None:
+            scene = replace(scene, solver=structure(solver, cast(Any, ContactSolver)))
+        if rho is not None:
+            scene = replace(scene, solver=_with_rho(scene.solver, rho))
+    except (StructureError, ValueError) as error:
+        raise SceneError(printable(str(error))) from error
+    return scene
+
+
+def _with_rho(solver: Any, rho: float) -> Any:
+    names = [entry.name for entry in fields(solver) if entry.name in ("rho", "rho_n", "rho_t")]
+    if not names:
+        raise SceneError(f"rho is {rho}: the solver {SOLVERS.kind_of(solver)} has no penalty: leave rho out")
+    return replace(solver, **dict.fromkeys(names, rho))
+
+
+def _ordered(table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    return {key: table[key] for key in keys if table.get(key, "") != ""}

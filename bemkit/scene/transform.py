@@ -1,0 +1,268 @@
+"""Stretched, moved and rescaled scenes: the same problem elsewhere, at another size, in other units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.obstacle import Obstacle, measure_contact
+from bemkit.formulas import ScalarField, evaluate_field
+from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
+from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.shapes import Shape
+from bemkit.geometry.symmetry import Symmetry
+from bemkit.scene.scene import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Scene, Traction
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """The map x -> factor * x + shift of the plane, component by component.
+
+    Parameters
+    ----------
+    factor : (float, float)
+        Positive.
+    shift : (float, float) [m]
+    """
+
+    factor: tuple[float, float] = (1.0, 1.0)
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    def forward(self, points: FloatArray) -> FloatArray:
+        """Map (n, 2) points."""
+        return np.asarray(points * np.array(self.factor) + np.array(self.shift))
+
+    def back(self, points: FloatArray) -> FloatArray:
+        """Map (n, 2) points back to where they came from."""
+        original: FloatArray = (points - np.array(self.shift)) / np.array(self.factor)
+        return original
+
+    def normals_back(self, normals: FloatArray) -> FloatArray:
+        """Return the unit normals that belong to the normals of the stretched boundary."""
+        if self.is_uniform:
+            return normals
+        original = normals * np.array(self.factor)
+        return np.asarray(original / np.hypot(*original.T)[:, None])
+
+    def normals_forward(self, normals: FloatArray) -> FloatArray:
+        """Return the unit normals of the stretched boundary that belong to normals of the original."""
+        return self._inverse.normals_back(normals)
+
+    @property
+    def _inverse(self) -> Stretch:
+        return Stretch((1.0 / self.factor[0], 1.0 / self.factor[1]))
+
+    def moved(self, symmetry: Symmetry) -> Symmetry:
+        """Map symmetry lines."""
+        places = zip((symmetry.x, symmetry.y), self.factor, self.shift, strict=True)
+        return Symmetry(*(None if place is None else place * factor + shift for place, factor, shift in places))
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether angles are kept."""
+        return self.factor[0] == self.factor[1]
+
+
+@dataclass(frozen=True)
+class MovedField:
+    """``factor`` times a field of the original body, as a function of the moved coordinates."""
+
+    field: ScalarField
+    stretch: Stretch
+    factor: float = 1.0
+
+    def __call__(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Evaluate at moved coordinates."""
+        return self.factor * evaluate_field(self.field, self.stretch.back(np.column_stack([x, y])))
+
+
+@dataclass(frozen=True)
+class MovedRegion:
+    """A condition on the original coordinates, as a function of the moved ones."""
+
+    region: Region
+    stretch: Stretch
+
+    def __call__(self, x: FloatArray, y: FloatArray) -> BoolArray:
+        """Evaluate at moved coordinates."""
+        original = self.stretch.back(np.column_stack([x, y]))
+        return np.asarray(self.region(original[:, 0], original[:, 1]))
+
+
+@dataclass(frozen=True)
+class MovedObstacle:
+    """An obstacle whose gap is ``factor`` times the gap of the original body, plus ``offset`` [m]."""
+
+    obstacle: Obstacle
+    stretch: Stretch = Stretch()
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Measure the gap at moved points; see `Obstacle.gap`."""
+        original = self.obstacle.gap(self.stretch.back(points), self.stretch.normals_back(normals))
+        return self.factor * original + self.offset
+
+    def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Return the direction of contact at moved points; see `DirectedObstacle.approach`."""
+        _, direction = measure_contact(self.obstacle, self.stretch.back(points), self.stretch.normals_back(normals))
+        return self.stretch.normals_forward(direction)
+
+
+@dataclass(frozen=True)
+class MovedLaw(FrictionLaw):
+    """A friction law at moved points, its stresses multiplied by `stress`."""
+
+    law: FrictionLaw
+    stretch: Stretch
+    stress: float
+
+    def at(self, points: FloatArray) -> FrictionLaw:
+        """Return the law for contact nodes given by their moved points."""
+        return self.law.at(self.stretch.back(points)).scaled(1.0 / self.stress)
+
+    @property
+    def is_frictionless(self) -> bool:
+        """What the law says."""
+        return self.law.is_frictionless
+
+    @property
+    def acts_across_gap(self) -> bool | BoolArray:
+        """What the law says."""
+        return self.law.acts_across_gap
+
+    def bound(self, sigma_n: FloatArray) -> FloatArray:
+        """Return the bound of a law without coordinates."""
+        return self.law.scaled(1.0 / self.stress).bound(sigma_n)
+
+    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
+        """Return the derivative of the bound of a law without coordinates."""
+        return self.law.scaled(1.0 / self.stress).bound_derivative(sigma_n)
+
+
+@dataclass(frozen=True)
+class MovedShape:
+    """A shape after a stretch and a shift."""
+
+    shape: Shape
+    stretch: Stretch
+
+    def outline(self) -> Outline:
+        """Return the moved boundary, its sides under their names."""
+        outline = self.shape.outline()
+        loops = tuple(
+            tuple(Side(side.name, _moved_curve(side.curve, self.stretch)) for side in loop) for loop in outline.loops
+        )
+        return Outline(loops, outline.is_exterior)
+
+
+def moved_scene(
+    scene: Scene, stretch: Stretch, *, stress: float = 1.0, displacement: float | None = None, modulus: float = 1.0
+) -> Scene:
+    """Return a scene after a stretch, with its numbers multiplied.
+
+    Parameters
+    ----------
+    scene : Scene
+    stretch : Stretch
+    stress : float
+        Factor of all loads, and of the stresses in the friction law.
+    displacement : float, optional
+        Factor of gaps and prescribed displacements; the first factor of the stretch if left out.
+    modulus : float
+        Factor of Young's modulus.
+
+    Returns
+    -------
+    Scene
+        Its fields, regions and obstacles are functions, so it cannot be written to a file.
+    """
+    factor = stretch.factor[0] if displacement is None else displacement
+    material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
+    parts = tuple(_moved_part(part, stretch, stress, factor) for part in scene.parts)
+    law = MovedLaw(scene.law, stretch, stress)
+    symmetry = None if scene.symmetry is None else stretch.moved(scene.symmetry)
+    return replace(
+        scene, shape=MovedShape(scene.shape, stretch), material=material, parts=parts, law=law, symmetry=symmetry
+    )
+
+
+def with_gap_offset(scene: Scene, offset: float) -> Scene:
+    """Return a scene whose obstacles stand further away by `offset` [m], nearer if it is negative."""
+    return with_conditions(
+        scene,
+        lambda condition: (
+            replace(condition, obstacle=MovedObstacle(condition.obstacle, offset=offset))
+            if isinstance(condition, Contact)
+            else condition
+        ),
+    )
+
+
+def with_turned_loads(scene: Scene, angle: float) -> Scene:
+    """Return a scene whose tractions and pressures are turned anticlockwise by an angle [rad]."""
+    cosine, sine = float(np.cos(angle)), float(np.sin(angle))
+
+    def turned(condition: Condition) -> Condition:
+        match condition:
+            case Traction(x, y):
+                return Traction(_combined(x, cosine, y, -sine), _combined(x, sine, y, cosine))
+            case Pressure(pressure, shear):  # the load is -pressure n + shear t, and t is n turned by 90 degrees
+                return Pressure(_combined(pressure, cosine, shear, sine), _combined(shear, cosine, pressure, -sine))
+        return condition
+
+    return with_conditions(scene, turned)
+
+
+def with_conditions(scene: Scene, change: Callable[[Condition], Condition]) -> Scene:
+    """Return a scene with the condition of every part replaced by `change` of it."""
+    return replace(scene, parts=tuple(replace(part, condition=change(part.condition)) for part in scene.parts))
+
+
+def _combined(
+    a: ScalarField, factor_a: float, b: ScalarField, factor_b: float
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    def field(x: FloatArray, y: FloatArray) -> FloatArray:
+        points = np.column_stack([x, y])
+        return factor_a * evaluate_field(a, points) + factor_b * evaluate_field(b, points)
+
+    return field
+
+
+def _moved_part(part: Part, stretch: Stretch, stress: float, displacement: float) -> Part:
+    where = None if part.where is None else MovedRegion(part.where, stretch)
+    return replace(part, condition=_moved_condition(part.condition, stretch, stress, displacement), where=where)
+
+
+def _moved_condition(condition: Condition, stretch: Stretch, stress: float, displacement: float) -> Condition:
+    def moved(field: ScalarField, factor: float) -> MovedField:
+        return MovedField(field, stretch, factor)
+
+    match condition:
+        case Traction(x, y):
+            return Traction(moved(x, stress), moved(y, stress))
+        case Pressure(pressure, shear):
+            return Pressure(moved(pressure, stress), moved(shear, stress))
+        case PrescribedDisplacement(x, y):
+            components = [None if value is None else moved(value, displacement) for value in (x, y)]
+            return PrescribedDisplacement(*components)
+        case Contact(obstacle, law):
+            own = None if law is None else MovedLaw(law, stretch, stress)
+            return Contact(MovedObstacle(obstacle, stretch, displacement), own)
+    return condition
+
+
+def _moved_curve(curve: Curve, stretch: Stretch) -> Curve:
+    if curve.is_straight:
+        start, end = stretch.forward(curve.point(np.array([0.0, 1.0]))).tolist()
+        return Segment(tuple(start), tuple(end))
+    factor = stretch.factor[0]
+    if stretch.is_uniform:
+        return MovedCurve(curve, (-stretch.shift[0] / factor, -stretch.shift[1] / factor), factor)
+    return ParametricCurve(
+        lambda s: stretch.forward(curve.point(s)), lambda s: curve.derivative(s) * np.array(stretch.factor)
+    )

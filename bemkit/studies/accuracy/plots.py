@@ -1,0 +1,132 @@
+"""Errors over run time: one panel for each error, the Pareto front behind, the fitted order beside each line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.reference.values import MEASURES
+from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, pareto_front
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_FRONT = "#D8D8D8"
+_MARKERS = ("o", "^", "s", "D", "v", "P")
+_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
+_MESHES = ("adaptive", "uniform", "graded")
+"""Which line belongs to which meshes, so that figures of several studies agree; others follow."""
+_ELEMENTS = ("constant", "linear", "quadratic")
+
+
+def draw_errors(rows: Sequence[Row], measures: Sequence[str], *, title: str = "") -> Figure:
+    """Draw errors over run time, or over the number of elements where no times were measured.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    measures : sequence of str
+        One panel for each.
+    title : str
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from matplotlib.figure import Figure
+
+    n_columns = min(len(measures), 2)
+    n_rows = -(-len(measures) // n_columns)
+    figure = Figure(figsize=(5.2 * n_columns, 3.9 * n_rows + 1.1), layout="constrained")
+    axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
+    for panel, measure in zip(axes, measures, strict=False):
+        _draw_panel(panel, rows, measure)
+    for panel in axes[len(measures) :]:
+        panel.set_visible(False)
+    figure.legend(handles=_legend(rows), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+    figure.suptitle(title, fontsize=11, parse_math=False)
+    return figure
+
+
+def is_timed(rows: Sequence[Row]) -> bool:
+    """Whether run times were measured."""
+    return any(np.isfinite(row.seconds) for row in rows)
+
+
+def _draw_panel(panel: Axes, rows: Sequence[Row], measure: str) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    abscissa = "seconds" if is_timed(rows) else "elements"
+    front = pareto_front(rows, measure)
+    if front:
+        x, y = _points(front, "seconds", measure)
+        style: dict[str, Any] = {"color": _FRONT, "linewidth": 5, "solid_capstyle": "round", "zorder": 0}
+        panel.step(x, y, where="post", **style)
+    named = set()
+    for series in by_series(rows):
+        x, y = _points(series, abscissa, measure)
+        colour, line, marker = _style(rows, series[0])
+        panel.plot(x, y, color=colour, linestyle=line, marker=marker, markersize=4.5, linewidth=1.2)
+        order = fitted_order(series, measure)
+        # drivers reach the same state: the order is that of elements and meshes
+        if x.size and np.isfinite(order) and series[0].series[:2] not in named:
+            named.add(series[0].series[:2])
+            _write_order(panel, f"{order:.1f}", (x[-1], y[-1]), colour)
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel("run time [s]" if abscissa == "seconds" else "number of elements")
+    panel.set_title(f"relative error: {MEASURES[measure]}", loc="left", fontsize=10)
+    panel.grid(visible=True, which="major", color="#E5E5E5", linewidth=0.6)
+    panel.spines[["top", "right"]].set_visible(False)
+
+
+def _write_order(panel: Axes, text: str, place: tuple[float, float], colour: str) -> None:
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    style: dict[str, Any] = {"color": colour, "fontsize": 8, "va": "top", "path_effects": halo, "zorder": 5}
+    panel.annotate(text, place, xytext=(3, -3), textcoords="offset points", **style)
+
+
+def _points(rows: Sequence[Row], abscissa: str, measure: str) -> tuple[Any, Any]:
+    x = np.array([float(getattr(row, abscissa)) for row in rows])
+    y = np.array([getattr(row, measure) for row in rows], dtype=float)
+    shown = np.isfinite(x) & np.isfinite(y) & (y > 0.0)
+    return x[shown], y[shown]
+
+
+def _style(rows: Sequence[Row], row: Row) -> tuple[str, Any, str]:
+    def place(known: Sequence[str], name: str) -> int:
+        names = dict.fromkeys([*known, *(str(getattr(other, name)) for other in rows)])
+        return list(names).index(getattr(row, name))
+
+    colour = _COLOURS[place(_ELEMENTS, "discretisation") % len(_COLOURS)]
+    line = _LINES[place(_MESHES, "meshes") % len(_LINES)]
+    return colour, line, _MARKERS[place((), "solver") % len(_MARKERS)]
+
+
+def _legend(rows: Sequence[Row]) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    handles: dict[str, Line2D] = {}
+    for row in rows:
+        colour, line, marker = _style(rows, row)
+        handles.setdefault(f"{row.discretisation} elements ({row.map})", Line2D([], [], color=colour, linewidth=3))
+        handles.setdefault(f"{row.meshes} meshes", Line2D([], [], color="#444444", linestyle=line, linewidth=1.2))
+        handles.setdefault(row.solver, Line2D([], [], color="#444444", marker=marker, linestyle="none", markersize=5))
+    if is_timed(rows):
+        handles["no run is faster and more accurate"] = Line2D([], [], color=_FRONT, linewidth=5)
+    for name, handle in handles.items():
+        handle.set_label(name)
+    order = ("elements (", "meshes", "")
+    return sorted(
+        handles.values(), key=lambda handle: next(k for k, word in enumerate(order) if word in str(handle.get_label()))
+    )

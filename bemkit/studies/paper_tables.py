@@ -1,0 +1,176 @@
+"""The paper's Tables 1 and 2: outer steps of Algorithm 1 for 5 x 5 pairs of rho, beside the printed numbers.
+
+rho in the tables is a number; the penalty of the method is that number times Young's modulus per unit of length. The
+examples are solved as in the paper: constant elements, N / 4 of them on each side of the body, zero multipliers at
+the start, and the displacements on the contact boundary compared in the largest norm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from bemkit.arrays import IntArray, read_only
+from bemkit.contact.certificate import certificate_scales
+from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.errors import NoResultError
+from bemkit.geometry.grading import Uniform
+from bemkit.model.contact_model import Model, build_model
+from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.scene.scene import ConstantCollocation, MeshOptions
+from bemkit.scene.toml import load_scene
+from bemkit.solvers.alm import AugmentedLagrangian
+from bemkit.solvers.base import solve
+from bemkit.solvers.ssn import SemismoothNewton
+
+RHO = (1e2, 1e3, 1e4, 1e5, 1e6)
+"""Values of rho_1 (rows) and rho_2 (columns)."""
+
+PRINTED: tuple[tuple[tuple[int, ...], ...], ...] = (
+    ((25, 25, 25, 25, 25), *((25, 13, 13, 13, 13),) * 4),
+    ((39, 38, 38, 38, 38), (29, 12, 12, 12, 12), *((29, 10, 8, 8, 8),) * 3),
+)
+"""Tables 1 and 2 of the paper."""
+
+_N_ELEMENTS = 320
+_PAPER_TOLERANCE = 1e-8
+"""``max|u_k+1 - u_k| <= 1e-8 max|u_k+1|`` on the contact boundary stops the outer iteration."""
+
+
+class PaperTableError(NoResultError):
+    """A pair of rho for which Algorithm 1 did not stop by the paper's criterion."""
+
+
+@dataclass(frozen=True, eq=False)
+class PaperTable:
+    """One of the two tables, ours beside the print.
+
+    Parameters
+    ----------
+    number : int
+        1 or 2, also the number of the example.
+    printed : (5, 5) int array
+        Outer steps in the paper; rho_1 by row, rho_2 by column.
+    outer_steps : (5, 5) int array
+        Outer steps here.
+    linear_solves : (5, 5) int array
+        All linear systems of these outer steps.
+    newton_solves : int
+        Linear systems of `SemismoothNewton` on the same discrete problem, from its cold start.
+    """
+
+    number: int
+    printed: IntArray
+    outer_steps: IntArray
+    linear_solves: IntArray
+    newton_solves: int
+
+    def __post_init__(self) -> None:
+        for name in ("printed", "outer_steps", "linear_solves"):
+            read_only(getattr(self, name))
+
+    def rows(self) -> list[dict[str, int | float]]:
+        """Return one row for each pair of rho."""
+        return [
+            {
+                "table": self.number,
+                "rho_1": RHO[i],
+                "rho_2": RHO[j],
+                "printed": int(self.printed[i, j]),
+                "outer_steps": int(self.outer_steps[i, j]),
+                "linear_solves": int(self.linear_solves[i, j]),
+            }
+            for i, j in product(range(len(RHO)), repeat=2)
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the table as JSON can hold it."""
+        return {
+            "table": self.number,
+            "rho": list(RHO),
+            "printed": self.printed.tolist(),
+            "outer_steps": self.outer_steps.tolist(),
+            "linear_solves": self.linear_solves.tolist(),
+            "newton_solves": self.newton_solves,
+        }
+
+
+def paper_tables(progress: Callable[[int, float, float], None] | None = None) -> tuple[PaperTable, PaperTable]:
+    """Compute both tables; about a second.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Called with (table, rho_1, rho_2) after each of the 50 runs.
+
+    Returns
+    -------
+    tuple of two PaperTable
+
+    Raises
+    ------
+    PaperTableError
+        If a run does not stop.
+    """
+    # for systems this small a second thread of BLAS only gets in the way
+    with blas_threads_for(_N_ELEMENTS // 2):
+        return _table(1, progress), _table(2, progress)
+
+
+def paper_model(number: int) -> Model:
+    """Return example 1 or 2 on the paper's uniform mesh of plain constant elements, made ready to solve."""
+    scene = load_scene(f"paper-{number}")
+    sides = [side for loop in scene.shape.outline().loops for side in loop]
+    # as many elements on each side, whatever its length
+    density = {
+        side.name: 1.0 / float(np.hypot(*np.ptp(side.curve.point(np.array([0.0, 1.0])), axis=0))) for side in sides
+    }
+    mesh = MeshOptions(elements=_N_ELEMENTS, grading=Uniform(), density=density)
+    scene = replace(scene, mesh=mesh, discretisation=ConstantCollocation(slopes=False))
+    return build_model(scene, scene.build_mesh())
+
+
+def _table(number: int, progress: Callable[[int, float, float], None] | None) -> PaperTable:
+    model = paper_model(number)
+    # from rho * E / (1 unit of length) to units of E'/L
+    unit = model.scene.material.youngs_modulus / model.units.modulus * model.units.length
+    steps, solves = np.zeros((5, 5), dtype=np.intp), np.zeros((5, 5), dtype=np.intp)
+    for i, j in product(range(len(RHO)), repeat=2):
+        driver = AugmentedLagrangian(rho_n=RHO[i] * unit, rho_t=RHO[j] * unit)
+        try:
+            steps[i, j], solves[i, j] = _outer_steps(model.problem, driver)
+        except PaperTableError as error:
+            raise PaperTableError(f"table {number}, rho_1 = {RHO[i]:g}, rho_2 = {RHO[j]:g}: {error}") from error
+        if progress is not None:
+            progress(number, RHO[i], RHO[j])
+    newton = solve(model.problem, SemismoothNewton())
+    return PaperTable(number, np.array(PRINTED[number - 1]), steps, solves, newton.linear_solves)
+
+
+def _outer_steps(problem: ContactProblem, driver: AugmentedLagrangian) -> tuple[int, int]:
+    """Return outer steps and linear solves until the paper's criterion is met."""
+    iterate = driver.init(problem, _zero_multipliers(problem))
+    for step in range(1, driver.max_steps + 1):
+        previous = iterate.state.displacement
+        iterate = driver.step(problem, iterate)
+        if iterate.ended is not None:
+            raise PaperTableError(f"{iterate.ended.name} in outer step {step}")
+        displacement = iterate.state.displacement
+        change = float(np.abs(displacement - previous).max())
+        if step > 1 and change <= _PAPER_TOLERANCE * float(np.abs(displacement).max()):
+            return step, iterate.linear_solves
+    raise PaperTableError(f"not stopped after {driver.max_steps} outer steps")
+
+
+def _zero_multipliers(problem: ContactProblem) -> ContactState:
+    """Return a start without tractions whose nodes all overlap a little, so that they begin in contact.
+
+    Without the overlap the first active set would be empty and the floating body of Example 1 would not be held.
+    """
+    _, length = certificate_scales(problem, problem.glued_state)
+    overlap = np.stack([np.maximum(problem.gap, 0.0) + length, problem.slip_origin], axis=1)
+    return ContactState(overlap, np.zeros_like(overlap))

@@ -1,0 +1,12 @@
+"""An independent check of a solution, from its own fields: no stiffness matrix, no active sets, no driver.
+
+Only the physical fields of a `Solution`, the points of its mesh and the statement of its scene are read. Normals are
+differentiated from the points, obstacles measured anew, and elasticity is tested with Kelvin's solution as printed in
+textbooks. Whatever the drivers believe, these numbers say whether the fields obey supports, contact and friction,
+whether forces and energy balance, and whether tractions and displacements belong to one elastic body.
+"""
+
+from bemkit.studies.stability.evidence.examine import COARSE_LIMIT as COARSE_LIMIT
+from bemkit.studies.stability.evidence.examine import CONTACT_LIMIT as CONTACT_LIMIT
+from bemkit.studies.stability.evidence.examine import Evidence as Evidence
+from bemkit.studies.stability.evidence.examine import examine as examine

@@ -1,0 +1,69 @@
+"""One figure for each axis: what was promised to be small, over the values of the axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.cli.outputs import save_figure
+from bemkit.studies.stability.cases import Axis
+from bemkit.studies.stability.sweep import Row, Verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
+_SERIES = (
+    ("certificate", "certificate of the driver", "#0072B2", "o"),
+    ("check", "independent check", "#009E73", "s"),
+    ("twin", "difference to the similar twin", "#E69F00", "^"),
+    ("drift", "drift from the reference", "#9A9A9A", "x"),
+)
+_FLOOR = 1e-18
+
+
+def save_plots(axes: Sequence[Axis], rows: Sequence[Row], folder: str | Path) -> tuple[Path, ...]:
+    """Draw one PNG for each axis into a folder, which is made if need be.
+
+    Raises
+    ------
+    OutputFileError
+        If a file cannot be written, or a file of another kind stands in the way.
+    """
+    own = {axis.name: [row for row in rows if row.axis == axis.name] for axis in axes}
+    return tuple(
+        save_figure(draw_axis(axis, own[axis.name]), Path(folder) / f"stability-{axis.name}.png") for axis in axes
+    )
+
+
+def draw_axis(axis: Axis, rows: Sequence[Row]) -> Figure:
+    """Draw one axis."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    plot = figure.add_subplot()
+    values = np.array([row.value for row in rows])
+    is_logarithmic = axis.is_logarithmic and bool((values > 0.0).any())
+    for name, label, colour, marker in _SERIES:
+        numbers = np.maximum([getattr(row, name) for row in rows], _FLOOR)
+        shown = np.isfinite(numbers) & ((values > 0.0) | (not is_logarithmic))
+        plot.plot(
+            values[shown], numbers[shown], marker, color=colour, label=label, markersize=5, linestyle="-", linewidth=0.8
+        )
+    for verdict, colour in ((Verdict.NAMED, "#56B4E9"), (Verdict.WRONG, "#D55E00")):
+        marked = [row.value for row in rows if row.verdict == verdict.value and (row.value > 0.0 or not is_logarithmic)]
+        for k, value in enumerate(marked):
+            plot.axvline(value, color=colour, linewidth=4, alpha=0.35, label=verdict.value if k == 0 else None)
+    if is_logarithmic:
+        plot.set_xscale("log")
+    plot.set_yscale("log")
+    plot.set_xlabel(axis.label)
+    plot.set_ylabel("dimensionless")
+    plot.set_title(axis.name, loc="left")
+    plot.grid(visible=True, color="#E5E5E5", linewidth=0.6)
+    plot.spines[["top", "right"]].set_visible(False)
+    plot.legend(fontsize="small", frameon=False)
+    return figure

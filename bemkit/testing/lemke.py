@@ -1,0 +1,249 @@
+"""The referee: Lemke's algorithm on the linear complementarity problem of Coulomb friction.
+
+It shares no equation with the other drivers: no projections, no rho, no active sets, no Newton matrix. It sees the
+body's compliance and pivots in a tableau. Meant for small problems and for second opinions.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.conditions import stick
+from bemkit.contact.piecewise_law import law_name
+from bemkit.contact.problem import ContactProblem, ContactState, LawError
+from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.newton import spring_stiffness
+from bemkit.solvers.options import check_max_steps
+
+_WEAKER = 1e-2
+"""Springs on free rigid motions, in units of those of the other drivers: the body may have to slide far in a few steps,
+at the cost of that many digits."""
+
+_ROUND_OFF = 1e-11
+"""Tableau entries smaller than this, relative to the largest of their column, are left-overs of eliminations."""
+
+
+@dataclass(frozen=True)
+class LemkePivoting:
+    """Complementary pivoting in the pressing forces, friction forces and slips of all contact nodes.
+
+    Parameters
+    ----------
+    max_steps : int
+        Steps allowed. One suffices for a held body; a body with free rigid motions takes a few.
+
+    Notes
+    -----
+    With pressing force p, friction forces against backward and forward slip b, f and the size of the slip l, all not
+    negative, the problem reads (Stewart and Trinkle)
+
+        0 <= g - u_n          complementary to p,
+        0 <= l + slip         complementary to b,
+        0 <= l - slip         complementary to f,
+        0 <= c + s p - b - f  complementary to l,
+
+    where ``u = compliance (load + F)`` and the nodal forces are ``F = (-p, b - f)``. The matrix is copositive for
+    every friction coefficient, so Lemke's algorithm ends with a solution if the body is held. Laws must be affine in
+    the pressure.
+
+    References
+    ----------
+    D. E. Stewart, J. C. Trinkle, Int. J. Numer. Meth. Engng 39 (1996) 2673-2691.
+    R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, section 4.4.
+    """
+
+    max_steps: int = 30
+
+    def __post_init__(self) -> None:
+        check_max_steps(self.max_steps)
+
+    def init(self, problem: ContactProblem, start: ContactState) -> Iterate:
+        """Keep the start, which matters for free rigid motions only.
+
+        Raises
+        ------
+        ValueError
+            If the friction bound is not affine in the pressure, or jumps when a node opens.
+        """
+        _affine_bound(problem)
+        return Iterate(state=start)
+
+    def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
+        """Pivot from the origin to a solution."""
+        stiffness, load, linear_solves = _probed(problem)
+        springs, spring_load = _springs(problem, iterate.state)
+        try:
+            compliance = np.asarray(np.linalg.inv(stiffness + springs), dtype=float)
+        except np.linalg.LinAlgError:
+            return replace(iterate, ended=Status.SINGULAR, message="the body has motions that are not listed as rigid")
+        free = compliance @ (load + spring_load)
+        matrix, vector, unit_force = _complementarity(problem, compliance, free)
+        exists = np.isfinite(vector)  # nodes that can never touch have no pressing force
+        unknowns = np.zeros(len(vector))
+        solution, n_pivots = lemke(matrix[np.ix_(exists, exists)], vector[exists])
+        spent = iterate.linear_solves + linear_solves + 1
+        if solution is None:
+            message = f"Lemke's algorithm ended on a ray after {n_pivots} pivots"
+            return replace(iterate, linear_solves=spent, ended=Status.STALLED, message=message)
+        unknowns[exists] = solution
+        pressed, backward, forward, _ = unit_force * unknowns.reshape(4, -1)
+        force = np.stack([-pressed, backward - forward], axis=1)
+        displacement = (free + compliance @ force.ravel()).reshape(-1, 2)
+        displacement = problem.respond(stick(*displacement.T)).displacement  # where the tangent is free it follows
+        state = ContactState(displacement, force / problem.body.weights[:, None])
+        return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
+
+
+def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None) -> tuple[FloatArray | None, int]:
+    """Return z with ``z >= 0``, ``w = matrix z + vector >= 0``, ``z w = 0``, by Lemke's algorithm.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    vector : (n,) array
+    max_pivots : int, optional
+        ``50 n`` by default.
+
+    Returns
+    -------
+    z : (n,) array or None
+        None if the algorithm ends on a ray or runs out of pivots.
+    n_pivots : int
+    """
+    n = len(vector)
+    limit = 50 * n if max_pivots is None else max_pivots
+    if vector.min() >= 0.0:
+        return np.zeros(n), 0
+    # Columns: w (n), z (n), covering variable, right-hand side. The cover is uneven, against ties.
+    cover = 1.0 + 0.5 * np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]
+    tableau = np.hstack([np.eye(n), -matrix, -cover[:, None], vector[:, None]])
+    basis = np.arange(n)
+    row, entering = int(np.argmin(vector / cover)), 2 * n
+    cover_at_start = -vector[row] / cover[row]
+    for n_pivots in range(1, limit + 1):
+        leaving = int(basis[row])
+        tableau[row] /= tableau[row, entering]
+        others = np.arange(n) != row
+        tableau[others] -= np.outer(tableau[others, entering], tableau[row])
+        basis[row] = entering
+        if leaving == 2 * n:
+            solution = np.zeros(2 * n)
+            solution[basis] = np.maximum(tableau[:, -1], 0.0)
+            return _solved_anew(matrix, vector, solution[n:], basis[basis >= n] - n), n_pivots
+        entering = leaving + n if leaving < n else leaving - n
+        covering = int(np.flatnonzero(basis == 2 * n)[0])
+        next_row = _leaving_row(tableau[:, entering], tableau[:, -1], covering, cover_at_start)
+        if next_row is None:
+            return None, n_pivots
+        row = next_row
+    return None, limit
+
+
+def _solved_anew(matrix: FloatArray, vector: FloatArray, found: FloatArray, basic: IntArray) -> FloatArray:
+    """Return the solution of the last basis without the round-off that the pivots have gathered."""
+    result = np.zeros_like(found)
+    try:
+        result[basic] = np.linalg.solve(matrix[np.ix_(basic, basic)], -vector[basic])
+    except np.linalg.LinAlgError:
+        return found
+    is_same = np.allclose(result, found, rtol=0.0, atol=1e-6 * found.max(initial=0.0))
+    # variables that are zero in a degenerate basis may come out on the other side of it
+    return np.maximum(result, 0.0) if is_same else found
+
+
+def _leaving_row(column: FloatArray, right_side: FloatArray, covering: int, cover_at_start: float) -> int | None:
+    """Return the row whose variable reaches zero first when the entering one grows; None if none does (a ray)."""
+    may_leave = column > _ROUND_OFF * np.abs(column).max()
+    if not may_leave.any():
+        return None
+    ratio = np.full(len(column), np.inf)
+    ratio[may_leave] = np.maximum(right_side[may_leave], 0.0) / column[may_leave]
+    row = int(np.argmin(ratio))
+    # Of equal rows the covering variable leaves first: the problem is then solved. Rows are often equal there,
+    # because an open node has no friction either.
+    left_over = right_side[covering] - ratio[row] * column[covering]
+    return covering if may_leave[covering] and left_over <= _ROUND_OFF * cover_at_start else row
+
+
+def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
+    """Return (c, s) of ``bound = c + s |sigma_n|``."""
+    none = np.zeros(problem.n_contact)
+    cohesion = problem.friction_bound(none)
+    stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    coefficient = (problem.friction_bound(none - stress) - cohesion) / stress
+    far = problem.friction_bound(none - 1e3 * stress)
+    is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
+    if not is_affine or np.any((cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)):
+        raise LawError(
+            f"LemkePivoting cannot treat the friction law {law_name(problem.law)}: its bound must be "
+            "c + s |sigma_n| without cap, and c = 0 unless it acts across the gap; use SemismoothNewton"
+        )
+    return cohesion, coefficient
+
+
+def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
+    """Return stiffness and load of any body, from its responses to unit displacements, and the solves spent.
+
+    Free tangents, which no force ever moves here, become springs of their own.
+    """
+    body, n_contact = problem.body, problem.n_contact
+    weights = np.repeat(body.weights, 2)
+    none = np.zeros(n_contact)
+    amount = (float(np.abs(problem.glued_state.traction).max()) or 1.0) / body.stiffness_scale
+    at_rest = problem.respond(stick(none, none)).traction.ravel()
+    stiffness = np.empty((2 * n_contact, 2 * n_contact))
+    for column, unit in enumerate(amount * np.eye(2 * n_contact)):
+        moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
+        stiffness[:, column] = weights * (moved - at_rest) / amount
+    idle = 2 * np.flatnonzero(body.tangent_is_free) + 1
+    stiffness[idle, idle] = weights[idle] * body.stiffness_scale
+    return stiffness, -weights * at_rest, 2 * n_contact + 1
+
+
+def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, FloatArray]:
+    """Return stiffness and load of springs on the free rigid motions, without force at the given state.
+
+    They are carried along from step to step and vanish from the solution.
+    """
+    motions, n_unknowns = problem.body.rigid_motions(), 2 * problem.n_contact
+    if not len(motions):
+        return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
+    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_free], axis=1)
+    motions = (motions * is_held).reshape(len(motions), -1)
+    orthonormal = np.linalg.qr(motions.T)[0]
+    scale = _WEAKER * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
+    springs = scale * orthonormal @ orthonormal.T
+    return springs, springs @ state.displacement.ravel()
+
+
+def _complementarity(
+    problem: ContactProblem, compliance: FloatArray, free: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return matrix and vector for nodal forces in units of the returned force.
+
+    The slips come in the unit of length which that force causes; so the off-diagonal blocks cancel in the quadratic
+    form, and the matrix is copositive.
+    """
+    cohesion, coefficient = _affine_bound(problem)
+    normal, tangential = slice(0, None, 2), slice(1, None, 2)
+    force = float(np.abs(problem.body.weights[:, None] * problem.glued_state.traction).max()) or 1.0
+    unit_compliance = float(np.abs(compliance).max())
+    length = force * unit_compliance
+    relative = compliance / unit_compliance
+    nn, nt = relative[normal, normal], relative[normal, tangential]
+    tn, tt = relative[tangential, normal], relative[tangential, tangential]
+    none, unit = np.zeros_like(nn), np.eye(problem.n_contact)
+    matrix = np.block(
+        [
+            [nn, -nt, nt, none],
+            [-tn, tt, -tt, unit],
+            [tn, -tt, tt, unit],
+            [np.diag(coefficient), -unit, -unit, none],
+        ]
+    )
+    clearance = problem.gap - free[normal]
+    slip = free[tangential] - problem.slip_origin
+    most_friction = problem.body.weights * cohesion / force
+    vector = np.concatenate([clearance / length, slip / length, -slip / length, most_friction])
+    return matrix, vector, force

@@ -1,0 +1,384 @@
+"""The command line: exit codes, one-line errors, no broken files, nothing imported without need."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import types
+from pathlib import Path
+
+import pytest
+
+import bemkit.__main__
+import bemkit.results.result_file
+import bemkit.runs.run
+from bemkit.cli.console import ConvergenceTable, format_size
+from bemkit.cli.main import main
+from bemkit.results.result_file import read_result
+from bemkit.scene.scene import MeshOptions, QuadraticGalerkin
+from bemkit.scene.shipped import shipped_files
+from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml
+from bemkit.solvers.base import Status
+
+SMALL = ["--elements", "40"]
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    assert isinstance(caught.value.code, int)
+    return caught.value.code
+
+
+@pytest.fixture(autouse=True)
+def in_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_run_prints_a_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-1", *SMALL) == 0
+    output = capsys.readouterr()
+    for word in ("converged", "contact nodes", "normal force", "friction force", "separated to slip", "certificate"):
+        assert word in output.out
+    assert output.err == ""  # no convergence table unless a person is watching
+
+
+def test_json_on_standard_output_is_one_object(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-2", *SMALL, "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["status"], result["converged"], result["n_elements"]) == ("converged", True, 40)
+    assert result["force_normal"] == pytest.approx(1.0 / 60.0, rel=1e-9)  # equilibrium
+    assert result["force_tangential"] < 0.0
+    assert {"x", "y", "s", "from", "to"} <= set(result["transitions"][0])
+
+
+def test_an_accuracy_instead_of_elements(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-2", "--discretisation", "quadratic", "--accuracy", "1e-2", "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["estimated_error"] <= 1e-2
+    assert "2 meshes" in result["message"]
+    assert any(item["name"] == "further meshes" and item["needed"] for item in result["plan"]["items"])
+
+
+def test_outputs_go_to_files_and_can_be_shown_again(capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in range(2):  # the second time replaces the first
+        assert call("run", "paper-1", *SMALL, "-q", "-o", "r.h5", "--json", "r.json", "--csv", "r.csv") == 0
+    assert capsys.readouterr() == ("", "")
+    assert sorted(os.listdir()) == ["r.csv", "r.h5", "r.json"]
+    stored = json.loads(Path("r.json").read_text("utf-8"))
+
+    assert call("show", "r.h5") == 0
+    assert "converged" in capsys.readouterr().out
+    assert call("show", "r.h5", "--json", "-") == 0
+    assert json.loads(capsys.readouterr().out) == stored
+    assert call("show", "r.h5", "--csv", "contact") == 0
+    text = capsys.readouterr().out
+    assert text == Path("r.csv").read_text("utf-8")
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert list(rows[0])[:10] == "x y s u_n u_t sigma_n sigma_t gap clearance status".split()
+    assert len(rows) == stored["n_contact"]
+    assert {row["status"] for row in rows} == {"separated", "slip", "stick"}
+    solution = read_result("r.h5")
+    assert [float(row["sigma_n"]) for row in rows] == solution.contact.sigma_n.tolist()
+    assert call("show", "r.h5", "--csv", "boundary") == 0
+    assert len(capsys.readouterr().out.splitlines()) == 41
+    assert call("show", "r.h5", "--csv", "history") == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1 + len(solution.history)
+    assert call("show", "r.h5", "--scene") == 0
+    assert scene_to_toml(scene_from_toml(capsys.readouterr().out)) == scene_to_toml(solution.scene)
+
+
+def test_overrides_reach_the_solver(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--discretisation", "linear", "--solver", "augmented-lagrangian", "--rho", "1e4"]
+    assert call("run", "paper-1", *SMALL, *arguments, "-o", "r.h5", "--json", "-") == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["outer_steps"] > 1
+    scene = read_result("r.h5").scene
+    assert 'discretisation = "linear"' in scene_to_toml(scene)
+    assert "rho_n = 10000.0" in scene_to_toml(scene)
+
+
+def test_a_run_that_does_not_converge_says_so_and_exits_with_1(capsys: pytest.CaptureFixture[str]) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    word = 'solver = "semismooth-newton"'
+    Path("hard.toml").write_text(text.replace(word, 'solver = { kind = "fixed-point", max_steps = 1 }'), "utf-8")
+    assert call("run", "hard.toml", *SMALL) == 1
+    assert "max steps" in capsys.readouterr().out
+
+
+def test_an_accuracy_out_of_reach_exits_with_3_and_keeps_what_was_reached(capsys: pytest.CaptureFixture[str]) -> None:
+    options = MeshOptions(accuracy=1e-9, most_elements=60)
+    Path("far.toml").write_text(
+        scene_to_toml(dataclasses.replace(load_scene("paper-1"), mesh=options, discretisation=QuadraticGalerkin()))
+    )
+    assert call("run", "far.toml", "-o", "far.h5", "--json", "far.json") == 3
+    shown = " ".join(capsys.readouterr().out.split())  # lines are folded
+    assert "accuracy not reached: The accuracy 1e-09 was not reached: more than 60 elements would" in shown
+    summary = json.loads(Path("far.json").read_text())
+    assert (summary["status"], summary["converged"], summary["certified"]) == ("accuracy_not_reached", False, True)
+    again = read_result("far.h5")
+    assert again.status is Status.ACCURACY_NOT_REACHED
+    assert again.linear_solves == summary["linear_solves"] == again.history[-1].linear_solves
+
+
+def test_scenes_and_plan(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("scenes") == 0
+    assert re.search(r"^paper-1 +Square on a rigid foundation", capsys.readouterr().out, re.MULTILINE)
+    assert call("plan", "paper-1") == 0
+    output = capsys.readouterr().out
+    assert "left out" in output
+    assert "hypersingular" in output
+    assert call("plan", "paper-1", "--json", "--elements", "64", "--discretisation", "linear") == 0
+    names = {item["name"]: item["needed"] for item in json.loads(capsys.readouterr().out)["items"]}
+    assert names["hypersingular operator W"]
+
+
+def test_explain_prints_what_was_planned_and_what_it_took(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "paper-1", "--elements", "40", "--explain") == 0
+    output = capsys.readouterr().out
+    rows = {line.split("  ")[0]: line.split() for line in output.splitlines() if line.strip()}
+    for stage in ("mesh", "assemble", "condense", "solve", "recover"):
+        assert len(rows[stage]) == 9  # two times and two sizes, each with its unit
+    assert rows["element pairs integrated"][-2:] == ["1,600", "1,600"]
+    assert rows["factorisations and their orders"][-4:] == ["LU", "84", "LU", "84"]
+    assert "columns of V on the free surface" in rows
+    assert call("run", "paper-1", "--elements", "40", "--explain", "--json", "-", "-o", "r.h5") == 0
+    shown = capsys.readouterr()
+    summary = json.loads(shown.out)
+    assert set(summary["memory"]) == {"mesh", "assemble", "condense", "solve", "recover"}
+    assert {item["name"]: item["needed"] for item in summary["plan"]["items"]}["result file (h5py)"]
+    assert "what was computed" in shown.err
+
+
+def test_a_symmetry_is_proposed(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("block.toml").write_text(
+        """
+title = "block"
+law = "frictionless"
+shape = { kind = "rectangle", width = 2.0, height = 1.0 }
+material = { youngs_modulus = 1.0, poisson_ratio = 0.3 }
+mesh = { elements = 24 }
+parts.floor = { sides = ["bottom"], condition = { kind = "contact", obstacle = "half-plane" } }
+parts.load = { sides = ["top"], condition = { kind = "pressure", pressure = 1.0 } }
+""",
+        "utf-8",
+    )
+    assert call("plan", "block.toml", "--json") == 0
+    reasons = {item["name"]: item["reason"] for item in json.loads(capsys.readouterr().out)["items"]}
+    assert reasons["symmetry"] == "proposed: the scene is symmetric about x = 1, and half of its unknowns would do"
+    text = Path("block.toml").read_text("utf-8")
+    Path("block.toml").write_text(text.replace("law =", "symmetry = { x = 1.0 }\nlaw ="))
+    assert call("plan", "block.toml", "--json") == 0
+    items = {item["name"]: item for item in json.loads(capsys.readouterr().out)["items"]}
+    assert items["symmetry"]["needed"]
+    assert items["symmetry"]["reason"] == "about x = 1: 12 of 24 elements carry unknowns"
+
+
+def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    before = sorted(os.listdir())
+    assert call(*arguments) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith("bemkit: error: ")
+    assert output.err.count("\n") == 1
+    assert sorted(os.listdir()) == before
+    return output.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "papr-1"], "did you mean 'paper-1'"),
+        (["run", "paper-1", "--elements", "2"], "elements is 2"),
+        (["run", "paper-1", "--accuracy", "2", "--discretisation", "linear"], "accuracy is 2.0: give a relative error"),
+        (["run", "paper-1", "--accuracy", "1e-3"], "collocation has no error estimate"),
+        (["run", "paper-1", "--accuracy", "1e-3", "--elements", "40"], "give one of them"),
+        (["run", "paper-1", "--elements", "many"], "'many' is not a valid integer.*bemkit run --help"),
+        (["run", "paper-1", "--elements", "100000"], "use at most"),
+        (["run", "paper-1", "--solver", "newtn"], "unknown solver 'newtn'"),
+        (["run", "paper-1", "--discretisation", "cubic"], "unknown discretisation 'cubic'"),
+        (["run", "paper-1", "--rho", "-1"], "rho"),
+        (["run", "paper-1", "--bogus"], "--bogus"),
+        (["run"], "Missing argument"),
+        (["bogus"], "No such command"),
+        (["run", "paper-1", "-o", "no/r.h5"], "the folder .* does not exist"),
+        (["run", "paper-1", "-o", "."], "exists and is not a file"),
+        (["run", "paper-1", "-o", "thesis.txt"], "exists and is not a bemkit result"),
+        (["run", "paper-1", "--json", "thesis.txt"], "exists and is not a JSON file"),
+        (["run", "paper-1", "--csv", "thesis.txt"], "exists and is not a CSV file"),
+        (["run", "paper-1", "--plot", "thesis.txt"], "exists and is not a folder"),
+        (["run", "paper-1", "--json", "-", "--csv", "-"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r", "--json", "r"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r", "--json", "./r"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "-"], "- is standard output.*give a file name"),
+        (["run", ""], "'': cannot be read .*give the path of a TOML file"),
+        (["show", "."], "not a file: give a file"),
+        (["show", "none.h5"], "no such file"),
+        (["show", "thesis.txt"], "not an HDF5 file"),
+        (["show", "thesis.txt", "--json", "-", "--scene"], "give one of them"),
+        (["plan", "none"], "no such file or shipped scene"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("thesis.txt").write_text("my thesis", "utf-8")
+    assert re.search(message, one_line_error(capsys, *arguments))
+    assert Path("thesis.txt").read_text("utf-8") == "my thesis"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("poisson_ratio = 0.2", "poisson_ratio = 0.9", "poisson_ratio is 0.9"),
+        ("friction_coefficient", "friction_coeficient", "did you mean 'friction_coefficient'"),
+        ('sides = ["right"]', 'sides = ["bottom"]', "foundation"),
+        ("y = -1.0", 'y = "log(x - 2)"', "is nan at"),
+        ("x > 0.5", "x > 5", "top-load"),
+        ("[shape]", "[shape", "not valid TOML"),
+    ],
+)
+def test_a_bad_scene_is_one_line_that_names_the_file(
+    old: str, new: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    assert old in text
+    Path("my.toml").write_text(text.replace(old, new), "utf-8")
+    error = one_line_error(capsys, "run", "my.toml", "-o", "r.h5", *SMALL)
+    assert error.startswith("bemkit: error: my.toml: ")
+    assert message in error
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "arguments", "message"),
+    [
+        ("friction_coefficient = 0.5", 'friction_coefficient = "x - 0.5"', [], "must be zero or positive"),
+        ("friction_coefficient = 0.5", 'friction_coefficient = "log(x - 0.5)"', [], "is nan at"),
+        ('"coulomb"', '"cohesive-coulomb"\ncap = 0.1', ["--solver", "lemke"], "use SemismoothNewton"),
+        ("title =", "load_factors = [0.5, 1.0]\ntitle =", ["--cascade"], "run it on one mesh"),
+    ],
+)
+def test_what_shows_only_while_solving_is_one_line_too(
+    old: str, new: str, arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = shipped_files()["paper-1"].read_text("utf-8")
+    assert old in text
+    Path("my.toml").write_text(text.replace(old, new), "utf-8")
+    error = one_line_error(capsys, "run", "my.toml", "-o", "r.h5", *SMALL, *arguments)
+    assert error.startswith("bemkit: error: my.toml: ")
+    assert message in error
+
+
+def test_defects_of_bemkit_keep_their_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object, **options: object) -> None:
+        raise ValueError("not an input error")
+
+    monkeypatch.setattr(bemkit.runs.run, "run", broken)
+    with pytest.raises(ValueError, match="not an input error"):
+        main(["run", "paper-1"])
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_an_interrupt_leaves_no_file(
+    error: type[BaseException], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr(bemkit.results.result_file, "_write_mesh", interrupted)
+    assert call("run", "paper-1", *SMALL, "-o", "r.h5") == (130 if error is KeyboardInterrupt else 2)
+    assert os.listdir() == []
+    assert capsys.readouterr().err.strip().count("\n") == 0
+
+
+def test_a_real_ctrl_c_ends_with_130() -> None:
+    code = "import sys; from bemkit.cli.main import main; print('ready', flush=True); main(sys.argv[1:])"
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "run", "paper-1", "--elements", "3000", "-o", "r.h5"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(1.0)  # into the assembly of 3000 elements, which takes longer than that
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.strip() == "bemkit: error: interrupted; no file is half written"
+    assert os.listdir() == []
+
+
+def test_an_interrupt_while_the_command_line_loads_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Loading(types.ModuleType):
+        def __getattr__(self, name: str) -> object:
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "bemkit.cli.main", Loading("bemkit.cli.main"))
+    with pytest.raises(SystemExit, match="130"):
+        bemkit.__main__.main()
+    assert capsys.readouterr().err == "bemkit: error: interrupted; no file is half written\n"
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    command = f"{sys.executable} -c 'from bemkit.cli.main import main; main()' run paper-1 --csv - | head -n 1"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("x,y,s")
+    assert done.stderr == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no device that is always full")
+@pytest.mark.parametrize("arguments", ["run paper-1 --elements 40 --json -", "run paper-1 --elements 40", "scenes"])
+def test_a_full_disk_behind_standard_output_is_one_line(arguments: str) -> None:
+    code = "from bemkit.cli.main import main; main()"
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        command = [sys.executable, "-c", code, *arguments.split()]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("bemkit: error: standard output: cannot be written (")
+    assert done.stderr.count("\n") == 1
+
+
+def test_nothing_is_imported_without_need() -> None:
+    code = """
+import sys
+from bemkit.cli.main import main
+try:
+    main(["run", "paper-1", "--elements", "40", "--json", "-"])
+except SystemExit as end:
+    assert end.code == 0
+wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
+wanted |= {f"bemkit.operators.{name}" for name in ("representation", "inner_moments", "multigrid", "cache")}
+wanted |= {f"bemkit.{name}" for name in ("interior", "plotting", "io", "hdf5", "explain", "adaptive")}
+print(sorted(wanted & set(sys.modules)), file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+
+
+def test_the_convergence_table_has_a_line_per_step() -> None:
+    from rich.console import Console
+
+    from bemkit.scene.toml import load_scene, with_overrides
+
+    console = Console(file=io.StringIO(), width=100)
+    solution = bemkit.runs.run.run(
+        with_overrides(load_scene("paper-1"), elements=40), callback=ConvergenceTable(console)
+    )
+    lines = console.file.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert lines[0].split()[:3] == ["step", "solves", "separated"]
+    assert len(lines) == 1 + len(solution.history)
+
+
+def test_sizes_are_readable() -> None:
+    assert [format_size(n) for n in (0, 999, 3_280_000, 5 * 10**13)] == ["0 B", "999 B", "3.28 MB", "50 TB"]

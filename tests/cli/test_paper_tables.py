@@ -1,0 +1,141 @@
+"""The paper's Tables 1 and 2 and the command that prints them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bemkit.studies.paper_tables as module
+from bemkit.cli.main import main
+from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
+from bemkit.studies.accuracy.report import compute_with_progress, to_csv, to_json
+from bemkit.studies.paper_tables import PRINTED, RHO, PaperTable, PaperTableError, paper_model, paper_tables
+
+
+@pytest.fixture(scope="module")
+def tables() -> tuple[PaperTable, PaperTable]:
+    return paper_tables()
+
+
+def test_the_mesh_is_the_papers() -> None:
+    for number in (1, 2):
+        model = paper_model(number)
+        assert model.nodes.nodes.size == 80
+        lengths = model.mesh.lengths[model.mesh.part("foundation")]
+        np.testing.assert_allclose(lengths, lengths[0], rtol=1e-12)
+        assert model.mesh.n_elements == 320
+
+
+def test_example_1_is_constant_where_the_print_is(tables: tuple[PaperTable, PaperTable]) -> None:
+    table = tables[0]
+    assert np.all(np.abs(table.outer_steps[1:, 1:] - 13) <= 3)
+    assert np.ptp(table.outer_steps[1:, 1:]) == 0
+    assert np.all(np.abs(table.outer_steps[0] - 25) <= 5)
+    assert np.all(np.abs(table.outer_steps[:, 0] - 25) <= 5)
+    assert np.ptp(table.outer_steps[0]) == 0
+    assert np.ptp(table.outer_steps[1:, 0]) == 0
+
+
+def test_example_2_has_the_pattern_of_the_print(tables: tuple[PaperTable, PaperTable]) -> None:
+    steps = tables[1].outer_steps
+    # in the print 39, 38, 38 ...; then 29, 12, 12 ...; then 29, 10, 8 ... three times
+    assert np.ptp(steps[0]) <= 1
+    assert np.all(steps[2:] == steps[2])
+    assert np.ptp(steps[1, 2:]) == np.ptp(steps[2, 2:]) == 0
+    assert np.all(np.abs(steps[0] - 31) <= 3)
+    assert np.all(np.abs(steps[1:, 0] - 29) <= 3)
+    assert steps[2, 0] > steps[2, 1] > steps[2, 2]
+    assert abs(steps[2, 1] - 10) <= 1
+    assert abs(steps[2, 2] - 8) <= 1
+    assert steps[1, 2] > steps[2, 2]  # rho_1 = 1e3 is not yet large
+
+
+def test_newton_beats_every_cell(tables: tuple[PaperTable, PaperTable]) -> None:
+    for table in tables:
+        assert table.newton_solves <= 10
+        assert np.all(table.newton_solves < table.linear_solves)
+
+
+def test_the_printed_numbers_are_those_of_the_paper() -> None:
+    assert np.sum(PRINTED[0]) == 9 * 25 + 16 * 13
+    assert np.sum(PRINTED[1]) == 39 + 4 * 38 + 4 * 29 + 4 * 12 + 3 * (10 + 3 * 8)
+
+
+def test_text_forms(tables: tuple[PaperTable, PaperTable]) -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(tables))))
+    assert len(rows) == 50
+    last = {name: float(value) for name, value in rows[-1].items()}
+    assert last == {
+        "table": 2,
+        "rho_1": RHO[-1],
+        "rho_2": RHO[-1],
+        "printed": 8,
+        "outer_steps": tables[1].outer_steps[-1, -1],
+        "linear_solves": tables[1].linear_solves[-1, -1],
+    }
+    loaded = json.loads(to_json(tables))["tables"]
+    assert [entry["table"] for entry in loaded] == [1, 2]
+    assert loaded[0]["outer_steps"] == tables[0].outer_steps.tolist()
+    assert loaded[1]["newton_solves"] == tables[1].newton_solves
+
+
+def test_a_run_that_does_not_stop_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def impatient(rho_n: float, rho_t: float) -> AugmentedLagrangian:
+        return AugmentedLagrangian(rho_n=rho_n, rho_t=rho_t, inner=InnerNewton(max_steps=1))
+
+    monkeypatch.setattr(module, "AugmentedLagrangian", impatient)
+    with pytest.raises(PaperTableError, match=r"table 1, rho_1 = 100, rho_2 = 100: INNER_FAILED in outer step 1"):
+        paper_tables()
+
+    def short(rho_n: float, rho_t: float) -> AugmentedLagrangian:
+        return AugmentedLagrangian(rho_n=rho_n, rho_t=rho_t, max_steps=3)
+
+    monkeypatch.setattr(module, "AugmentedLagrangian", short)
+    with pytest.raises(PaperTableError, match="not stopped after 3 outer steps"):
+        paper_tables()
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(["study", "paper-tables", *arguments])
+    assert isinstance(caught.value.code, int)
+    return caught.value.code
+
+
+def test_the_command(
+    tables: tuple[PaperTable, PaperTable],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("bemkit.studies.accuracy.report.paper_tables", lambda *_: tables)
+    assert call("--json", "t.json", "--csv", "t.csv") == 0
+    shown = capsys.readouterr()
+    cell = f"{tables[0].outer_steps[1, 1]}/13 ({tables[0].linear_solves[1, 1]})"
+    assert cell in shown.out
+    assert max(map(len, shown.out.splitlines())) <= 80
+    assert json.loads(Path("t.json").read_text())["tables"][0]["table"] == 1
+    assert Path("t.csv").read_text() == to_csv(tables)
+    assert call("--csv", "-") == 0
+    assert capsys.readouterr().out == to_csv(tables)
+    assert call("--quiet") == 0
+    assert capsys.readouterr() == ("", "")
+    assert call("--csv", "-", "--json", "-") == 2
+    assert "both print to standard output" in capsys.readouterr().err
+    Path("mine.txt").write_text("not a table")
+    assert call("--csv", "mine.txt") == 2
+    assert Path("mine.txt").read_text() == "not a table"
+
+
+def test_the_progress_bar_sees_every_pair(capsys: pytest.CaptureFixture[str]) -> None:
+    seen: list[tuple[int, float, float]] = []
+    paper_tables(lambda *pair: seen.append(pair))
+    assert len(set(seen)) == len(seen) == 50
+    assert compute_with_progress(is_live=True)[0].number == 1
+    assert capsys.readouterr().out == ""

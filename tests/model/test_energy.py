@@ -1,0 +1,73 @@
+"""Energies that are negative have a name, and those that round-off makes of zero have none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.model.energy import is_indefinite, negative_share
+from bemkit.operators.rigid_modes import rigid_motions
+
+PAPER = bk.ConstantCollocation(slopes=False)
+
+
+def thin_ring(inner_radius: float, elements: int, *parts: bk.Part, **options: object) -> bk.Scene:
+    settings: dict[str, object] = {"material": bk.Material(1e4, 0.3), "law": bk.Coulomb(0.3), **options}
+    shape = bk.Ring(inner_radius, 1.0)
+    return bk.Scene(title="ring", shape=shape, mesh=bk.MeshOptions(elements), parts=parts, **settings)  # type: ignore[arg-type]
+
+
+FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -1.0))), sides=("outer-3", "outer-4"))
+LOAD = bk.Part("load", bk.Traction(y=-1.0), sides=("outer-1", "outer-2"))
+
+
+@pytest.mark.parametrize("law", [bk.Coulomb(0.3), bk.Frictionless(), bk.Tresca(0.1)])
+def test_a_body_that_pushes_back_the_wrong_way_is_a_named_failure(law: bk.FrictionLaw) -> None:
+    solution = bk.run(thin_ring(0.8, 40, FLOOR, LOAD, discretisation=PAPER, law=law))
+    assert solution.status is bk.Status.NEGATIVE_ENERGY
+    assert "more elements" in solution.message
+    assert "the stiffness that the contact boundary sees is negative" in solution.message
+
+
+def test_slopes_that_keep_means_bend_the_same_ring_the_right_way() -> None:
+    solution = bk.run(thin_ring(0.8, 40, FLOOR, LOAD, discretisation=bk.ConstantCollocation()))
+    assert solution.is_converged
+    top = np.argmax(solution.boundary.points[:, 1])
+    assert solution.boundary.displacement[top, 1] < 0.0 < solution.energy
+
+
+def test_scenes_without_contact_are_judged_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    squeeze = bk.Part("load", bk.Traction(y=bk.Expression("-y")), sides=tuple(f"outer-{k}" for k in range(1, 5)))
+    scene = thin_ring(0.8, 40, squeeze, symmetry=bk.Symmetry(x=0.0, y=0.0), law=bk.Frictionless())
+    assert bk.run(scene).is_converged
+    monkeypatch.setattr("bemkit.model.energy.negative_share", lambda *_: 0.25)
+    solution = bk.run(scene)
+    assert solution.status is bk.Status.NEGATIVE_ENERGY
+    assert "2.5e-01 times" in solution.message
+
+
+def test_work_is_judged_apart_from_rigid_motions() -> None:
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(20, 2))
+    motions = rigid_motions(points, np.zeros(2), 1.0).reshape(40, 3)
+    force = rng.normal(size=40)
+    force -= motions @ np.linalg.lstsq(motions, force, rcond=None)[0]  # balanced
+    force = force.reshape(20, 2)
+    travel = 1e8 * motions.sum(axis=1).reshape(20, 2)
+    assert negative_share(1e-3 * force, force, motions, None) == 0.0
+    assert negative_share(-1e-3 * force, force, motions, None) == pytest.approx(1.0)
+    # 1e8 * 1e-16 of round-off in displacements of 1e-3
+    assert negative_share(travel - 1e-3 * force, force, motions, None) == pytest.approx(1.0, rel=1e-3)
+    assert negative_share(travel + 1e-3 * force, force, motions, None) == 0.0
+    assert negative_share(travel, force, motions, np.ones((20, 2))) == 0.0
+
+
+def test_what_is_indefinite() -> None:
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(6, 6)))[0]
+    for least, expected in ((1.0, False), (0.0, False), (-1e-15, False), (-1e-6, True), (-1.0, True)):
+        assert is_indefinite(turn @ np.diag([5.0, 4.0, 3.0, 2.0, 1.0, least]) @ turn.T) is expected
+    assert not is_indefinite(np.diag([1.0, -1e-9]), np.full((2, 2), 1e6))  # the round-off of a body of such sizes
+    assert not is_indefinite(np.array([[1.0, 5.0], [-5.0, 1.0]]))  # no energy in the part that is antisymmetric
+    assert not is_indefinite(np.array([[np.nan]]))
+    assert not is_indefinite(np.zeros((0, 0)))

@@ -1,0 +1,260 @@
+"""The plan: what is needed, what is left out, and what fits."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tracemalloc
+
+import pytest
+
+import bemkit as bk
+import bemkit.plan.memory
+from bemkit.cli.main import main
+from bemkit.contact.laws import Frictionless
+from bemkit.contact.obstacle import HalfPlane
+from bemkit.geometry.shapes import Disk, Rectangle
+from bemkit.operators.linear.solvers import DefiniteOperator, Factor, Krylov, LinearSolver
+from bemkit.operators.material import Material
+from bemkit.plan import (
+    Machine,
+    Plan,
+    Stage,
+    TooLargeError,
+    Wishes,
+    check_elements,
+    check_memory,
+    make_plan,
+    this_machine,
+)
+from bemkit.scene.scene import Clamped, Condition, Contact, MeshOptions, Part, PrescribedDisplacement, Roller, Scene
+from bemkit.scene.toml import load_scene, with_overrides
+
+SLOW = Machine(seconds_per_evaluation=1e-7, seconds_per_flop=1e-9, seconds_per_call=1e-6)
+FAST = Machine(seconds_per_evaluation=1e-8, seconds_per_flop=1e-11, seconds_per_call=1e-7)
+
+
+def plan_of(scene: Scene) -> Plan:
+    return make_plan(scene, scene.build_mesh())
+
+
+def needed(scene: Scene) -> dict[str, bool]:
+    return {item.name: item.is_needed for item in plan_of(scene).items}
+
+
+def reasons(scene: Scene) -> dict[str, str]:
+    return {item.name: item.reason for item in plan_of(scene).items}
+
+
+class Borrowed:
+    """A linear solver of somebody else, which iterates."""
+
+    forms_matrix = False
+
+    def factor(self, operator: DefiniteOperator, name: str) -> Factor:
+        """Return what Krylov returns."""
+        return Krylov().factor(operator, name)
+
+
+def replace_solver(scene: Scene, solver: LinearSolver) -> Scene:
+    return dataclasses.replace(scene, linear_solver=solver)
+
+
+def block(*conditions: tuple[str, Condition]) -> Scene:
+    parts = [Part("foundation", Contact(HalfPlane()), ("bottom",))]
+    parts += [Part(side, condition, (side,)) for side, condition in conditions]
+    return Scene(
+        title="t", shape=Rectangle(2.0, 1.0), material=Material(1.0, 0.3), parts=tuple(parts), mesh=MeshOptions(24)
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "n_free"),
+    [
+        (block(), 3),
+        (block(("right", Roller())), 1),
+        (block(("top", PrescribedDisplacement(y=0.0))), 1),
+        (block(("right", Roller()), ("top", Roller())), 0),
+        (block(("right", Roller()), ("left", Roller())), 1),
+        (block(("left", Clamped())), 0),
+    ],
+)
+def test_rigid_motions_that_only_contact_holds_are_counted(scene: Scene, n_free: int) -> None:
+    assert plan_of(scene).sizes.n_free_motions == n_free
+    assert needed(scene)["rigid motions as unknowns"] == (n_free > 0)
+
+
+def test_numbers_and_verbs_agree() -> None:
+    one, three = (reasons(scene)["rigid motions as unknowns"] for scene in (block(("right", Roller())), block()))
+    assert one == "1 of 3 rigid motions is held by contact alone"
+    assert three == "3 of 3 rigid motions are held by contact alone"
+
+
+def test_a_disc_on_rollers_all_round_may_still_turn() -> None:
+    arcs = ("arc-1", "arc-2", "arc-3")
+    parts = (Part("floor", Contact(HalfPlane()), ("arc-4",)), Part("ring", Roller(), arcs))
+    scene = Scene(title="t", shape=Disk(1.0), material=Material(1.0, 0.3), parts=parts, mesh=MeshOptions(64))
+    assert plan_of(scene).sizes.n_free_motions == 1
+    assert needed(scene)["quadrature on curved elements"]
+
+
+def test_what_is_left_out_depends_on_the_scene() -> None:
+    scene = load_scene("paper-1")
+    constant = needed(scene)
+    linear = needed(with_overrides(scene, discretisation="linear"))
+    frictionless = needed(dataclasses.replace(scene, law=Frictionless()))
+    assert not constant["hypersingular operator W"]
+    assert linear["hypersingular operator W"]
+    assert not constant["columns of V on the free surface"]
+    assert constant["friction"]
+    assert constant["tangential unknowns"]
+    assert not frictionless["friction"]
+    assert not frictionless["tangential unknowns"]
+    assert not constant["quadrature on curved elements"]
+    assert not constant["stress inside the body"]
+    assert not constant["figures (matplotlib)"]
+    assert not linear["second elastic body"]
+    assert "columns of V on the free surface" not in linear  # Galerkin takes whole matrices
+    held = [Part(side, Roller(), (side,)) for side in ("left", "right", "bottom", "top")]
+    without = block(*((part.name, part.condition) for part in held if part.name != "bottom"))
+    without = dataclasses.replace(without, parts=tuple(held), law=Frictionless())
+    without = with_overrides(without, discretisation="constant")
+    assert not needed(without)["contact system"]
+    assert "second elastic body" not in needed(without)
+    assert not needed(without)["columns of V on the free surface"]
+
+
+def test_pyamg_is_needed_only_where_the_preconditioner_is_coarsened() -> None:
+    name, linear = "algebraic multigrid (pyamg)", block(("left", Clamped()))
+    n_free = plan_of(linear).sizes.n_free
+    factored, coarsened = (replace_solver(linear, Krylov(coarsest=n)) for n in (n_free, n_free - 1))
+    assert reasons(linear)[name] == "the linear solver is direct"
+    assert not needed(factored)[name]
+    assert reasons(factored)[name] == f"the preconditioner is factored: its order {n_free} does not exceed {n_free}"
+    assert needed(coarsened)[name]
+    assert reasons(replace_solver(linear, Borrowed()))[name] == "the linear solver is Borrowed"
+
+
+def test_the_pressure_of_an_incompressible_body_is_one_more_unknown_of_galerkin_maps_alone() -> None:
+    name, linear = "pressure that keeps the volume", block(("left", Clamped()))
+    assert reasons(linear)[name] == "the body is compressible"
+    linear = dataclasses.replace(linear, material=Material(1.0, 0.5))
+    assert needed(linear)[name]
+    constant = with_overrides(linear, discretisation="constant")
+    assert not needed(constant)[name]
+    assert reasons(constant)[name] == "collocation has it among the tractions"
+
+
+def test_a_plan_knows_the_outputs_that_are_asked_for() -> None:
+    plan = plan_of(load_scene("paper-1"))
+    wished = plan.with_outputs(Wishes(result_file=True))
+    outputs = {item.name: item.is_needed for item in wished.items if item.stage is Stage.OUTPUTS}
+    assert outputs == {"result file (h5py)": True, "figures (matplotlib)": False}
+    assert wished.with_outputs(Wishes()) == plan
+    assert sum(wished.seconds(FAST).values()) > sum(plan.seconds(FAST).values())
+
+
+def test_every_item_has_a_reason_and_costs_grow() -> None:
+    scene = load_scene("paper-1")
+    small, large = (plan_of(with_overrides(scene, elements=n, discretisation="linear")) for n in (400, 800))
+    assert all(item.reason for item in small.items)
+    assert large.memory == pytest.approx(4 * small.memory, rel=0.1)  # nodes at ends of parts and fixed buffers
+    # the time of dense algebra grows with the cube, that of assembly with the square
+    assert 7.0 < large.seconds(SLOW)[Stage.CONDENSE] / small.seconds(SLOW)[Stage.CONDENSE] < 8.2
+    assert small.as_dict()["memory"] == small.memory
+    assert small.as_dict()["work"] == small.work.as_dict()
+    assert all(item["seconds"] >= 0.0 for item in small.as_dict(SLOW)["items"])
+    assert small.as_dict(SLOW)["seconds"] > 10.0 * small.as_dict(FAST)["seconds"] * (1.0 - 1e-12)
+
+
+def test_a_machine_is_measured_once() -> None:
+    machine = this_machine()
+    assert machine is this_machine()
+    assert min(machine.seconds_per_evaluation, machine.seconds_per_flop, machine.seconds_per_call) > 0.0
+
+
+def test_a_run_measures_no_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A prediction that nobody asks for costs nothing."""
+
+    def measured(*_: object) -> None:
+        raise AssertionError("the machine was measured")
+
+    this_machine.cache_clear()
+    monkeypatch.setattr("bemkit.plan.machine._best", measured)
+    assert bk.run(block(("right", Roller()))).is_converged
+    with pytest.raises(AssertionError, match="was measured"):
+        this_machine()
+
+
+TRACED = {
+    "constant": with_overrides(load_scene("paper-1"), elements=240),
+    "linear": with_overrides(load_scene("paper-1"), elements=200, discretisation="linear"),
+    "quadratic": with_overrides(load_scene("paper-1"), elements=120, discretisation="quadratic"),
+    "frictionless": with_overrides(load_scene("wavy-obstacle"), elements=200, discretisation="linear"),
+    "contact all along": with_overrides(load_scene("receding-layer"), elements=200, discretisation="constant"),
+    "Krylov": dataclasses.replace(
+        with_overrides(load_scene("paper-1"), elements=160, discretisation="linear"), linear_solver=Krylov()
+    ),
+    "curved": with_overrides(load_scene("disc-between-plates"), elements=200, discretisation="linear"),
+}
+
+
+@pytest.mark.parametrize("kind", TRACED)
+def test_the_largest_memory_is_foreseen(kind: str) -> None:
+    """Within a fifth: a model of what is alive at once knows no temporary array of a line of code.
+
+    The mesh is a matter of kilobytes.
+    """
+    scene = TRACED[kind]
+    bk.run(with_overrides(scene, elements=40))  # loads what is loaded on first use
+    tracemalloc.start()
+    try:
+        solution = bk.run(scene)
+    finally:
+        tracemalloc.stop()
+    assert solution.is_converged
+    assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
+    for stage in (Stage.ASSEMBLE, Stage.CONDENSE, Stage.SOLVE, Stage.RECOVER):
+        assert solution.memory[stage.value] == pytest.approx(solution.plan.peaks[stage], rel=0.25), stage
+
+
+def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = plan_of(load_scene("paper-1"))
+    check_memory(plan)
+    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 0.25 * plan.memory)
+    message = f"320 elements need about {plan.memory / 1e9:.3g} GB, this computer has .* GB: use at most 160 elements"
+    with pytest.raises(TooLargeError, match=message):
+        check_memory(plan)
+    with pytest.raises(TooLargeError, match="use at most 160 elements"):
+        bk.run(load_scene("paper-1"))
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_a_million_elements_are_refused_before_the_mesh_is_made(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    built: list[int | None] = []
+    build_mesh = bk.Scene.build_mesh
+
+    def watched(scene: bk.Scene) -> bk.BoundaryMesh:
+        built.append(scene.mesh.elements)
+        return build_mesh(scene)
+
+    monkeypatch.setattr(bk.Scene, "build_mesh", watched)
+    with pytest.raises(SystemExit, match="2"):
+        main([command, "paper-1", "--elements", "1000000"])
+    message = r"1000000 elements need about \S+ GB, this computer has \S+ GB: use at most \d+ elements"
+    assert re.search(message, capsys.readouterr().err)
+    assert max(filter(None, built)) <= 2000
+
+
+def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = bk.load_scene("paper-1")
+    large = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=12_000))
+    needed = make_plan(large, large.build_mesh()).memory
+    # the parts that grow more slowly than the square are a few thousandths
+    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 1.01 * needed)
+    check_elements(large)
+    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 0.99 * needed)
+    with pytest.raises(TooLargeError, match=r"use at most 119.. elements"):
+        check_elements(large)

@@ -1,0 +1,111 @@
+"""Figures: they say what they must, and the files are complete."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from bemkit.atomic_files import OutputFileError
+from bemkit.results.figures import (
+    STATUS_COLOURS,
+    Units,
+    draw_contact_displacement,
+    draw_contact_status,
+    draw_contact_traction,
+    draw_deformation,
+    exaggeration,
+    node_displacement,
+    save_figures,
+)
+from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.runs.run import run
+from bemkit.scene.toml import load_scene, with_overrides
+
+
+@pytest.fixture(scope="module", params=["linear", "constant"])
+def solution(request: pytest.FixtureRequest) -> Solution:
+    return run(with_overrides(load_scene("paper-1"), elements=40, discretisation=request.param))
+
+
+def test_all_figures_are_complete_pictures(solution: Solution, tmp_path: Path) -> None:
+    for _ in range(2):  # the second time replaces the first
+        paths = save_figures(solution, tmp_path / "figures")
+    names = ["deformation", "contact-displacement", "contact-traction", "contact-status"]
+    assert [path.stem for path in paths] == names
+    assert sorted(path.name for path in (tmp_path / "figures").iterdir()) == sorted(f"{name}.png" for name in names)
+    for path in paths:
+        picture = matplotlib.image.imread(path)
+        assert min(picture.shape[:2]) > 500
+        assert picture[..., :3].std() > 0.05  # not blank
+
+
+def test_the_deformation_tells_its_factor_and_its_units(solution: Solution) -> None:
+    figure = draw_deformation(solution, units=Units("mm", "MPa"))
+    axes = figure.axes[0]
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    factor = exaggeration(solution.mesh.diameter, node_displacement(solution))
+    assert f"deformed, displacements \u00d7 {factor:g}" in legend
+    assert "obstacle" in legend
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
+    drawn = axes.lines[1].get_xydata()[:-1]
+    np.testing.assert_allclose(drawn - solution.mesh.nodes, factor * node_displacement(solution), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("draw", "label"),
+    [
+        (draw_contact_displacement, "displacement [m]"),
+        (draw_contact_traction, "traction [Pa]"),
+        (draw_contact_status, "pressure [Pa]"),
+    ],
+)
+def test_contact_figures_have_labels_curves_and_a_status_strip(solution: Solution, draw: object, label: str) -> None:
+    axes, strip, *_ = draw(solution, "foundation").axes  # type: ignore[operator]
+    assert axes.get_ylabel() == label
+    assert strip.get_xlabel() == "arc length $s$ along 'foundation' [m]"
+    assert axes.get_title()
+    assert len(axes.get_legend().get_texts()) >= 2
+    bars = [(patch.get_x(), patch.get_x() + patch.get_width(), patch.get_facecolor()) for patch in strip.patches]
+    places = [transition.s for transition in solution.transitions]
+    np.testing.assert_allclose([end for _, end, _ in bars], [*places, 1.0], rtol=1e-12)
+    colours = [matplotlib.colors.to_hex(colour).upper() for _, _, colour in bars]
+    assert colours == [STATUS_COLOURS[word].upper() for word in ("separated", "slip", "stick")]
+
+
+def test_titles_may_hold_any_character(solution: Solution, tmp_path: Path) -> None:
+    scene = dataclasses.replace(solution.scene, title="costs $5 and \\frac{ more_ than $")
+    save_figures(dataclasses.replace(solution, scene=scene), tmp_path)
+
+
+def test_displacements_at_nodes_are_those_of_a_linear_field(solution: Solution) -> None:
+    points, centres = solution.boundary.points, solution.boundary.centres
+    gradient = np.array([[0.5, -2.0], [3.0, 0.25]])
+    linear = BoundaryFields(points.copy(), points @ gradient, centres.copy(), np.zeros_like(centres))
+    changed = dataclasses.replace(solution, boundary=linear)
+    before, after = solution.mesh.node_elements.T
+    is_corner = np.sum(solution.mesh.tangents[before] * solution.mesh.tangents[after], axis=1) < 0.5
+    assert is_corner.sum() == 4
+    error = np.abs(node_displacement(changed) - solution.mesh.nodes @ gradient).max(axis=1)
+    assert error[~is_corner].max() < 1e-14  # values up to 5
+    assert error.max() < solution.mesh.lengths.max() * np.abs(gradient).max()  # corners are cut by half an element
+
+
+@pytest.mark.parametrize(
+    ("largest", "factor"), [(1.0, 0.05), (0.08, 1.0), (0.03, 2.0), (1e-5, 5e3), (0.0, 1.0), (np.nan, 1.0)]
+)
+def test_the_exaggeration_is_a_round_number(largest: float, factor: float) -> None:
+    displacement = np.array([[0.0, 0.0], [0.0, -largest]])
+    assert exaggeration(1.0, displacement) == pytest.approx(factor, rel=1e-12)
+
+
+def test_files_of_others_are_left_alone(solution: Solution, tmp_path: Path) -> None:
+    (tmp_path / "contact-traction.png").write_text("mine", "utf-8")
+    with pytest.raises(OutputFileError, match=r"contact-traction\.png: exists and is not a figure"):
+        save_figures(solution, tmp_path)
+    (tmp_path / "file").write_text("mine", "utf-8")
+    with pytest.raises(OutputFileError, match="the folder cannot be made"):
+        save_figures(solution, tmp_path / "file")

@@ -1,0 +1,151 @@
+"""Scenes with known answers, and the true error of a solution in the energy norm."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import bemkit as bk
+from bemkit.geometry.curves import Arc, Segment
+from bemkit.geometry.outline import Outline, Side
+from bemkit.model.contact_model import build_model
+
+REFERENCE = Path(bk.__file__).parent / "reference" / "data"
+
+
+@dataclass(frozen=True)
+class QuarterDisk:
+    """The quarter x > 0, y < 0 of a disc around the origin."""
+
+    radius: float = 1.0
+
+    def outline(self) -> Outline:
+        """Return the arc and two radii."""
+        r = self.radius
+        arc = Side("arc", Arc((0.0, 0.0), r, -0.5 * np.pi, 0.0))
+        top, left = Side("top", Segment((r, 0.0), (0.0, 0.0))), Side("left", Segment((0.0, 0.0), (0.0, -r)))
+        return Outline(((arc, top, left),))
+
+
+def paper(example: int, discretisation: Any = None, mesh: bk.MeshOptions | None = None) -> bk.Scene:
+    """One of the paper's examples."""
+    scene = bk.load_scene(f"paper-{example}")
+    discretisation = bk.QuadraticGalerkin() if discretisation is None else discretisation
+    scene = dataclasses.replace(scene, discretisation=discretisation)
+    return dataclasses.replace(scene, mesh=scene.mesh if mesh is None else mesh)
+
+
+def wavy() -> bk.Scene:
+    """A block pressed onto waves (Westergaard): contact up to a = 0.25, peak pressure 0.048824."""
+    gap = bk.Gap(bk.Expression("0.01 * (1 - cos(2 * pi * x))"))
+    return bk.Scene(
+        title="wavy obstacle",
+        shape=bk.Rectangle(0.5, 1.5),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("foundation", bk.Contact(gap), sides=("bottom",)),
+            bk.Part("left", bk.Roller(), sides=("left",)),
+            bk.Part("right", bk.Roller(), sides=("right",)),
+            bk.Part("load", bk.Pressure(0.0172616), sides=("top",)),
+        ),
+        discretisation=bk.QuadraticGalerkin(),
+    )
+
+
+def disc(approach: float = 0.0160341) -> bk.Scene:
+    """A quarter of a disc between rigid plates, E' = 1: half-angle 0.100134, peak pressure 0.050235."""
+    floor = bk.Contact(bk.HalfPlane((0.0, approach - 1.0), (0.0, 1.0)))
+    return bk.Scene(
+        title="disc between plates",
+        shape=QuarterDisk(),
+        material=bk.Material(1.0 - 0.3**2, 0.3),
+        parts=(
+            bk.Part("foundation", floor, sides=("arc",), where=bk.Expression("y < -0.5")),
+            bk.Part("top", bk.Roller(), sides=("top",)),
+            bk.Part("left", bk.Roller(), sides=("left",)),
+        ),
+        discretisation=bk.QuadraticGalerkin(),
+    )
+
+
+def angle() -> bk.Scene:
+    """An L clamped at its back and pushed down at its end: a re-entrant corner with the exponent 0.54."""
+    corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (0.5, 0.5), (0.5, 1.0), (0.0, 1.0))
+    return bk.Scene(
+        title="L",
+        shape=bk.Polygon(corners, ("foundation", "end", "step", "inner", "top", "back")),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("foundation", bk.Contact(bk.HalfPlane()), sides=("foundation",)),
+            bk.Part("wall", bk.Clamped(), sides=("back",)),
+            bk.Part("load", bk.Traction(y=-1e-3), sides=("end",)),
+        ),
+        discretisation=bk.QuadraticGalerkin(),
+    )
+
+
+def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
+    """Return the relative error in the energy norm against the solution on the same mesh with all elements bisected."""
+    scene, mesh = solution.scene, solution.mesh
+    for _ in range(n_bisections):
+        mesh = mesh.refined(np.arange(mesh.n_elements))
+    fine = bk.run(scene, mesh=mesh).boundary.displacement
+    space, fine_space = (scene.discretisation.displacement_space(m) for m in (solution.mesh, mesh))
+    n_parts = 2**n_bisections
+    own = np.arange(mesh.n_elements)
+    xi = (2.0 * (own % n_parts)[:, None] + 1.0 + fine_space.local_nodes) / n_parts - 1.0
+    inherited = np.empty_like(fine)
+    for local, dofs in enumerate(fine_space.element_dofs.T):
+        at_dofs = solution.boundary.displacement[space.element_dofs[own // n_parts]]
+        inherited[dofs] = np.einsum("pe,epc->ec", space.basis(xi[:, local]), at_dofs)
+    stiffness = build_model(scene, mesh).elastic.matrix()
+    error = (fine - inherited).ravel()
+    return float(np.sqrt(error @ stiffness @ error / (fine.ravel() @ stiffness @ fine.ravel())))
+
+
+@lru_cache
+def reference_table(example: int) -> Any:
+    """Return the columns x, u_n, u_t, sigma_n, sigma_t of the independent reference."""
+    return np.genfromtxt(REFERENCE / f"paper-{example}.csv", delimiter=",", names=True)
+
+
+@lru_cache
+def reference_values(example: int) -> tuple[dict[str, float], list[float]]:
+    """Return the scalars and the transition points of the independent reference."""
+    data = json.loads((REFERENCE / f"paper-{example}.json").read_text())
+    return {name: entry["value"] for name, entry in data["scalars"].items()}, [t["x"] for t in data["transitions"]]
+
+
+def contact_error(solution: bk.Solution, example: int, *names: str) -> float:
+    """Return the relative L2 error of columns of the contact table on the contact side, evaluated by the elements."""
+    return table_error(example, {name: contact_values(solution, example, name) for name in names})
+
+
+def table_error(example: int, fields: dict[str, Any]) -> float:
+    """Return the relative L2 error on the contact side of some fields at the points of the reference, together."""
+    table = reference_table(example)
+    weights = np.gradient(table["x"])
+    miss = sum(float(weights @ (values - table[name]) ** 2) for name, values in fields.items())
+    return float(np.sqrt(miss / sum(float(weights @ table[name] ** 2) for name in fields)))
+
+
+def contact_values(solution: bk.Solution, example: int, name: str) -> Any:
+    """Return a column of the contact table at the points of the reference, interpolated by the displacement space."""
+    x, mesh = reference_table(example)["x"], solution.mesh
+    space = solution.scene.discretisation.displacement_space(mesh)
+    elements = mesh.part("foundation")  # in order of x on the bottom side
+    ends = mesh.end[elements, 0]
+    own = elements[np.minimum(np.searchsorted(ends, x - 1e-14), elements.size - 1)]
+    start, end = mesh.start[own, 0], mesh.end[own, 0]
+    xi = np.clip((2.0 * x - start - end) / (end - start), -1.0, 1.0)
+    chain = space.element_dofs[elements].ravel()
+    chain = chain[np.sort(np.unique(chain, return_index=True)[1])]
+    at_dofs = np.zeros(space.n_dofs // 2)
+    at_dofs[chain] = getattr(solution.contact, name)
+    return np.einsum("pn,np->n", space.basis(xi), at_dofs[space.element_dofs[own]])

@@ -1,0 +1,81 @@
+"""The error estimate against true errors, on problems with known answers."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
+from bemkit.results.error_indicators import element_errors
+from tests.runs.refinement_problems import angle, disc, paper, true_error, wavy
+
+PROBLEMS: dict[str, Callable[[], bk.Scene]] = {
+    "paper-1": lambda: paper(1),
+    "paper-2": lambda: paper(2),
+    "wavy": wavy,
+    "disc": disc,
+    "L": angle,
+}
+ELEMENTS = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize("word", ELEMENTS)
+@pytest.mark.parametrize("exponent", [1.0, 2.0])
+def test_effectivity(problem: str, word: str, exponent: float) -> None:
+    mesh = bk.MeshOptions(elements=48, grading=bk.Algebraic(exponent))
+    scene = dataclasses.replace(PROBLEMS[problem](), discretisation=ELEMENTS[word], mesh=mesh)
+    solution = bk.run(scene)
+    assert solution.estimated_error is not None
+    effectivity = solution.estimated_error / true_error(solution)
+    assert 0.3 <= effectivity <= 5.0
+
+
+@pytest.mark.parametrize("word", ELEMENTS)
+def test_effectivity_of_adapted_meshes(word: str) -> None:
+    scene = paper(1, ELEMENTS[word], bk.MeshOptions(accuracy=4e-3))
+    solution = bk.run(scene)
+    assert solution.estimated_error is not None
+    assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
+
+
+@pytest.mark.parametrize("space", [LinearSpace, QuadraticSpace])
+def test_what_the_space_holds_has_no_error(space: type[LinearSpace]) -> None:
+    mesh = bk.discretise(bk.Rectangle(2.0, 1.0).outline(), n_elements=30, grading=bk.Algebraic(2.0))
+    functions = space(mesh)
+    points = np.empty((functions.n_dofs // 2, 2))
+    points[functions.element_dofs] = mesh.points(np.arange(30), functions.local_nodes)
+    linear = points @ np.array([[1.0, 0.3], [-0.2, 0.5]])
+    # round-off of differences over the shortest elements, which are 1e-2 long
+    assert element_errors(functions, linear, 1.0).sum() < 1e-24
+
+
+def test_the_estimate_scales_with_stiffness_and_squared_displacement() -> None:
+    mesh = bk.discretise(bk.Rectangle(2.0, 1.0).outline(), n_elements=30)
+    displacement = np.sin(3.0 * mesh.nodes)
+    once = element_errors(LinearSpace(mesh), displacement, 2.0)
+    assert once.min() >= 0.0
+    assert once.max() > 0.0
+    np.testing.assert_allclose(element_errors(LinearSpace(mesh), 3.0 * displacement, 4.0), 18.0 * once, rtol=1e-12)
+
+
+def test_collocation_has_no_estimate() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
+    assert solution.element_errors is None
+    assert solution.summary()["estimated_error"] is None
+
+
+def test_a_body_at_rest_has_no_error() -> None:
+    parts = (
+        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("lid", bk.Clamped(), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="rest", shape=bk.Rectangle(1.0, 1.0), material=bk.Material(1.0, 0.3), parts=parts,
+        mesh=bk.MeshOptions(elements=12),
+    )  # fmt: skip
+    assert bk.run(scene).estimated_error == 0.0

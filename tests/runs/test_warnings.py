@@ -1,0 +1,202 @@
+"""Warnings: found, shown in yellow, and kept in JSON and result files."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from rich.console import Console
+
+import bemkit as bk
+from bemkit.cli.console import print_plan, print_summary
+from bemkit.contact.laws import Coulomb, Frictionless
+from bemkit.contact.obstacle import Gap
+from bemkit.formulas import Expression
+from bemkit.geometry.shapes import Rectangle
+from bemkit.hdf5 import MARK, seal
+from bemkit.operators.material import Material
+from bemkit.plan import make_plan, this_machine
+from bemkit.results.result_file import read_result, write_result
+from bemkit.results.solution import Solution
+from bemkit.results.tables import to_json
+from bemkit.results.warnings import FEWEST_NODES, find_warnings
+from bemkit.runs.run import run, run_history
+from bemkit.scene.scene import (
+    Clamped,
+    Contact,
+    LinearGalerkin,
+    MeshOptions,
+    Part,
+    PrescribedDisplacement,
+    Scene,
+    Traction,
+)
+from bemkit.scene.toml import load_scene, with_overrides
+from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.base import Status
+
+WORDS = ("The first doubt: do this.", "The second, with \N{GREEK SMALL LETTER NU} = 0.5.")
+
+
+@pytest.fixture(scope="module")
+def solution() -> Solution:
+    found = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="linear"))
+    plan = dataclasses.replace(found.plan, warnings=WORDS[:1])
+    return dataclasses.replace(found, plan=plan, warnings=WORDS)
+
+
+def test_a_file_keeps_warnings(tmp_path: Path, solution: Solution) -> None:
+    write_result(tmp_path / "r.h5", solution)
+    again = read_result(tmp_path / "r.h5")
+    assert (again.warnings, again.plan.warnings) == (WORDS, WORDS[:1])
+
+
+def test_a_file_written_before_there_were_warnings_can_be_read(tmp_path: Path, solution: Solution) -> None:
+    write_result(tmp_path / "r.h5", solution)
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        del file["warnings"], file["plan/warnings"]
+    seal(tmp_path / "r.h5", MARK)
+    again = read_result(tmp_path / "r.h5")
+    assert (again.warnings, again.plan.warnings) == ((), ())
+
+
+def test_json_lists_warnings(solution: Solution) -> None:
+    summary = json.loads(to_json(solution))
+    assert summary["warnings"] == list(WORDS)
+    assert summary["plan"]["warnings"] == list(WORDS[:1])
+
+
+def test_the_summary_shows_warnings_in_yellow(solution: Solution) -> None:
+    stream = io.StringIO()
+    print_summary(solution, Console(file=stream, force_terminal=True, color_system="standard", width=200))
+    lines = stream.getvalue().splitlines()
+    # 33 is yellow in ISO 6429
+    assert [line for line in lines if "warning" in line] == [f"\x1b[33mwarning: {words}\x1b[0m" for words in WORDS]
+
+
+def test_the_plan_shows_warnings(capsys: pytest.CaptureFixture[str], solution: Solution) -> None:
+    print_plan("title", solution.plan, this_machine())
+    assert f"warning: {WORDS[0]}" in capsys.readouterr().out
+
+
+def test_a_plan_without_doubts_has_no_warnings() -> None:
+    scene = load_scene("paper-1")
+    assert make_plan(scene, scene.build_mesh()).warnings == ()
+
+
+def bowl(approach: float = 1e-4, **changes: object) -> Scene:
+    """A block pressed onto a parabola, with friction; at 24 linear elements three nodes are in contact."""
+    parts = (
+        Part("foot", Contact(Gap(Expression("0.02 * x**2"))), ("bottom",)),
+        Part("top", PrescribedDisplacement(x=0.0, y=-approach), ("top",)),
+    )
+    scene = Scene(
+        title="bowl", shape=Rectangle(2.0, 1.0, corner=(-1.0, 0.0)), material=Material(1.0, 0.3), parts=parts,
+        law=Coulomb(0.1), discretisation=LinearGalerkin(), mesh=MeshOptions(elements=24),
+    )  # fmt: skip
+    return dataclasses.replace(scene, **changes)  # type: ignore[arg-type]
+
+
+def test_a_contact_zone_of_few_nodes_is_doubted_once() -> None:
+    solution = run(bowl())
+    n_closed = solution.contact.n_contact - solution.contact.status_words().count("separated")
+    assert 0 < n_closed < FEWEST_NODES
+    narrow = [words for words in solution.warnings if " zone of part 'foot' at s = " in words]
+    assert len(narrow) == 1
+    assert narrow[0].startswith("A contact zone")
+    assert f"has only {n_closed} node" in narrow[0]
+
+
+def test_a_stick_zone_of_few_nodes_is_doubted_unless_there_is_no_friction() -> None:
+    fine = run(bowl(1e-2, mesh=MeshOptions(elements=120, density={"bottom": 4.0})))
+    assert not [words for words in fine.warnings if words.startswith("A contact zone")]
+    table = fine.contact
+    status = np.where(table.status == NodeStatus.SEPARATED, table.status, NodeStatus.SLIP_FORWARD)
+    closed = np.flatnonzero(status != NodeStatus.SEPARATED)
+    status[closed[4:6]] = NodeStatus.STICK
+    changed = dataclasses.replace(fine, contact=dataclasses.replace(table, status=status))
+    (words,) = [words for words in find_warnings(changed) if " zone of part " in words]
+    place = table.s[closed[4:6]].mean()
+    assert words.startswith(f"A stick zone of part 'foot' at s = {place:.4g} has only 2 nodes: use more")
+    status = status.copy()
+    status[closed[8]] = NodeStatus.STICK
+    twice = dataclasses.replace(fine, contact=dataclasses.replace(table, status=status))
+    assert any("2 nodes, and 1 more zone like it" in words for words in find_warnings(twice))
+    smooth = dataclasses.replace(changed, scene=dataclasses.replace(fine.scene, law=Frictionless()))
+    assert not [words for words in find_warnings(smooth) if " zone of part " in words]
+
+
+def test_a_large_estimated_error_is_doubted(solution: Solution) -> None:
+    assert solution.estimated_error is not None
+    energy = solution.energy * (solution.estimated_error / 0.06) ** 2
+    words = "The estimated error is 6 %: use more elements, or give an accuracy."
+    assert words in find_warnings(dataclasses.replace(solution, energy=energy))
+    fine = dataclasses.replace(solution, energy=4.0 * energy)
+    assert not [words for words in find_warnings(fine) if "estimated error" in words]
+
+
+def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
+    lost = dataclasses.replace(solution, energy=-1e-9)
+    assert lost.estimated_error is None
+    assert lost.summary()["estimated_error"] is None
+    assert any("No error could be estimated, because the elastic energy, -1.0e-09" in w for w in find_warnings(lost))
+    collocation = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="constant"))
+    assert not [words for words in find_warnings(dataclasses.replace(collocation, energy=-1.0)) if "estimate" in words]
+
+
+def test_a_held_side_of_one_element_is_doubted() -> None:
+    block = Scene(
+        title="block", shape=Rectangle(8.0, 1.0), material=Material(1.0, 0.3), discretisation=LinearGalerkin(),
+        parts=(Part("wall", Clamped(), ("left",)), Part("load", Traction(x=1.0), ("right",))),
+        mesh=MeshOptions(elements=18),
+    )  # fmt: skip
+    words = "Part 'wall' has 1 element, too few to estimate the error of its reactions: use more elements there."
+    assert words in run(block).warnings
+    assert not [w for w in run(dataclasses.replace(block, mesh=MeshOptions(elements=72))).warnings if "Part" in w]
+
+
+def test_a_failed_solve_has_the_warnings_of_its_plan_alone(solution: Solution) -> None:
+    failed = dataclasses.replace(solution, status=Status.STALLED, energy=-1.0)
+    assert find_warnings(failed) == solution.plan.warnings
+
+
+def test_a_load_history_keeps_the_warnings_of_all_its_steps() -> None:
+    scene = bowl(load_factors=(1.0, 30.0))
+    steps = run_history([scene])
+    assert steps[0].warnings
+    assert set(run(scene).warnings) == {*steps[0].warnings, *steps[1].warnings}
+
+
+@pytest.mark.parametrize(("elements", "degrees"), [(8, 90), (16, None)])
+def test_elements_that_go_around_a_quarter_of_a_circle_are_doubted(elements: int, degrees: int | None) -> None:
+    squeeze = bk.Part("squeeze", bk.Pressure(bk.Expression("x**2")), sides=tuple(f"outer-{k}" for k in range(1, 5)))
+    scene = bk.Scene(
+        title="ring",
+        shape=bk.Ring(0.9, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(squeeze,),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        mesh=bk.MeshOptions(elements=elements),
+    )
+    found = [warning for warning in bk.run(scene).warnings if "turns by" in warning]
+    assert [f"turns by {degrees} degrees on one element" in warning for warning in found] == [True] * bool(degrees)
+
+
+@pytest.mark.parametrize(("elements", "is_doubted"), [(4, True), (8, False)])
+def test_elements_that_stand_alone_have_no_estimate(elements: int, is_doubted: bool) -> None:
+    scene = bk.Scene(
+        title="block",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("load", bk.Traction(y=-1e-3), sides=("top",)),
+        ),
+        mesh=bk.MeshOptions(elements=elements),
+    )
+    assert any("On 100 % of the boundary single" in warning for warning in bk.run(scene).warnings) == is_doubted

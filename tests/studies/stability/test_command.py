@@ -1,0 +1,132 @@
+"""``bemkit stability``: tables, files, resume, exit codes."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from bemkit.cli.main import commands
+from bemkit.scene.toml import load_scene
+from bemkit.studies.stability import sweep as sweep_module
+from bemkit.studies.stability.axes import all_axes
+from bemkit.studies.stability.cases import find_axes
+from bemkit.studies.stability.files import cells, read_rows, to_csv, to_markdown
+from bemkit.studies.stability.plots import draw_axis
+from bemkit.studies.stability.random_scenes import random_case
+from bemkit.studies.stability.sweep import Row
+from bemkit.studies.stability.trials import Outcome, Trial, try_cases
+
+FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
+
+
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(commands, [str(argument) for argument in arguments], standalone_mode=False)
+
+
+def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> None:
+    files = {name: tmp_path / f"rows.{name}" for name in ("h5", "csv", "md")}
+    result = call(
+        *FAST, "-o", files["h5"], "--csv", files["csv"], "--markdown", files["md"], "--plot", tmp_path / "plots"
+    )
+    assert result.exception is None
+    assert result.return_value == 0
+    assert "11 rows: 6 right, 5 named" in result.output
+    assert "promise: solved below 1, refused above" in result.output
+    scene, rows = read_rows(files["h5"])
+    assert "title" in scene
+    assert len(rows) == 11
+    assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [
+        row.verdict for row in rows
+    ]
+    assert files["csv"].read_text() == to_csv(rows)
+    assert files["md"].read_text().count("| right |") == 6
+    assert (tmp_path / "plots" / "stability-sliding.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_rows_in_the_file_are_not_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert call(*FAST, "-q", "-o", tmp_path / "rows.h5").return_value == 0
+    before = read_rows(tmp_path / "rows.h5")
+    monkeypatch.setattr(sweep_module, "compute", None)  # calling it would fail
+    assert call(*FAST, "-q", "-o", tmp_path / "rows.h5").return_value == 0
+    assert repr(read_rows(tmp_path / "rows.h5")) == repr(before)
+
+
+def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = Row("sliding", 100.0, "wrong", "converged", 1, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, "the check finds 1.0")
+    monkeypatch.setattr(sweep_module, "compute", lambda *arguments: wrong)
+    result = call(*FAST)
+    assert result.return_value == 1
+    assert "the check finds 1.0" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("stability", "paper-3"), "no such file or shipped scene"),
+        (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
+        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "both print to standard output"),
+        (("stability", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
+        (("stability", "--random", "3", "--axis", "gap"), "--axis goes with a sweep of one scene"),
+        (("stability", "paper-1", "--random", "3"), "SCENE goes with a sweep of one scene"),
+        (("stability", "paper-1", "--seed", "3"), "--seed goes with random scenes: add --random"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: tuple[str, ...], message: str) -> None:
+    assert message in str(call(*arguments).exception)
+
+
+def test_files_of_others_and_of_other_scenes_stay(tmp_path: Path) -> None:
+    path = tmp_path / "rows.h5"
+    path.write_text("my thesis")
+    assert "not an HDF5 file" in str(call(*FAST, "-o", path).exception)
+    assert path.read_text() == "my thesis"
+    path.unlink()
+    call(*FAST, "-q", "-o", path)
+    other = call("stability", "paper-2", "--elements", "32", "--axis", "sliding", "-q", "-o", path)
+    assert "holds the sweep of another scene: choose another name or delete it first" in str(other.exception)
+
+
+def test_tables_leave_out_what_does_not_exist() -> None:
+    nan = float("nan")
+    row = Row("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
+    assert cells(row) == ["2", "named", "refused", "", "", "", "", "", "", ""]
+    axes = find_axes(all_axes(), ["sliding"])
+    assert "| 2 | named | refused |" in to_markdown(axes, [row])
+    assert draw_axis(axes[0], [row]).axes[0].get_title(loc="left") == "sliding"
+
+
+def test_random_scenes_are_counted() -> None:
+    result = call("stability", "--random", 8, "--seed", 7, "--first", 40, "--jobs", 1)
+    assert result.exception is None
+    assert result.return_value == 0
+    assert "8 random scenes" in result.output
+    for outcome in ("successes", "warned", "named failures", "wrong successes", "tracebacks"):
+        assert outcome in result.output
+
+
+def test_random_scenes_are_the_same_in_processes() -> None:
+    alone = list(try_cases(7, range(40, 44)))
+    assert list(try_cases(7, range(40, 44), processes=2)) == alone
+
+
+def test_random_scenes_that_fail_are_saved_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = Trial(7, 41, Outcome.WRONG, "status", "status 1.0e+00")
+    monkeypatch.setattr(
+        "bemkit.studies.stability.trial_session.try_cases", lambda seed, indices, processes: iter([found])
+    )
+    result = call("stability", "--random", 1, "--seed", 7, "--first", 41, "--save", tmp_path / "failures")
+    assert result.return_value == 1
+    assert "wrong success: status: status 1.0e+00" in result.output
+    assert "bemkit stability --random 1 --seed 7 --first 41" in result.output
+    saved = tmp_path / "failures" / "random-7-41.toml"
+    assert saved.read_text().startswith("# wrong success: status")
+    assert load_scene(saved) == random_case(7, 41).scenes[0]
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("my thesis")
+    result = call("stability", "--random", 1, "--save", tmp_path / "file")
+    assert "cannot be made (File exists): give the name of a folder" in str(result.exception)

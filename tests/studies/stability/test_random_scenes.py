@@ -1,0 +1,126 @@
+"""Random scenes: pure functions of their numbers, wide, and each ends in the right answer or a named failure."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.scene.toml import scene_from_toml
+from bemkit.studies.stability.random_scenes import random_case
+from bemkit.studies.stability.trials import Outcome, Trial, judge, try_case, try_cases
+from tests.studies.stability.scenes import FLOOR, block
+
+REMEDY = re.compile(
+    r"\b(give|use|change|hold|raise|make|check|try|start|allow|choose|remove|restrict|list|subtract|move|keep|press|name|take|leave|describe|let|bring|put)\b"
+)
+
+
+def assert_honest(trials: list[Trial]) -> None:
+    """Assert that every success is right and every failure has a name and a remedy."""
+    failures = [trial for trial in trials if trial.is_failure]
+    assert not failures, "\n".join(f"{t.seed} {t.index}: {t.outcome.value}: {t.reason}: {t.message}" for t in failures)
+    for trial in trials:
+        if trial.outcome is Outcome.NAMED:
+            assert REMEDY.search(trial.message), f"no remedy: {trial.index}: {trial.message}"
+
+
+def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
+    trials = list(try_cases(1, range(200), processes=2))
+    assert_honest(trials)
+    counts = Counter(trial.outcome for trial in trials)
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 80  # a generator of scenes without answers tests nothing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3, 5])
+def test_many_random_scenes(seed: int) -> None:
+    assert_honest(list(try_cases(seed, range(2000), processes=2)))
+
+
+def test_a_scene_is_a_function_of_its_numbers() -> None:
+    for index in (0, 17, 33):
+        assert random_case(7, index) == random_case(7, index)
+    assert random_case(7, 1) != random_case(7, 2)
+    assert random_case(7, 1).scenes[0].shape != random_case(8, 1).scenes[0].shape
+
+
+def test_scenes_are_the_same_after_a_scene_file() -> None:
+    for index in range(30):
+        case = random_case(7, index)
+        assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
+
+
+def test_every_kind_is_drawn() -> None:
+    scenes = [scene for index in range(150) for scene in random_case(3, index).scenes]
+    drawn = Counter(type(value).__name__ for scene in scenes for value in kinds_in(scene))
+    wanted = (
+        *("Rectangle", "Polygon", "Disk", "Sector", "Ring", "PlateWithHole", "ExteriorOf"),
+        *("HalfPlane", "Circle", "Cavity", "Gap"),
+        *("Clamped", "Roller", "PrescribedDisplacement", "Traction", "Pressure", "Contact"),
+        *("Frictionless", "Tresca", "Coulomb", "CohesiveCoulomb"),
+        *("SemismoothNewton", "AugmentedLagrangian", "FixedPoint", "LemkePivoting"),
+        *("LinearGalerkin", "QuadraticGalerkin", "ConstantCollocation", "Krylov", "Symmetry", "Algebraic", "Geometric"),
+    )
+    assert not [name for name in wanted if not drawn[name]]
+    assert any(len(scene.load_factors) > 1 for scene in scenes)
+    assert any(len(random_case(3, index).scenes) > 1 for index in range(100))
+    assert any(scene.mesh.accuracy is not None for scene in scenes)
+    assert any(scene.material.poisson_ratio == 0.5 for scene in scenes)
+    assert any(len(scene.contact_parts) > 1 for scene in scenes)
+    modulus = [scene.material.youngs_modulus for scene in scenes]
+    assert max(modulus) / min(modulus) > 1e15
+
+
+def kinds_in(scene: bk.Scene) -> list[object]:
+    conditions = [part.condition for part in scene.parts]
+    obstacles = [condition.obstacle for condition in conditions if isinstance(condition, bk.Contact)]
+    return [
+        *(scene.shape, scene.law, scene.solver, scene.discretisation, scene.linear_solver, scene.symmetry),
+        *(scene.mesh.grading, *conditions, *obstacles),
+    ]
+
+
+def solved_block() -> bk.Solution:
+    return bk.run(block(FLOOR, bk.Part("load", bk.Pressure(1e-3), sides=("top",)), mesh=bk.MeshOptions(160)))
+
+
+def test_a_wrong_success_is_called_wrong() -> None:
+    solution = solved_block()
+    assert judge([solution])[0] in (Outcome.SUCCESS, Outcome.WARNED)
+    outcome, reason, message = judge([dataclasses.replace(solution, energy=-solution.energy)])
+    assert (outcome, reason) == (Outcome.WRONG, "energy")
+    assert "negative_energy" in message
+
+
+def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_coarse() -> None:
+    solution = solved_block()
+    strained = dataclasses.replace(
+        solution,
+        scene=dataclasses.replace(solution.scene, material=bk.Material(3.0, 0.3)),
+        energy=solution.energy,
+        warnings=(),
+    )
+    assert judge([strained])[:2] == (Outcome.WRONG, "reciprocity")
+    assert judge([dataclasses.replace(strained, warnings=("use more elements",))])[0] is Outcome.WARNED
+
+
+def test_a_status_is_a_named_failure() -> None:
+    stalled = dataclasses.replace(solved_block(), status=bk.Status.STALLED, energy=-1.0)
+    assert judge([stalled])[:2] == (Outcome.NAMED, "stalled")
+
+
+def test_errors_without_a_name_are_tracebacks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*arguments: object) -> None:
+        raise ZeroDivisionError("float division by zero")
+
+    monkeypatch.setattr("bemkit.studies.stability.trials.solved_steps", fails)
+    trial = try_case(7, 4)
+    assert (trial.outcome, trial.reason) == (Outcome.TRACEBACK, "ZeroDivisionError")
+    assert "float division by zero" in trial.message
+    monkeypatch.setattr("bemkit.studies.stability.trials.solved_steps", lambda case: np.float64(1.0) / np.float64(0.0))
+    assert try_case(7, 4).reason == "RuntimeWarning"  # numpy's warnings count as errors

@@ -1,0 +1,166 @@
+"""The sweeps: right on the paper's examples, and not to be fooled."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.studies.stability import sweep as sweep_module
+from bemkit.studies.stability.axes import all_axes
+from bemkit.studies.stability.cases import Axis, Case, UnknownAxisError, find_axes
+from bemkit.studies.stability.evidence import examine
+from bemkit.studies.stability.sweep import Row, StabilityError, Verdict, compute, difference, sweep
+from tests.studies.stability.scenes import CONSTANT, LINEAR, small_paper_scene
+
+EXTREMES = {
+    "youngs-modulus": (1e-12, 1e15),
+    "load": (1e-12, 1e15),
+    "size": (1e-9, 1e9),
+    "degenerate-size": (0.99, 1.0),
+    "position": (1e4, 1e12),
+    "poisson-ratio": (0.4999999, 0.5),
+    "friction": (0.0, 10.0, 1e3),
+    "gap": (-1e3, 1e3),
+    "load-direction": (30.0, 90.0),
+    "sliding": (0.9999, 1.0001),
+    "aspect-ratio": (0.01, 100.0),
+    "rho-newton": (1e-8, 1e12),
+    "rho-augmented": (1e3, 1e12),
+    "elements": (0.5,),
+    "grading": (1e6, 1e12),
+}
+
+
+def shortened(name: str) -> Axis:
+    (axis,) = find_axes(all_axes(), [name])
+    return dataclasses.replace(axis, values=EXTREMES[name])
+
+
+def test_every_axis_is_tested_here() -> None:
+    assert {axis.name for axis in all_axes()} == set(EXTREMES)
+    with pytest.raises(UnknownAxisError, match="'rho': the axes are youngs-modulus, load"):
+        find_axes(all_axes(), ["rho"])
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+@pytest.mark.parametrize(("number", "discretisation"), [(1, CONSTANT), (2, LINEAR)], ids=["paper-1", "paper-2"])
+def test_the_ends_of_every_axis_are_right_or_named(
+    name: str, number: int, discretisation: bk.LinearGalerkin | bk.ConstantCollocation
+) -> None:
+    scene = small_paper_scene(number, 48, discretisation=discretisation)
+    for row in sweep(scene, [shortened(name)]):
+        verdict = Verdict(row.verdict)
+        assert verdict in (Verdict.RIGHT, Verdict.NAMED, Verdict.COARSE), row
+        if name in ("youngs-modulus", "load", "size", "degenerate-size", "rho-newton", "grading", "poisson-ratio"):
+            assert verdict is Verdict.RIGHT, row
+        if verdict is Verdict.RIGHT:
+            assert row.certificate <= 1e-8
+            assert row.condition >= 1.0
+        else:
+            assert row.message
+
+
+def test_answers_approach_the_incompressible_one_smoothly() -> None:
+    axis = dataclasses.replace(shortened("poisson-ratio"), values=(0.49, 0.499, 0.4999, 0.49999))
+    drifts = [row.drift for row in sweep(small_paper_scene(1), [axis])]
+    # proportional to 1/2 - nu; sets change on the way, so the first ratio is not exact
+    np.testing.assert_allclose(np.array(drifts[:-1]) / drifts[1:], 10.0, rtol=0.2)
+
+
+def altered(solution: bk.Solution) -> bk.Solution:
+    table = solution.contact
+    return dataclasses.replace(solution, contact=dataclasses.replace(table, sigma_t=0.99 * table.sigma_t))
+
+
+def row_of(case: Case, reference: bk.Solution) -> Row:
+    return compute("axis", case, reference)
+
+
+def test_a_driver_that_lies_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = small_paper_scene(1)
+    reference = bk.run(scene)
+    assert row_of(Case(1.0, scene), reference).verdict == "right"
+    monkeypatch.setattr(sweep_module, "run", lambda scene, mesh=None: altered(bk.run(scene, mesh=mesh)))
+    lying = row_of(Case(1.0, scene), reference)
+    assert lying.verdict == "wrong"
+    assert "independent check finds" in lying.message
+
+
+def test_an_answer_that_depends_on_the_units_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = small_paper_scene(1)
+    reference = bk.run(scene)
+
+    def unit_bound(scene: bk.Scene, mesh: object = None) -> bk.Solution:
+        stiff = scene.material.youngs_modulus > 1e6
+        return bk.run(dataclasses.replace(scene, law=bk.Coulomb(0.4)) if stiff else scene)
+
+    monkeypatch.setattr(sweep_module, "run", unit_bound)
+    assert row_of(Case(1.0, scene), reference).verdict == "ambiguous"
+    held_to_it = row_of(Case(1.0, scene, drift_limit=1e-6), reference)
+    assert held_to_it.verdict == "wrong"
+    assert "similar twin differs" in held_to_it.message
+
+
+def test_drift_unsolvable_claims_and_other_statuses_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = small_paper_scene(1)
+    reference = bk.run(scene)
+    other = dataclasses.replace(scene, law=bk.Coulomb(0.4))
+    assert "drifts" in row_of(Case(1.0, other, drift_limit=1e-6), reference).message
+    assert "other" in row_of(Case(1.0, other, keeps_steps=True), reference).message
+    assert "no solution exists" in row_of(Case(1.0, scene, is_solvable=False), reference).message
+    few = dataclasses.replace(scene, solver=bk.SemismoothNewton(max_steps=1))
+    named = row_of(Case(1.0, few), reference)
+    assert (named.verdict, named.status) == ("named", "max_steps")
+    assert row_of(Case(1.0, few, is_solvable=True), reference).verdict == "wrong"
+    stiff_fails = lambda scene, mesh=None: bk.run(few if scene.material.youngs_modulus > 1e6 else scene)  # noqa: E731
+    monkeypatch.setattr(sweep_module, "run", stiff_fails)
+    assert "but its similar twin: max_steps" in row_of(Case(1.0, scene), reference).message
+
+
+def test_an_error_without_a_name_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(scene: bk.Scene, mesh: object = None) -> bk.Solution:
+        raise ValueError("operands could not be broadcast together")
+
+    reference = bk.run(small_paper_scene(1))
+    monkeypatch.setattr(sweep_module, "run", broken)
+    with pytest.raises(ValueError, match="broadcast"):
+        row_of(Case(1.0, small_paper_scene(1)), reference)
+
+
+def test_a_scene_without_a_solution_is_no_baseline() -> None:
+    scene = small_paper_scene(1, solver=bk.SemismoothNewton(max_steps=1))
+    with pytest.raises(StabilityError, match=r"no converged solution .*: give one that has"):
+        list(sweep(scene, all_axes()))
+
+
+def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
+    row = Row("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
+    begun: list[float] = []
+    rows = list(
+        sweep(small_paper_scene(1), [axis], finished={("friction", 0.1): row}, begins=lambda _, v: begun.append(v))
+    )
+    assert rows[0] is row
+    assert begun == [0.2]
+    assert rows[1].verdict == "right"
+
+
+def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:
+    one, finer = bk.run(small_paper_scene(1, 64)), bk.run(small_paper_scene(1, 128))
+    assert 1e-6 < difference(one, finer, Case(1.0, one.scene).similarity) < 0.05
+    table = dataclasses.replace(one.contact, part=("elsewhere",) * one.contact.n_contact)
+    assert math.isinf(difference(one, dataclasses.replace(one, contact=table), Case(1.0, one.scene).similarity))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT], ids=["linear", "constant"])
+@pytest.mark.parametrize("name", ["paper-1", "paper-2"])
+def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.LinearGalerkin) -> None:
+    scene = dataclasses.replace(bk.load_scene(name), discretisation=discretisation)
+    assert examine(bk.run(scene)).is_good
+    wrong = [row for row in sweep(scene, all_axes()) if row.verdict == "wrong"]
+    assert wrong == []
