@@ -13,7 +13,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from bemkit.cli.main import main as cli
+from bemkit.cli import main as cli
 from bemkit.results.tables import TABLES
 from bemkit.solvers.base import Status
 from tests.docs.pages import plain, read, section, table

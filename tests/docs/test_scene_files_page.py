@@ -14,8 +14,8 @@ from bemkit import formulas as expression
 from bemkit.formulas import Expression
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
+from bemkit.scene import registry as kinds
 from bemkit.scene.scene import MeshOptions, Part, Scene
-from bemkit.scene.scene import registry as kinds
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml
 from tests.docs.pages import Row, blocks, plain, read, section, table

@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import bemkit as bk
-from bemkit.operators.linear.solvers import threads
+from bemkit.operators.linear import threads
 from bemkit.operators.linear.threads import blas_threads_for
 
 SMALL, HUGE = 10, threads.LARGE + 1

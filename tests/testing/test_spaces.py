@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curve, discretise, space
+from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curves, discretise, spaces
 from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
@@ -61,13 +61,13 @@ def test_spaces_conform(mesh: BoundaryMesh, number: int) -> None:
 
 
 @pytest.mark.parametrize("shape", CURVES, ids=repr)
-def test_curves_conform(shape: curve.Curve) -> None:
+def test_curves_conform(shape: curves.Curve) -> None:
     check_curve(shape)
 
 
 def test_every_public_space_and_curve_is_checked() -> None:
-    assert public_classes(space, "basis") == {type(one) for one in spaces_on(MESHES[0])}
-    assert public_classes(curve, "derivative") == {type(one) for one in CURVES}
+    assert public_classes(spaces, "basis") == {type(one) for one in spaces_on(MESHES[0])}
+    assert public_classes(curves, "derivative") == {type(one) for one in CURVES}
 
 
 @dataclass

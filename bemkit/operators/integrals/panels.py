@@ -25,8 +25,8 @@ class Panels:
     Notes
     -----
     In the local coordinate (x - centre) / (half tangent) a straight element is the interval [-1, 1], and a curved one
-    the image of that interval under a polynomial p of small degree with |p'| = 1 (see `curved_panels`): `half` is half the arc
-    length, `tangent` the direction of the chord and `centre` the point in the middle.
+    the image of that interval under a polynomial p of low degree with |p'| = 1 (see `curved_panels`): `half` is half
+    the arc length, `tangent` the direction of the chord and `centre` the point in the middle.
     """
 
     def __init__(self, mesh: BoundaryMesh) -> None:

@@ -12,9 +12,9 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 import bemkit as bk
+from bemkit.cli import outputs as outputs_module
 from bemkit.cli.errors import complaint
 from bemkit.cli.main import commands
-from bemkit.cli.main import outputs as outputs_module
 from bemkit.errors import BemkitError
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES
