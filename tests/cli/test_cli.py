@@ -358,9 +358,12 @@ try:
 except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
-wanted |= {f"bemkit.operators.{name}" for name in ("representation", "inner_moments", "multigrid", "cache")}
-wanted |= {f"bemkit.{name}" for name in ("interior", "plotting", "io", "hdf5", "explain", "adaptive")}
+names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.linear.multigrid", "operators.cache",
+    "results.interior", "results.figures", "results.result_file", "hdf5", "cli.explain", "runs.adaptive")
+wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)
+from importlib.util import find_spec
+assert all(find_spec(name) for name in wanted if name.startswith("bemkit."))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
