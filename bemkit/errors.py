@@ -1,4 +1,8 @@
-"""The base classes of all errors that bemkit raises on purpose."""
+"""The base classes of all errors that bemkit raises on purpose, and texts of strangers made fit for their messages."""
+
+from __future__ import annotations
+
+from pathlib import Path
 
 
 class BemkitError(Exception):
@@ -15,3 +19,16 @@ class InputError(BemkitError, ValueError):
 
 class NoResultError(BemkitError, RuntimeError):
     """A calculation that ended without a result: the input is well posed, but the method did not get there."""
+
+
+def printable(text: str) -> str:
+    """Return a text with a space for every line break, and ``?`` for every other character that is not printable.
+
+    Escape codes of a terminal and marks that turn the direction of writing are among these.
+    """
+    return "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
+
+
+def shown_path(path: Path) -> str:
+    """Return the name of a file for messages."""
+    return printable(str(path))[:200]

@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.atomic_files import replacing
-from bemkit.errors import InputError
-from bemkit.printable import printable, shown_path
+from bemkit.errors import InputError, printable, shown_path
 
 if TYPE_CHECKING:
     import h5py

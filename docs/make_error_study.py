@@ -17,10 +17,11 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
+from bemkit.studies.accuracy.measure import error_tasks
 from bemkit.studies.accuracy.plots import draw_errors
-from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, pareto_front
+from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, pareto_front
 from bemkit.studies.accuracy.runs import AdaptiveMeshes, all_runs, graded, uniform
-from bemkit.studies.accuracy.sweep import timed_rows
+from bemkit.studies.engine import compute
 
 PAGE = Path(__file__).parent / "error-against-run-time.md"
 IMAGES = Path(__file__).parent / "images"
@@ -58,7 +59,7 @@ def save_small(figure: Figure, path: Path) -> None:
     Image.open(drawn).convert("RGB").quantize(N_COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
-def study(scene: bk.Scene, reference: Reference) -> list[Row]:
+def study(scene: bk.Scene, reference: Reference) -> list[ErrorRecord]:
     """Return the rows: all elements and meshes by Newton, and the smaller ones by the augmented Lagrangian too."""
     elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
     meshes = (uniform(ELEMENTS), graded(ELEMENTS), AdaptiveMeshes(ACCURACIES))
@@ -67,7 +68,7 @@ def study(scene: bk.Scene, reference: Reference) -> list[Row]:
     augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
     # the finest meshes are for constant elements, which are fast and need them
     runs = [run for run in (*newton, *augmented) if run.discretisation == "constant" or run.size != ELEMENTS[-1]]
-    return list(timed_rows(runs, reference, repeat=REPEAT))
+    return list(compute(error_tasks(runs, reference, REPEAT)))
 
 
 def reference_sentence(reference: Reference) -> str:
@@ -80,7 +81,7 @@ def reference_sentence(reference: Reference) -> str:
     return f"Reference: {reference.source}." + (f" Its own errors are at most: {', '.join(own)}." if own else "")
 
 
-def orders_table(rows: Sequence[Row]) -> str:
+def orders_table(rows: Sequence[ErrorRecord]) -> str:
     """Return the observed orders in the number of elements, Newton only: other drivers reach the same state."""
     lines = [
         f"| elements | meshes | {' | '.join(MEASURES[name] for name in PANELS)} |",
@@ -93,7 +94,7 @@ def orders_table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def choice_table(rows: Sequence[Row]) -> str:
+def choice_table(rows: Sequence[ErrorRecord]) -> str:
     """Return the fastest run that reaches each error of the normal traction, and of the energy."""
     lines = ["| wished error | in the normal traction | in the energy |", "|---|---|---|"]
     for target in TARGETS:
@@ -102,7 +103,7 @@ def choice_table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def fastest(rows: Sequence[Row], measure: str, target: float) -> str:
+def fastest(rows: Sequence[ErrorRecord], measure: str, target: float) -> str:
     """Describe the fastest run whose error is at most the target."""
     good = [row for row in pareto_front(rows, measure) if getattr(row, measure) <= target]
     if not good:

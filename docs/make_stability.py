@@ -10,8 +10,8 @@ from markers import between
 import bemkit as bk
 from bemkit.scene.toml import with_overrides
 from bemkit.studies.stability.axes import all_axes
-from bemkit.studies.stability.files import to_markdown
-from bemkit.studies.stability.sweep import Verdict, sweep
+from bemkit.studies.stability.records import Verdict, to_markdown
+from bemkit.studies.stability.sweep import sweep
 
 PAGE = Path(__file__).parent / "stability.md"
 RUNS = (("paper-1", "linear"), ("paper-2", "constant"), ("paper-1", "constant"), ("paper-2", "linear"))

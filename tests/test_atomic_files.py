@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from bemkit import locks
-from bemkit.atomic_files import OutputFileError, check_target, replacing, reserved
-from bemkit.locks import FileLock, HeldElsewhereError
+from bemkit import atomic_files
+from bemkit.atomic_files import FileLock, HeldElsewhereError, OutputFileError, check_target, replacing, reserved
 
 
 def yes(path: Path) -> bool:
@@ -134,14 +133,14 @@ def test_leftovers_of_the_dead_are_removed_and_files_of_the_living_stay(tmp_path
 def test_a_lock_on_a_removed_file_is_taken_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its holder removes the file after another process has opened it and before that locks it."""
     path = tmp_path / "lock"
-    lock = locks._lock
+    lock = atomic_files._lock
 
     def slowly(descriptor: int, waits: bool) -> bool:
         monkeypatch.undo()
         path.unlink()
         return lock(descriptor, waits)
 
-    monkeypatch.setattr(locks, "_lock", slowly)
+    monkeypatch.setattr(atomic_files, "_lock", slowly)
     with contextlib.closing(FileLock(path)):
         assert path.exists()
         with pytest.raises(HeldElsewhereError, match="another process holds the lock"):
@@ -151,7 +150,7 @@ def test_a_lock_on_a_removed_file_is_taken_anew(tmp_path: Path, monkeypatch: pyt
 def test_without_locks_nothing_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     perhaps_living = tmp_path / f".a.h5.{'0' * 32}.tmp"
     perhaps_living.write_text("half", "utf-8")
-    monkeypatch.setattr(locks, "fcntl", None)
+    monkeypatch.setattr(atomic_files, "fcntl", None)
     with reserved([tmp_path / "a.h5"]), replacing(tmp_path / "a.h5"):
         pass
     assert sorted(os.listdir(tmp_path)) == [perhaps_living.name, "a.h5"]

@@ -13,7 +13,7 @@ import pytest
 
 import bemkit
 import bemkit.runs.run
-from bemkit.cli.errors import complaint, concerning
+from bemkit.cli.errors import one_line, concerning
 from bemkit.cli.main import main
 from bemkit.errors import BemkitError, InputError, NoResultError
 
@@ -59,7 +59,7 @@ def test_errors_cross_the_border_of_a_process(kind: type[BemkitError]) -> None:
 def test_what_an_error_concerns_stands_before_its_message() -> None:
     with pytest.raises(InputError) as caught, concerning("study"), concerning("paper-1"):
         raise InputError("rho is -1")
-    assert complaint(caught.value) == "study: paper-1: rho is -1"
+    assert one_line(caught.value) == "study: paper-1: rho is -1"
 
 
 @pytest.mark.parametrize(("kind", "code"), [(InputError, 2), (BemkitError, 2), (NoResultError, 1)])

@@ -20,9 +20,6 @@ NAME = "bemkit"
 TO_BE_TURNED = {
     "bemkit.model.contact_model imports bemkit.plan",
     "bemkit.model.elastic_model imports bemkit.plan",
-    "bemkit.studies.accuracy.session imports bemkit.cli.outputs",
-    "bemkit.studies.stability.plots imports bemkit.cli.outputs",
-    "bemkit.studies.stability.trial_session imports bemkit.cli.outputs",
     "bemkit.runs.run -> bemkit.runs.adaptive -> bemkit.runs.run",
     "bemkit.runs.adaptive -> bemkit.runs.run -> bemkit.runs.adaptive",
     "bemkit.scene.scene -> bemkit.scene.symmetry -> bemkit.scene.scene",

@@ -10,7 +10,7 @@ from bemkit.errors import BemkitError
 
 @contextmanager
 def concerning(name: str) -> Iterator[None]:
-    """Let the complaint about an error in this context begin with a name, such as that of the scene."""
+    """Let the message of an error in this context begin with a name, such as that of the scene."""
     try:
         yield
     except BemkitError as error:
@@ -18,6 +18,6 @@ def concerning(name: str) -> Iterator[None]:
         raise
 
 
-def complaint(error: BemkitError) -> str:
+def one_line(error: BemkitError) -> str:
     """Return the names that an error concerns, the outermost first, and its message."""
     return ": ".join([*reversed(getattr(error, "__notes__", [])), str(error)])

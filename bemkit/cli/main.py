@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.cli.errors import complaint, concerning
+from bemkit.cli.errors import concerning, one_line
 from bemkit.cli.stability import stability
 from bemkit.cli.study import study
-from bemkit.errors import BemkitError, NoResultError
-from bemkit.printable import printable
-from bemkit.streams import PipeClosedError, guarded_streams, print_data
+from bemkit.errors import BemkitError, NoResultError, printable
+from bemkit.results.streams import PipeClosedError, guarded_streams, print_data
 from bemkit.version import __version__
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def _run_to_end(arguments: list[str] | None) -> int:
     except PipeClosedError:  # the reader, such as head, has seen enough
         code = PIPE_CLOSED
     except BemkitError as error:
-        _complain(complaint(error))
+        _complain(one_line(error))
         code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         _complain("interrupted; no file is half written")
@@ -143,7 +142,8 @@ def run(
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
 def show(result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool) -> None:
     """Show RESULT, a file written by bemkit run -o."""
-    from bemkit.cli.outputs import STDOUT, Outputs
+    from bemkit.cli.outputs import Outputs
+    from bemkit.results.outputs import STDOUT
     from bemkit.results.result_file import read_result
     from bemkit.scene.toml import scene_to_toml
 

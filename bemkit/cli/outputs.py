@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.atomic_files import OutputFileError
 from bemkit.plan import Wishes
+from bemkit.results.outputs import JSON_START, STDOUT, TextFile, check_figures
 from bemkit.results.solution import Solution
-from bemkit.results.tables import CSV_STARTS, to_json, write_csv
-from bemkit.streams import print_data
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-STDOUT = "-"
-PNG_START = "\x89PNG"
+from bemkit.results.tables import CSV_STARTS, to_csv, to_json
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """The wishes for output; each may be left out.
+    """What is asked for; each may be left out.
 
     Parameters
     ----------
@@ -32,7 +23,7 @@ class Outputs:
     json, csv : str or None
         File names, or ``"-"`` for standard output.
     table : str
-        Which table the CSV holds, see `bemkit.results.tables.write_csv`.
+        Which table the CSV holds, see `bemkit.results.tables.to_csv`.
     plots : Path or None
         Folder for figures.
     """
@@ -52,6 +43,14 @@ class Outputs:
     def wishes(self) -> Wishes:
         """What of this a plan knows."""
         return Wishes(result_file=self.result is not None, figures=self.plots is not None)
+
+    @property
+    def _texts(self) -> tuple[TextFile[Solution], TextFile[Solution]]:
+        kind, start = f"CSV file of the {self.table} table", CSV_STARTS[self.table]
+        return (
+            TextFile(self.json, "JSON file", JSON_START, lambda solution: to_json(solution) + "\n"),
+            TextFile(self.csv, kind, start, lambda solution: to_csv(solution, self.table)),
+        )
 
     def check(self) -> list[Path]:
         """Find out, before any work is done, whether everything can be written.
@@ -74,15 +73,13 @@ class Outputs:
             from bemkit.results.result_file import check_result_target
 
             targets.append(check_result_target(self.result))
-        if self.json not in (None, STDOUT):
-            targets.append(check_target(Path(str(self.json)), "JSON file", _is_json))
-        if self.csv not in (None, STDOUT):
-            targets.append(check_target(Path(str(self.csv)), f"CSV file of the {self.table} table", self._is_csv))
+        for text in self._texts:
+            targets += text.check()
         if len(set(targets)) < len(targets) or self.json == self.csv == STDOUT:
             shown = ", ".join(str(place) for place in (self.result, self.json, self.csv) if place is not None)
             raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
         if self.plots is not None:
-            check_figures(self.plots, "deformation.png")
+            check_figures(self.plots, "deformation")
         return targets
 
     def write(self, solution: Solution) -> None:
@@ -103,96 +100,9 @@ class Outputs:
             from bemkit.results.result_file import write_result
 
             write_result(self.result, solution)
-        if self.json is not None:
-            write_text(self.json, to_json(solution) + "\n")
-        if self.csv is not None:
-            stream = io.StringIO()
-            write_csv(solution, self.table, stream)
-            write_text(self.csv, stream.getvalue())
+        for text in self._texts:
+            text.write(solution)
         if self.plots is not None:
             from bemkit.results.figures import save_figures
 
             save_figures(solution, self.plots)
-
-    def _is_csv(self, path: Path) -> bool:
-        return begins_with(path, CSV_STARTS[self.table])
-
-
-def _is_json(path: Path) -> bool:
-    return begins_with(path, "{")
-
-
-def begins_with(path: Path, start: str) -> bool:
-    """Tell whether a file begins like one of its kind; every character stands for one byte."""
-    expected = start.encode("latin-1")
-    with path.open("rb") as stream:
-        return stream.read(len(expected)) == expected
-
-
-def check_figures(folder: Path, name: str) -> None:
-    """Find out, before any work is done, whether figures can be drawn and written.
-
-    Parameters
-    ----------
-    folder : Path
-        Need not exist yet.
-    name : str
-        One of the figures: if it can be written, any other can.
-
-    Raises
-    ------
-    OutputFileError
-    """
-    if find_spec("matplotlib") is None:
-        raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
-    if folder.exists() and not folder.is_dir():
-        raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
-    check_target(folder / name if folder.exists() else folder, "figure", lambda path: begins_with(path, PNG_START))
-
-
-def save_figure(figure: Figure, path: Path, dots_per_inch: int = 150) -> Path:
-    """Write a figure as PNG, all or nothing, into a folder that is made if need be; return its path.
-
-    Raises
-    ------
-    OutputFileError
-        If the file cannot be written, or a file of another kind stands in the way.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputFileError(f"{path.parent}: cannot be made ({error.strerror}): choose another name") from error
-    target = check_target(path, "figure", lambda existing: begins_with(existing, PNG_START))
-    with replacing(target) as temporary:
-        # without the time and version stamps the same picture is the same file
-        figure.savefig(temporary, dpi=dots_per_inch, format="png", metadata={"Software": None})
-    return target
-
-
-def check_text(place: str | None, kind: str, start: str) -> None:
-    """Find out whether a text can be written; an existing file is replaced only if it begins like one of its kind.
-
-    Parameters
-    ----------
-    place : str or None
-        File name, or ``"-"`` for standard output, which can always be written.
-    kind : str
-        What will be written, for messages: "JSON file".
-    start : str
-        How files of this kind begin.
-
-    Raises
-    ------
-    OutputFileError
-    """
-    if place not in (None, STDOUT):
-        check_target(Path(str(place)), kind, lambda path: begins_with(path, start))
-
-
-def write_text(place: str, text: str) -> None:
-    """Write a text to a file, all or nothing, or to standard output if the place is ``"-"``."""
-    if place == STDOUT:
-        print_data(text)
-        return
-    with replacing(Path(place).resolve()) as temporary:
-        temporary.write_text(text, encoding="utf-8")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,9 @@ import click
 
 if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
+    from bemkit.studies.engine import StudyOutputs
     from bemkit.studies.stability.cases import Axis
-    from bemkit.studies.stability.sweep import Row
+    from bemkit.studies.stability.records import StabilityRecord
 
 
 @click.command()
@@ -60,24 +62,26 @@ def stability(
         _refuse(sweeps, "goes with a sweep of one scene: leave it out, or --random")
         return _try_random(count, seed or 0, first or 0, jobs, failures, quiet=quiet)
     _refuse(trials, "goes with random scenes: add --random, such as --random 200")
+    uses_stdout = "-" in (csv_file, markdown)
+    if csv_file == markdown == "-":
+        raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
     from bemkit.atomic_files import reserved
     from bemkit.scene.toml import load_scene, with_overrides
     from bemkit.studies.stability.axes import all_axes
     from bemkit.studies.stability.cases import find_axes
 
-    uses_stdout = "-" in (csv_file, markdown)
-    if csv_file == markdown == "-":
-        raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
-    click.get_current_context().with_resource(reserved(_check_outputs(output, csv_file, markdown)))
-    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
     axes = find_axes(all_axes(), names)
-    rows = _computed(chosen, axes, output, is_quiet=quiet, shows_tables=not quiet and not uses_stdout)
-    _write(axes, rows, csv_file, markdown, folder)
-    if not quiet and not uses_stdout:
+    outputs = _outputs(axes, output, csv_file, markdown, folder)
+    click.get_current_context().with_resource(reserved(outputs.check()))
+    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+    shows_tables = not quiet and not uses_stdout
+    records = _records(chosen, axes, outputs, is_live=_is_live(quiet), shows_tables=shows_tables)
+    outputs.write(records)
+    if shows_tables:
         from bemkit.studies.stability.report import print_verdicts
 
-        print_verdicts(rows)
-    return int(any(row.verdict == "wrong" for row in rows))
+        print_verdicts(records)
+    return int(any(record.verdict == "wrong" for record in records))
 
 
 def _refuse(options: Mapping[str, object], remedy: str) -> None:
@@ -88,71 +92,72 @@ def _refuse(options: Mapping[str, object], remedy: str) -> None:
 
 
 def _try_random(count: int, seed: int, first: int, jobs: int | None, folder: str | None, *, quiet: bool) -> int:
+    """Solve and judge random scenes; those that fail are on the disk as soon as they are known."""
     from os import cpu_count
 
-    from bemkit.studies.stability.trial_session import TrialSession, print_trials
+    from bemkit.results.outputs import make_folder
+    from bemkit.studies.engine import compute_with_progress
+    from bemkit.studies.stability.report import print_trials
+    from bemkit.studies.stability.trials import save_trial, trial_tasks
 
-    is_live = not quiet and sys.stderr.isatty()
-    trials = TrialSession(count, seed, first, jobs or cpu_count() or 1, folder, is_live).run()
+    if folder is not None:
+        make_folder(Path(folder))
+    tasks = trial_tasks(seed, range(first, first + count))
+    trials = []
+    processes = min(jobs or cpu_count() or 1, count)
+    for trial in compute_with_progress(tasks, "random scenes", is_live=_is_live(quiet), processes=processes):
+        trials.append(trial)
+        if folder is not None and trial.is_failure:
+            save_trial(trial, Path(folder))
+    trials.sort(key=lambda trial: trial.index)
     if not quiet:
         print_trials(trials)
     return int(any(trial.is_failure for trial in trials))
 
 
-def _computed(
-    scene: Scene, axes: tuple[Axis, ...], output: str | None, *, is_quiet: bool, shows_tables: bool
-) -> list[Row]:
-    """Compute what is missing; with an output file every finished row is on the disk at once."""
+def _outputs(
+    axes: Sequence[Axis], path: str | None, csv_file: str | None, markdown: str | None, folder: str | None
+) -> StudyOutputs[StabilityRecord]:
+    from bemkit.results.outputs import TextFile
+    from bemkit.studies.engine import StudyOutputs
+    from bemkit.studies.stability.plots import draw_axes, figure_name
+    from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
+
+    texts = (
+        TextFile(csv_file, "CSV file of stability rows", CSV_START, to_csv),
+        TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),
+    )
+    return StudyOutputs(FILE, path, texts, folder, partial(draw_axes, axes), figure_name(axes[0]))
+
+
+def _records(
+    scene: Scene,
+    axes: Sequence[Axis],
+    outputs: StudyOutputs[StabilityRecord],
+    *,
+    is_live: bool,
+    shows_tables: bool,
+) -> list[StabilityRecord]:
+    """Compute what is missing, keep every record at once, and print each axis when it is complete."""
     from bemkit.scene.toml import scene_to_toml
-    from bemkit.studies.stability.files import finished_rows, write_rows
+    from bemkit.studies.engine import Task, compute_with_progress
     from bemkit.studies.stability.report import print_axis
     from bemkit.studies.stability.sweep import sweep
 
-    text = scene_to_toml(scene) if output else ""
-    known = finished_rows(output, text) if output else {}
-    rows: list[Row] = []
+    labels = {"scene": scene_to_toml(scene) if outputs.path else ""}
+    finished = outputs.finished(labels)
+    remaining = iter(axes)
 
-    def announce(axis: Axis, value: float) -> None:
-        if not is_quiet and sys.stderr.isatty():
-            print(f"\r\x1b[K{axis.name} {value:.6g}", end="", file=sys.stderr)
+    def run_axis(tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
+        axis = next(remaining)
+        computed = compute_with_progress(tasks, axis.name, is_live=is_live, finished=finished)
+        records = list(outputs.keep(computed, finished, labels))
+        if shows_tables:
+            print_axis(axis, records)
+        return records
 
-    for row in sweep(scene, axes, finished=known, begins=announce):
-        rows.append(row)
-        if output and (row.axis, row.value) not in known:
-            known[row.axis, row.value] = row
-            write_rows(output, text, list(known.values()))
-        axis = next(axis for axis in axes if axis.name == row.axis)
-        if shows_tables and row.value == axis.values[-1]:
-            if sys.stderr.isatty():
-                print("\r\x1b[K", end="", file=sys.stderr)
-            print_axis(axis, [other for other in rows if other.axis == axis.name])
-    return rows
+    return list(sweep(scene, axes, run_axis))
 
 
-def _check_outputs(output: str | None, csv_file: str | None, markdown: str | None) -> list[Path]:
-    """Find out, before any work is done, whether everything can be written; return the files to be reserved."""
-    from bemkit.cli.outputs import check_text
-    from bemkit.studies.stability.files import CSV_START, FILE, MARKDOWN_START
-
-    if output is not None and Path(output).is_file():
-        FILE.read(output)  # says more about a broken file than that it stands in the way
-    targets = [] if output is None else [FILE.check_target(output)]
-    check_text(csv_file, "CSV file of stability rows", CSV_START)
-    check_text(markdown, "Markdown file of stability tables", MARKDOWN_START)
-    return targets
-
-
-def _write(
-    axes: tuple[Axis, ...], rows: list[Row], csv_file: str | None, markdown: str | None, folder: str | None
-) -> None:
-    from bemkit.cli.outputs import write_text
-    from bemkit.studies.stability.files import to_csv, to_markdown
-
-    if csv_file is not None:
-        write_text(csv_file, to_csv(rows))
-    if markdown is not None:
-        write_text(markdown, to_markdown(axes, rows))
-    if folder is not None:
-        from bemkit.studies.stability.plots import save_plots
-
-        save_plots(axes, rows, Path(folder))
+def _is_live(quiet: bool) -> bool:
+    return not quiet and sys.stderr.isatty()

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
 from bemkit.cli.errors import concerning
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bemkit.results.solution import Solution
+    from bemkit.scene.scene import Scene
+    from bemkit.studies.accuracy.options import StudyOptions
+    from bemkit.studies.accuracy.records import ErrorRecord
+    from bemkit.studies.accuracy.runs import Run
+    from bemkit.studies.engine import StudyOutputs
 
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
@@ -69,28 +83,80 @@ def errors(
     The exit code is 1 if a run did not converge.
     """
     from bemkit.atomic_files import reserved
-    from bemkit.cli.outputs import STDOUT
-    from bemkit.studies.accuracy.session import Outputs, Session
-    from bemkit.studies.accuracy.wishes import DEFAULT_MEASURES, Lists, read_measures, read_wishes
+    from bemkit.results.outputs import STDOUT
+    from bemkit.scene.toml import load_scene
+    from bemkit.studies.accuracy.options import DEFAULT_MEASURES, StudyOptions, read_measures
 
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
-    outputs = Outputs(output, csv_file, folder, read_measures(measures or DEFAULT_MEASURES))
+    shown = read_measures(measures or DEFAULT_MEASURES)
+    problem = load_scene(scene)
+    outputs = _error_outputs(problem.title, shown, output, csv_file, folder)
     click.get_current_context().with_resource(reserved(outputs.check()))
-    wishes = read_wishes(
-        scene,
-        Lists(elements, accuracies, discretisation, meshes, solver),
+    options = StudyOptions(
+        elements,
+        accuracies,
+        discretisation,
+        meshes,
+        solver,
         exponent=exponent,
         most_elements=most_elements,
         over_resolve=over_resolve,
         repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
     )
-    is_live, shows_tables = not quiet and sys.stderr.isatty(), not quiet and csv_file != STDOUT
-    session = Session(wishes, outputs, jobs=jobs, is_live=is_live, shows_tables=shows_tables)
+    runs = options.runs(problem)
+    shows_tables = not quiet and csv_file != STDOUT
     with concerning(scene):
-        rows = session.run()
-    outputs.write(wishes.scene.title, rows)
-    return 0 if all(row.is_certified for row in rows) else NOT_CONVERGED
+        records = _error_records(
+            problem, runs, options, outputs, jobs, is_live=_is_live(quiet), shown=shown if shows_tables else ()
+        )
+    outputs.write(records)
+    return 0 if all(record.is_certified for record in records) else NOT_CONVERGED
+
+
+def _error_outputs(
+    title: str, measures: Sequence[str], path: str | None, csv_file: str | None, folder: str | None
+) -> StudyOutputs[ErrorRecord]:
+    from bemkit.results.outputs import TextFile
+    from bemkit.studies.accuracy.plots import FIGURE, draw_errors
+    from bemkit.studies.accuracy.records import CSV_START, FILE, to_csv
+    from bemkit.studies.engine import StudyOutputs
+
+    def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
+        return {FIGURE: draw_errors(records, measures, title=title)}
+
+    table = TextFile(csv_file, "CSV file of an error study", CSV_START, to_csv)
+    # sharp at the width of a page, and a small file
+    return StudyOutputs(FILE, path, (table,), folder, figures, FIGURE, dots_per_inch=110)
+
+
+def _error_records(
+    problem: Scene,
+    runs: Sequence[Run],
+    options: StudyOptions,
+    outputs: StudyOutputs[ErrorRecord],
+    jobs: int,
+    *,
+    is_live: bool,
+    shown: Sequence[str],
+) -> list[ErrorRecord]:
+    """Compute what is missing, keep every record at once, and print some of the errors."""
+    from bemkit.studies.accuracy.measure import error_tasks
+    from bemkit.studies.accuracy.table import print_reference, print_study
+    from bemkit.studies.engine import compute_with_progress
+
+    labels = options.labels(problem)
+    finished = outputs.finished(labels)
+    reference = options.reference(problem)
+    if shown:
+        print_reference(problem.title, reference)
+    tasks = error_tasks(runs, reference, options.repeat)
+    computed = compute_with_progress(tasks, "error study", is_live=is_live, processes=jobs, finished=finished)
+    records = {record.key: record for record in outputs.keep(computed, finished, labels)}
+    in_order = [records[run.key] for run in runs]
+    if shown:
+        print_study(in_order, shown)
+    return in_order
 
 
 @study.command("paper-tables")
@@ -99,20 +165,25 @@ def errors(
 @click.option("-q", "--quiet", is_flag=True, help="Print neither the progress bar nor the tables.")
 def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> None:
     """Reproduce the source paper's Tables 1 and 2: outer steps of the augmented Lagrangian method over rho."""
-    from bemkit.cli.outputs import STDOUT, check_text, write_text
-    from bemkit.studies.accuracy import report
+    from functools import partial
+
+    from bemkit.results.outputs import JSON_START, STDOUT, TextFile
+    from bemkit.studies import paper_tables as module
+    from bemkit.studies.engine import compute_with_progress
 
     if json_file == csv_file == STDOUT:
         raise click.UsageError("--csv - and --json - both print to standard output: give one of them")
-    check_text(json_file, "JSON file", "{")
-    check_text(csv_file, "CSV file of the paper's tables", "table,rho_1")
-    tables = report.compute_with_progress(is_live=not quiet and sys.stderr.isatty())
-    if json_file is not None:
-        write_text(json_file, report.to_json(tables))
-    if csv_file is not None:
-        write_text(csv_file, report.to_csv(tables))
+    texts = (
+        TextFile(json_file, "JSON file", JSON_START, module.to_json),
+        TextFile(csv_file, "CSV file of the paper's tables", module.CSV_START, module.to_csv),
+    )
+    for text in texts:
+        text.check()
+    tables = module.paper_tables(partial(compute_with_progress, name="paper tables", is_live=_is_live(quiet)))
+    for text in texts:
+        text.write(tables)
     if not quiet and STDOUT not in (json_file, csv_file):
-        report.print_paper_tables(tables)
+        module.print_paper_tables(tables)
 
 
 @study.command()
@@ -122,17 +193,51 @@ def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> No
 @click.option("--json", "json_file", metavar="FILE", help="Write all summaries as JSON; - is standard output.")
 def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
     """Look for several solutions of SCENE from several starts."""
-    from bemkit.cli.outputs import STDOUT, check_text, write_text
+    from bemkit.results.outputs import JSON_START, STDOUT, TextFile
     from bemkit.runs.run import run_probe
     from bemkit.scene.toml import load_scene, with_overrides
-    from bemkit.studies.accuracy import report
 
-    check_text(json_file, "JSON file", "{")
+    summaries: TextFile[Sequence[Solution]] = TextFile(
+        json_file, "JSON file", JSON_START, lambda found: _solutions_as_json(found, starts)
+    )
+    summaries.check()
     chosen = with_overrides(load_scene(scene), elements=elements)
     with concerning(scene):
         found = run_probe(chosen, n_starts=starts)
-    if json_file is not None:
-        write_text(json_file, report.solutions_to_json(found, starts))
+    summaries.write(found)
     if json_file != STDOUT:
-        report.print_solutions(found, starts)
+        _print_solutions(found, starts)
     return 0 if found else NOT_CONVERGED
+
+
+def _solutions_as_json(found: Sequence[Solution], n_starts: int) -> str:
+    """Return the summaries of all solutions as one JSON object."""
+    from bemkit.results.tables import finite_only
+
+    summaries = [finite_only(solution.summary()) for solution in found]
+    return json.dumps({"starts": n_starts, "solutions": summaries}, indent=2, allow_nan=False) + "\n"
+
+
+def _print_solutions(found: Sequence[Solution], n_starts: int) -> None:
+    """Print how many distinct solutions there are, and what tells them apart."""
+    from rich.text import Text
+
+    from bemkit.results.streams import plain_table, stdout_console
+
+    console = stdout_console()
+    if not found:
+        console.print(f"none of {n_starts} starts leads to a solution")
+        return
+    title = f"{len(found)} distinct solution{'s' * (len(found) > 1)} from {n_starts} starts"
+    console.print(Text(title, style="bold yellow" if len(found) > 1 else "bold"))
+    table = plain_table(right=("separated", "slip", "stick", "normal force", "friction force", "energy"), gap=2)
+    for solution in found:
+        counts = Counter(solution.contact.status_words())
+        forces = (solution.force_normal, solution.force_tangential, solution.energy)
+        words = (str(counts[word]) for word in ("separated", "slip", "stick"))
+        table.add_row(*words, *(f"{value:.6g}" for value in forces))
+    console.print(table)
+
+
+def _is_live(quiet: bool) -> bool:
+    return not quiet and sys.stderr.isatty()

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.errors import printable
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.validity.loops import following_in_loops
 from bemkit.geometry.vectors import cross
-from bemkit.printable import printable
 
 _SURFACES = (".ply", ".stl", ".off", ".obj")
 

@@ -25,7 +25,7 @@ from bemkit.operators import kernels
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
-from bemkit.stopwatch import assembling
+from bemkit.operators.stopwatch import assembling
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
 """The xx, xy, yx, yy entries, each (n_rows, n_trial); None is zero."""

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.atomic_files import OutputFileError, check_target, replacing
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.geometry.reflection import unfolded
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.results.boundary_figure import draw_boundary_traction
+from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import ConstantCollocation
 
@@ -75,11 +75,6 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
         If the folder or a file in it cannot be written.
     """
     units = Units() if units is None else units
-    target = Path(folder)
-    try:
-        target.mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputFileError(f"{target}: the folder cannot be made ({error.strerror}): choose another") from error
     figures = {"deformation": draw_deformation(solution, units=units)}
     parts = list(dict.fromkeys(solution.contact.part))
     if not parts:
@@ -89,7 +84,7 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
         figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
         figures[f"contact-traction{suffix}"] = draw_contact_traction(solution, part, units=units)
         figures[f"contact-status{suffix}"] = draw_contact_status(solution, part, units=units)
-    return tuple(_save(figure, target / f"{name}.png") for name, figure in figures.items())
+    return write_figures(figures, Path(folder))
 
 
 def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figure:
@@ -388,10 +383,3 @@ def _draw_obstacles(axes: Axes, solution: Solution) -> None:
         is_labelled = True
     axes.set_xlim(*frame[0])
     axes.set_ylim(*frame[1])
-
-
-def _save(figure: Figure, path: Path) -> Path:
-    target = check_target(path, "figure", lambda existing: existing.read_bytes()[:4] == b"\x89PNG")
-    with replacing(target) as temporary:
-        figure.savefig(temporary, format="png", dpi=150)
-    return path

@@ -1,13 +1,11 @@
-"""Rows of a long sweep in an HDF5 file that is complete after every row, so that a stopped sweep can go on."""
+"""Records of a study in an HDF5 file that is complete after every record, so that a stopped study can go on."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_type_hints
+from typing import Any, Generic, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -17,13 +15,21 @@ from bemkit.results.result_file import provenance
 
 _MAX_LABEL = 1_000_000
 
-Row = TypeVar("Row")
-"""A frozen dataclass whose fields are texts, floats and whole numbers."""
+
+class Record(Protocol):
+    """A frozen dataclass whose fields are texts, floats and whole numbers."""
+
+    @property
+    def key(self) -> Hashable:
+        """What tells the records of one study apart."""
+
+
+R = TypeVar("R", bound=Record)
 
 
 @dataclass(frozen=True)
-class RowFile(Generic[Row]):
-    """A kind of file: labels that say what was swept, and rows.
+class RecordFile(Generic[R]):
+    """A kind of file: labels that say what was studied, and records.
 
     Parameters
     ----------
@@ -33,8 +39,8 @@ class RowFile(Generic[Row]):
         Of the layout.
     command : str
         That writes such files, for messages.
-    row : type
-        Of the rows.
+    record : type
+        Of the records.
     labels : tuple of str
         Names of the texts.
     """
@@ -42,15 +48,15 @@ class RowFile(Generic[Row]):
     format: str
     version: int
     command: str
-    row: type[Row]
+    record: type[R]
     labels: tuple[str, ...]
 
     def check_target(self, path: str | Path) -> Path:
-        """Find out, before any work is done, whether rows can be written; see `bemkit.atomic_files.check_target`."""
+        """Find out, before any work is done, whether records can be written; see `bemkit.atomic_files.check_target`."""
         return check_target(Path(path), f"{self.command} file", self._is_own)
 
-    def write(self, path: str | Path, labels: Mapping[str, str], rows: Sequence[Row]) -> None:
-        """Write labels and rows, replacing an older file at once or not at all.
+    def write(self, path: str | Path, labels: Mapping[str, str], records: Sequence[R]) -> None:
+        """Write labels and records, replacing an older file at once or not at all.
 
         Raises
         ------
@@ -63,10 +69,10 @@ class RowFile(Generic[Row]):
             for name in self.labels:
                 write_text(file, name, labels[name])
             write_attributes(file.create_group("provenance"), provenance())
-            write_table(file.create_group("rows"), {name: self._column(name, rows) for name in self._types})
+            write_table(file.create_group("rows"), {name: self._column(name, records) for name in self._types})
 
-    def read(self, path: str | Path) -> tuple[dict[str, str], tuple[Row, ...]]:
-        """Read labels and rows.
+    def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
+        """Read labels and records.
 
         Raises
         ------
@@ -84,20 +90,16 @@ class RowFile(Generic[Row]):
                 )
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
-            columns = reader.table(
-                "rows",
-                texts=[name for name in types if types[name] is str],
-                floats=[name for name in types if types[name] is float],
-                integers=[name for name in types if types[name] is int],
-            )
-            rows = tuple(
-                self.row(**{name: types[name](value) for name, value in zip(columns, values, strict=True)})
+            texts, floats, integers = ([name for name in types if types[name] is kind] for kind in (str, float, int))
+            columns = reader.table("rows", texts=texts, floats=floats, integers=integers)
+            records = tuple(
+                self.record(**{name: types[name](value) for name, value in zip(columns, values, strict=True)})
                 for values in zip(*columns.values(), strict=True)
             )
-        return labels, rows
+        return labels, records
 
-    def finished(self, path: str | Path, labels: Mapping[str, str]) -> tuple[Row, ...]:
-        """Return the rows of an earlier sweep under the same labels, nothing if there is no file.
+    def finished(self, path: str | Path, labels: Mapping[str, str]) -> dict[Hashable, R]:
+        """Return the records of an earlier study under the same labels by their keys, nothing if there is no file.
 
         Raises
         ------
@@ -105,22 +107,22 @@ class RowFile(Generic[Row]):
             If the file cannot be read, or its labels differ.
         """
         if not Path(path).exists():
-            return ()
-        earlier, rows = self.read(path)
+            return {}
+        earlier, records = self.read(path)
         for name in self.labels:
             if earlier[name] != labels[name]:
                 # scenes and the like are too long to be shown
                 is_long = "\n" in earlier[name] + labels[name]
                 what = f"of another {name}" if is_long else f"with {name} {earlier[name]}, not {labels[name]}"
                 raise ResultFileError(f"{path}: holds the sweep {what}: choose another name or delete it first")
-        return rows
+        return {record.key: record for record in records}
 
     @property
     def _types(self) -> dict[str, Any]:
-        return get_type_hints(self.row)
+        return get_type_hints(self.record)
 
-    def _column(self, name: str, rows: Sequence[Row]) -> Any:
-        values = [getattr(row, name) for row in rows]
+    def _column(self, name: str, records: Sequence[R]) -> Any:
+        values = [getattr(record, name) for record in records]
         kind = self._types[name]
         return values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)
 
@@ -130,12 +132,3 @@ class RowFile(Generic[Row]):
         except ResultFileError:
             return False
         return True
-
-
-def csv_text(head: Sequence[str], lines: Iterable[Sequence[Any]]) -> str:
-    """Return a header line and lines of values as comma-separated values."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(lines)
-    return stream.getvalue()

@@ -34,7 +34,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
 from bemkit.results.plan_file import read_plan, read_work, write_plan, write_work
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
-from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns, write_csv
+from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
@@ -43,7 +43,7 @@ from bemkit.version import __version__
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_csv", "write_result"]
+__all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
 FORMAT = "bemkit-result"
 SCHEMA_VERSION = 1

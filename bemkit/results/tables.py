@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
+from bemkit.results.outputs import csv_text
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -29,8 +29,8 @@ RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n
 _CONTACT = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 
 
-def write_csv(solution: Solution, table: str, stream: IO[str]) -> None:
-    """Write one table of a solution as comma-separated values with a header line.
+def to_csv(solution: Solution, table: str) -> str:
+    """Return one table of a solution as comma-separated values with a header line.
 
     Parameters
     ----------
@@ -38,19 +38,16 @@ def write_csv(solution: Solution, table: str, stream: IO[str]) -> None:
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
         ``"history"``: one row per step of the solver.
-    stream : text file
 
     Raises
     ------
-    ValueError
+    InputError
         If there is no table of that name.
     """
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     columns = _columns(solution, table)
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(_plain(column) for column in columns.values()), strict=True))
+    return csv_text(columns, zip(*(_plain(column) for column in columns.values()), strict=True))
 
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe_escape
 from bemkit.model.held_friction import with_held_friction
 from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, Stage, check_elements, check_memory, make_plan
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
 from bemkit.results.totals import with_totals
@@ -32,7 +33,6 @@ from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
 from bemkit.solvers.multistart import probe
-from bemkit.stopwatch import assembly_time
 
 
 class UnsolvableSceneError(InputError):

@@ -6,8 +6,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from bemkit.operators.stopwatch import AssemblyTime, traced_peak
 from bemkit.plan import Stage
-from bemkit.stopwatch import AssemblyTime, traced_peak
 
 
 @dataclass(frozen=True)

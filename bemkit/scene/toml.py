@@ -11,9 +11,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, cast
 
-from bemkit.errors import InputError
+from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
-from bemkit.printable import printable
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
 from bemkit.scene.scene import Discretisation, Scene

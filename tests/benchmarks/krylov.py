@@ -25,7 +25,7 @@ from bemkit.operators.linear.choice import direct_cost, krylov_cost
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare import CondensedMap
-from bemkit.stopwatch import assembly_time
+from bemkit.operators.stopwatch import assembly_time
 
 L_SHAPE = bk.Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 BODIES = {

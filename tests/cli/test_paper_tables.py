@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,18 @@ import pytest
 import bemkit.studies.paper_tables as module
 from bemkit.cli.main import main
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
-from bemkit.studies.accuracy.report import compute_with_progress, to_csv, to_json
-from bemkit.studies.paper_tables import PRINTED, RHO, PaperTable, PaperTableError, paper_model, paper_tables
+from bemkit.studies.engine import Task, compute, compute_with_progress
+from bemkit.studies.paper_tables import (
+    PRINTED,
+    RHO,
+    PaperCell,
+    PaperTable,
+    PaperTableError,
+    paper_model,
+    paper_tables,
+    to_csv,
+    to_json,
+)
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +125,7 @@ def test_the_command(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("bemkit.studies.accuracy.report.paper_tables", lambda *_: tables)
+    monkeypatch.setattr("bemkit.studies.paper_tables.paper_tables", lambda *_: tables)
     assert call("--json", "t.json", "--csv", "t.csv") == 0
     shown = capsys.readouterr()
     cell = f"{tables[0].outer_steps[1, 1]}/13 ({tables[0].linear_solves[1, 1]})"
@@ -134,8 +145,8 @@ def test_the_command(
 
 
 def test_the_progress_bar_sees_every_pair(capsys: pytest.CaptureFixture[str]) -> None:
-    seen: list[tuple[int, float, float]] = []
-    paper_tables(lambda *pair: seen.append(pair))
-    assert len(set(seen)) == len(seen) == 50
-    assert compute_with_progress(is_live=True)[0].number == 1
+    seen: list[Task[PaperCell]] = []
+    paper_tables(partial(compute, begins=seen.append))
+    assert len({task.label for task in seen}) == len(seen) == 50
+    assert paper_tables(partial(compute_with_progress, name="paper tables", is_live=True))[0].number == 1
     assert capsys.readouterr().out == ""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from bemkit.printable import printable
-from bemkit.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
+from bemkit.errors import printable
+from bemkit.results.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
 
 PROGRAM = [sys.executable, "-m", "bemkit"]
 TITLE = "Würfel auf Ebene → 接触"

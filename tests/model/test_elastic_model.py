@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import tomllib
 from dataclasses import replace
@@ -19,7 +18,7 @@ from bemkit.model.elastic_model import FreeBodyError, build_elastic_model
 from bemkit.results.figures import save_figures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
-from bemkit.results.tables import to_json, write_csv
+from bemkit.results.tables import to_csv, to_json
 from bemkit.runs.nested import CascadeError, run_cascade
 from bemkit.runs.run import run_history, run_probe
 from bemkit.scene.scene import Discretisation, NoContactError
@@ -97,12 +96,8 @@ def test_nothing_of_contact_is_in_the_result(bent: Solution) -> None:
     assert summary["outer_steps"] == 0
     assert summary["certificate"]["penetration"] == 0.0
     assert summary["status"] == "converged"
-    stream = io.StringIO()
-    write_csv(bent, "contact", stream)
-    assert stream.getvalue() == "x,y,s,u_n,u_t,sigma_n,sigma_t,gap,clearance,status,part\n"
-    stream = io.StringIO()
-    write_csv(bent, "history", stream)
-    assert len(stream.getvalue().splitlines()) == 2
+    assert to_csv(bent, "contact") == "x,y,s,u_n,u_t,sigma_n,sigma_t,gap,clearance,status,part\n"
+    assert len(to_csv(bent, "history").splitlines()) == 2
 
 
 def test_the_plan_says_so(bent: Solution) -> None:

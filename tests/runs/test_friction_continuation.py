@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.studies.stability.evidence import examine
+from bemkit.studies.stability.independent_check import check_solution
 
 ELEMENTS = [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin()]
 MOST_SOLVES = 150
@@ -36,7 +36,7 @@ def bonded_punch(discretisation, friction_coefficient):
 def solved(scene):
     solution = bk.run(scene)
     assert solution.is_converged
-    assert examine(solution).is_good
+    assert check_solution(solution).is_good
     return solution
 
 

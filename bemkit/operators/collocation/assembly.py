@@ -26,7 +26,7 @@ from bemkit.operators.collocation.gradient_reconstruction import Slopes
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
-from bemkit.stopwatch import assembling
+from bemkit.operators.stopwatch import assembling
 
 CHUNK_PAIRS = 32768
 

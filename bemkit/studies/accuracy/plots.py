@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.reference.values import MEASURES
-from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, pareto_front
+from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, pareto_front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+FIGURE = "error-against-run-time"
 
 # the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -24,12 +26,12 @@ _MESHES = ("adaptive", "uniform", "graded")
 _ELEMENTS = ("constant", "linear", "quadratic")
 
 
-def draw_errors(rows: Sequence[Row], measures: Sequence[str], *, title: str = "") -> Figure:
+def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, title: str = "") -> Figure:
     """Draw errors over run time, or over the number of elements where no times were measured.
 
     Parameters
     ----------
-    rows : sequence of Row
+    records : sequence of ErrorRecord
     measures : sequence of str
         One panel for each.
     title : str
@@ -45,32 +47,32 @@ def draw_errors(rows: Sequence[Row], measures: Sequence[str], *, title: str = ""
     figure = Figure(figsize=(5.2 * n_columns, 3.9 * n_rows + 1.1), layout="constrained")
     axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
     for panel, measure in zip(axes, measures, strict=False):
-        _draw_panel(panel, rows, measure)
+        _draw_panel(panel, records, measure)
     for panel in axes[len(measures) :]:
         panel.set_visible(False)
-    figure.legend(handles=_legend(rows), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+    figure.legend(handles=_legend(records), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
     figure.suptitle(title, fontsize=11, parse_math=False)
     return figure
 
 
-def is_timed(rows: Sequence[Row]) -> bool:
+def is_timed(records: Sequence[ErrorRecord]) -> bool:
     """Whether run times were measured."""
-    return any(np.isfinite(row.seconds) for row in rows)
+    return any(np.isfinite(record.seconds) for record in records)
 
 
-def _draw_panel(panel: Axes, rows: Sequence[Row], measure: str) -> None:
+def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    abscissa = "seconds" if is_timed(rows) else "elements"
-    front = pareto_front(rows, measure)
+    abscissa = "seconds" if is_timed(records) else "elements"
+    front = pareto_front(records, measure)
     if front:
         x, y = _points(front, "seconds", measure)
         style: dict[str, Any] = {"color": _FRONT, "linewidth": 5, "solid_capstyle": "round", "zorder": 0}
         panel.step(x, y, where="post", **style)
     named = set()
-    for series in by_series(rows):
+    for series in by_series(records):
         x, y = _points(series, abscissa, measure)
-        colour, line, marker = _style(rows, series[0])
+        colour, line, marker = _style(records, series[0])
         panel.plot(x, y, color=colour, linestyle=line, marker=marker, markersize=4.5, linewidth=1.2)
         order = fitted_order(series, measure)
         # drivers reach the same state: the order is that of elements and meshes
@@ -96,33 +98,37 @@ def _write_order(panel: Axes, text: str, place: tuple[float, float], colour: str
     panel.annotate(text, place, xytext=(3, -3), textcoords="offset points", **style)
 
 
-def _points(rows: Sequence[Row], abscissa: str, measure: str) -> tuple[Any, Any]:
-    x = np.array([float(getattr(row, abscissa)) for row in rows])
-    y = np.array([getattr(row, measure) for row in rows], dtype=float)
+def _points(records: Sequence[ErrorRecord], abscissa: str, measure: str) -> tuple[Any, Any]:
+    x = np.array([float(getattr(record, abscissa)) for record in records])
+    y = np.array([getattr(record, measure) for record in records], dtype=float)
     shown = np.isfinite(x) & np.isfinite(y) & (y > 0.0)
     return x[shown], y[shown]
 
 
-def _style(rows: Sequence[Row], row: Row) -> tuple[str, Any, str]:
+def _style(records: Sequence[ErrorRecord], record: ErrorRecord) -> tuple[str, Any, str]:
     def place(known: Sequence[str], name: str) -> int:
-        names = dict.fromkeys([*known, *(str(getattr(other, name)) for other in rows)])
-        return list(names).index(getattr(row, name))
+        names = dict.fromkeys([*known, *(str(getattr(other, name)) for other in records)])
+        return list(names).index(getattr(record, name))
 
     colour = _COLOURS[place(_ELEMENTS, "discretisation") % len(_COLOURS)]
     line = _LINES[place(_MESHES, "meshes") % len(_LINES)]
     return colour, line, _MARKERS[place((), "solver") % len(_MARKERS)]
 
 
-def _legend(rows: Sequence[Row]) -> list[Any]:
+def _legend(records: Sequence[ErrorRecord]) -> list[Any]:
     from matplotlib.lines import Line2D
 
     handles: dict[str, Line2D] = {}
-    for row in rows:
-        colour, line, marker = _style(rows, row)
-        handles.setdefault(f"{row.discretisation} elements ({row.map})", Line2D([], [], color=colour, linewidth=3))
-        handles.setdefault(f"{row.meshes} meshes", Line2D([], [], color="#444444", linestyle=line, linewidth=1.2))
-        handles.setdefault(row.solver, Line2D([], [], color="#444444", marker=marker, linestyle="none", markersize=5))
-    if is_timed(rows):
+    for record in records:
+        colour, line, marker = _style(records, record)
+        handles.setdefault(
+            f"{record.discretisation} elements ({record.map})", Line2D([], [], color=colour, linewidth=3)
+        )
+        handles.setdefault(f"{record.meshes} meshes", Line2D([], [], color="#444444", linestyle=line, linewidth=1.2))
+        handles.setdefault(
+            record.solver, Line2D([], [], color="#444444", marker=marker, linestyle="none", markersize=5)
+        )
+    if is_timed(records):
         handles["no run is faster and more accurate"] = Line2D([], [], color=_FRONT, linewidth=5)
     for name, handle in handles.items():
         handle.set_label(name)

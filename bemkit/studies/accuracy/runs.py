@@ -12,14 +12,11 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.scene import ConstantCollocation, Discretisation, Scene
 from bemkit.solvers.base import ContactSolver
+from bemkit.studies.engine import StudyError
 
 ELEMENTS = (40, 80, 160, 320)
 ACCURACIES = (1e-2, 1e-3, 1e-4)
 MOST_ELEMENTS = 500
-
-
-class StudyError(InputError):
-    """A study that cannot begin or cannot go on."""
 
 
 class MeshSequence(Protocol):
@@ -104,14 +101,14 @@ class AdaptiveMeshes:
 
 @dataclass(frozen=True)
 class Run:
-    """One row to compute.
+    """One record to compute.
 
     Parameters
     ----------
     meshes : str
         Name of the sequence.
     size : float
-        Number of elements, or wished accuracy.
+        Number of elements, or asked-for accuracy.
     problem : Scene
         Its own mesh, elements and driver do not matter.
     element : Discretisation
@@ -151,7 +148,7 @@ class Run:
 
     @property
     def key(self) -> tuple[str, str, str, float]:
-        """What tells rows of one study apart."""
+        """What tells records of one study apart."""
         return self.discretisation, self.meshes, self.solver, self.size
 
 

@@ -6,13 +6,12 @@ import sys
 from collections.abc import Sequence
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from bemkit.reference.values import MEASURES, Reference
-from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, orders, pareto_front
+from bemkit.results.streams import plain_table, stdout_console
+from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, orders, pareto_front
 
 WIDE = 100
 """Width of a terminal from which on stages, memory and estimates are shown; the files hold them in any case."""
@@ -39,71 +38,69 @@ def print_reference(title: str, reference: Reference, console: Console | None = 
 
 
 def print_series(
-    rows: Sequence[Row], measures: Sequence[str], marked: dict[str, set[object]], console: Console
+    records: Sequence[ErrorRecord], measures: Sequence[str], marked: dict[str, set[object]], console: Console
 ) -> None:
-    """Print the rows of one series; each error is followed by its order against the mesh before."""
-    first = rows[0]
+    """Print the records of one series; each error is followed by its order against the mesh before."""
+    first = records[0]
     words = (f"{first.discretisation} elements", first.map, f"{first.meshes} meshes", first.solver)
     console.print(Text(", ".join(words), style="bold"))
-    table = _table()
     is_wide = console.width >= WIDE
-    for name in _costs(first, is_wide=is_wide):
-        table.add_column(name, justify="right", no_wrap=True)
+    table = plain_table(right=[*_costs(first, is_wide=is_wide)])
     for measure in measures:
         table.add_column(f"{SHORT[measure]:>6}", no_wrap=True)
-    steps = {measure: orders(rows, measure) for measure in measures}
-    for k, row in enumerate(rows):
-        errors = [_error(row, measure, steps[measure][k], row.key in marked[measure]) for measure in measures]
-        table.add_row(*_costs(row, is_wide=is_wide).values(), *errors)
+    steps = {measure: orders(records, measure) for measure in measures}
+    for k, record in enumerate(records):
+        errors = [_error(record, measure, steps[measure][k], record.key in marked[measure]) for measure in measures]
+        table.add_row(*_costs(record, is_wide=is_wide).values(), *errors)
     console.print(table)
-    for row in rows:
-        if not row.is_certified:
-            console.print(Text(f"  {_aim(row.size)}: {row.status.replace('_', ' ')}: {row.message}", style="red"))
-        elif row.message:
+    for record in records:
+        if not record.is_certified:
+            console.print(
+                Text(f"  {_aim(record.size)}: {record.status.replace('_', ' ')}: {record.message}", style="red")
+            )
+        elif record.message:
             # the first sentence; the rest is in the files
-            console.print(Text(f"  {row.message.split('. ')[0]}", style="yellow"))
+            console.print(Text(f"  {record.message.split('. ')[0]}", style="yellow"))
     console.print()
 
 
-def print_study(rows: Sequence[Row], measures: Sequence[str], console: Console | None = None) -> None:
+def print_study(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console | None = None) -> None:
     """Print all series, their fitted orders, and what is fastest for which error."""
     console = _console(console)
-    fronts = {measure: pareto_front(rows, measure) for measure in measures}
-    marked: dict[str, set[object]] = {measure: {row.key for row in front} for measure, front in fronts.items()}
-    for series in by_series(rows):
+    fronts = {measure: pareto_front(records, measure) for measure in measures}
+    marked: dict[str, set[object]] = {measure: {record.key for record in front} for measure, front in fronts.items()}
+    for series in by_series(records):
         print_series(series, measures, marked, console)
-    _print_orders(rows, measures, console)
+    _print_orders(records, measures, console)
     if any(fronts.values()):
         console.print(Text("* no other run of this study is both faster and more accurate", style="dim"))
-    elif rows:
+    elif records:
         console.print(Text("run times and memory were not measured: the runs were spread over processes", style="dim"))
 
 
-def _print_orders(rows: Sequence[Row], measures: Sequence[str], console: Console) -> None:
+def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console) -> None:
     console.print(Text("observed orders in N, fitted to the last meshes", style="bold"))
-    table = _table()
-    for name in ("elements", "map", "meshes", "driver"):
-        table.add_column(name, no_wrap=name != "driver", overflow="fold")
-    for measure in measures:
-        table.add_column(SHORT[measure], justify="right", no_wrap=True)
-    for series in by_series(rows):
+    table = plain_table(("elements", "map", "meshes", "driver"), [SHORT[measure] for measure in measures])
+    for column in table.columns[:3]:
+        column.no_wrap = True
+    for series in by_series(records):
         first = series[0]
         cells = [_number(fitted_order(series, measure), ".1f") for measure in measures]
         table.add_row(first.discretisation, first.map, first.meshes, first.solver, *cells)
     console.print(table)
 
 
-def _costs(row: Row, *, is_wide: bool) -> dict[str, str]:
+def _costs(record: ErrorRecord, *, is_wide: bool) -> dict[str, str]:
     """Return what stands before the errors, by the heads of the columns."""
-    aim = {"aim": _aim(row.size)} if row.meshes == "adaptive" else {}
-    always = {"N": str(row.elements or "-"), "it": str(row.linear_solves)}
-    seconds = {"total s": _number(row.seconds, ".3f")}
+    aim = {"aim": _aim(record.size)} if record.meshes == "adaptive" else {}
+    always = {"N": str(record.elements or "-"), "it": str(record.linear_solves)}
+    seconds = {"total s": _number(record.seconds, ".3f")}
     if not is_wide:
         return aim | always | seconds
     stages = {
-        "assem.": _number(row.seconds_assemble, ".3f"),
-        "cond.": _number(row.seconds_condense, ".3f"),
-        "solve": _number(row.seconds_solve, ".3f"),
+        "assem.": _number(record.seconds_assemble, ".3f"),
+        "cond.": _number(record.seconds_condense, ".3f"),
+        "solve": _number(record.seconds_solve, ".3f"),
     }
     return (
         aim
@@ -111,14 +108,14 @@ def _costs(row: Row, *, is_wide: bool) -> dict[str, str]:
         | stages
         | seconds
         | {
-            "MB": _number(row.peak_memory / 1e6, ".3g"),
-            "estim.": _short(row.estimated_error),
+            "MB": _number(record.peak_memory / 1e6, ".3g"),
+            "estim.": _short(record.estimated_error),
         }
     )
 
 
-def _error(row: Row, measure: str, order: float, is_best: bool) -> Text:
-    value = getattr(row, measure)
+def _error(record: ErrorRecord, measure: str, order: float, is_best: bool) -> Text:
+    value = getattr(record, measure)
     text = "absent" if np.isposinf(value) else _short(value)
     step = f"{order:4.1f}" if np.isfinite(order) else "    "
     return Text(f"{text:>6} {step}{'*' if is_best else ' '}", style="bold green" if is_best else "")
@@ -137,12 +134,6 @@ def _number(value: float, form: str) -> str:
     return "-" if not np.isfinite(value) else f"{value:{form}}"
 
 
-def _table() -> Table:
-    return Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-
-
 def _console(console: Console | None) -> Console:
-    if console is not None:
-        return console
     # into a file or a pipe there is room
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 120)
+    return stdout_console(console, width=None if sys.stdout.isatty() else 120)

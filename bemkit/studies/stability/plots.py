@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.cli.outputs import save_figure
 from bemkit.studies.stability.cases import Axis
-from bemkit.studies.stability.sweep import Row, Verdict
+from bemkit.studies.stability.records import StabilityRecord, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,36 +23,36 @@ _SERIES = (
 _FLOOR = 1e-18
 
 
-def save_plots(axes: Sequence[Axis], rows: Sequence[Row], folder: str | Path) -> tuple[Path, ...]:
-    """Draw one PNG for each axis into a folder, which is made if need be.
-
-    Raises
-    ------
-    OutputFileError
-        If a file cannot be written, or a file of another kind stands in the way.
-    """
-    own = {axis.name: [row for row in rows if row.axis == axis.name] for axis in axes}
-    return tuple(
-        save_figure(draw_axis(axis, own[axis.name]), Path(folder) / f"stability-{axis.name}.png") for axis in axes
-    )
+def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
+    """Draw one figure for each axis, by file names."""
+    return {figure_name(axis): draw_axis(axis, [one for one in records if one.axis == axis.name]) for axis in axes}
 
 
-def draw_axis(axis: Axis, rows: Sequence[Row]) -> Figure:
+def figure_name(axis: Axis) -> str:
+    """Return the name of the file, without ``.png``."""
+    return f"stability-{axis.name}"
+
+
+def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
     """Draw one axis."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     plot = figure.add_subplot()
-    values = np.array([row.value for row in rows])
+    values = np.array([record.value for record in records])
     is_logarithmic = axis.is_logarithmic and bool((values > 0.0).any())
     for name, label, colour, marker in _SERIES:
-        numbers = np.maximum([getattr(row, name) for row in rows], _FLOOR)
+        numbers = np.maximum([getattr(record, name) for record in records], _FLOOR)
         shown = np.isfinite(numbers) & ((values > 0.0) | (not is_logarithmic))
         plot.plot(
             values[shown], numbers[shown], marker, color=colour, label=label, markersize=5, linestyle="-", linewidth=0.8
         )
     for verdict, colour in ((Verdict.NAMED, "#56B4E9"), (Verdict.WRONG, "#D55E00")):
-        marked = [row.value for row in rows if row.verdict == verdict.value and (row.value > 0.0 or not is_logarithmic)]
+        marked = [
+            record.value
+            for record in records
+            if record.verdict == verdict.value and (record.value > 0.0 or not is_logarithmic)
+        ]
         for k, value in enumerate(marked):
             plot.axvline(value, color=colour, linewidth=4, alpha=0.35, label=verdict.value if k == 0 else None)
     if is_logarithmic:

@@ -5,40 +5,73 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
+from bemkit.results.streams import plain_table, stdout_console
 from bemkit.studies.stability.cases import Axis
-from bemkit.studies.stability.files import cells
-from bemkit.studies.stability.sweep import Row, Verdict
+from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
+from bemkit.studies.stability.trials import Outcome, Trial
 
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 
+_OUTCOME_STYLES = {
+    Outcome.WRONG: "bold red",
+    Outcome.TRACEBACK: "bold red",
+    Outcome.WARNED: "yellow",
+    Outcome.NAMED: "cyan",
+}
+_PLURALS = {
+    Outcome.SUCCESS: "successes",
+    Outcome.WARNED: "warned",
+    Outcome.NAMED: "named failures",
+    Outcome.WRONG: "wrong successes",
+    Outcome.TRACEBACK: "tracebacks",
+}
 
-def print_axis(axis: Axis, rows: Sequence[Row], console: Console | None = None) -> None:
-    """Print the table of one axis, and the reasons of rows that are not right."""
-    console = Console(highlight=False) if console is None else console
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
-    for name in ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s"):
-        table.add_column(name, justify="left" if name == "verdict" else "right", no_wrap=True)
-    for row in rows:
-        value, verdict, status, *rest = cells(row)
+
+def print_axis(axis: Axis, records: Sequence[StabilityRecord], console: Console | None = None) -> None:
+    """Print the table of one axis, and the reasons of records that are not right."""
+    console = stdout_console(console)
+    heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s")
+    table = plain_table(right=heads)
+    table.columns[1].justify = "left"
+    for record in records:
+        value, verdict, status, *rest = cells(record)
         words = verdict if verdict == "right" else f"{verdict}: {status}"
-        table.add_row(value, Text(words, style=_STYLES[verdict]), *rest, f"{row.seconds:.2f}")
+        table.add_row(value, Text(words, style=_STYLES[verdict]), *rest, f"{record.seconds:.2f}")
     console.print(Text(f"{axis.name}: {axis.label}", style="bold"))
     console.print(Text(f"promise: {axis.promise}", style="dim"))
     console.print(table)
-    for row in rows:
-        if row.message:
-            console.print(Text(f"  {row.value:.9g}: {row.message}"))
+    for record in records:
+        if record.message:
+            console.print(Text(f"  {record.value:.9g}: {record.message}"))
     console.print()
 
 
-def print_verdicts(rows: Sequence[Row], console: Console | None = None) -> None:
-    """Print how many rows got which verdict."""
-    console = Console(highlight=False) if console is None else console
-    counts = Counter(row.verdict for row in rows)
+def print_verdicts(records: Sequence[StabilityRecord], console: Console | None = None) -> None:
+    """Print how many records got which verdict."""
+    console = stdout_console(console)
+    counts = Counter(record.verdict for record in records)
     words = [f"{counts[verdict.value]} {verdict.value}" for verdict in Verdict if counts[verdict.value]]
-    console.print(Text(f"{len(rows)} rows: {', '.join(words)}", style="bold"))
+    console.print(Text(f"{len(records)} rows: {', '.join(words)}", style="bold"))
+
+
+def print_trials(trials: Sequence[Trial], console: Console | None = None) -> None:
+    """Print how many scenes came to which end and why, and what to call for each that failed."""
+    console = stdout_console(console)
+    table = plain_table(("outcome", "scenes", "why"), gap=2)
+    table.columns[1].justify = "right"
+    for outcome in Outcome:
+        own = [trial for trial in trials if trial.outcome is outcome]
+        reasons = Counter(trial.reason for trial in own if trial.reason)
+        why = ", ".join(f"{reason.replace('_', ' ')} {count}" for reason, count in reasons.most_common())
+        shows_why = outcome is not Outcome.WARNED
+        table.add_row(
+            Text(_PLURALS[outcome], _OUTCOME_STYLES.get(outcome, "")), str(len(own)), why if shows_why else ""
+        )
+    console.print(Text(f"{len(trials)} random scenes", style="bold"))
+    console.print(table)
+    for trial in [trial for trial in trials if trial.is_failure]:
+        console.print(Text(f"{trial.outcome.value}: {trial.reason}: {trial.message.strip().splitlines()[-1]}"))
+        console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))

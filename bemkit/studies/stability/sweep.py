@@ -3,215 +3,121 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from enum import Enum
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, partial
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import BemkitError, InputError
+from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
+from bemkit.studies.engine import Attempt, Task, attempt, compute
 from bemkit.studies.stability.cases import Axis, Case, Similarity
-from bemkit.studies.stability.evidence import examine
+from bemkit.studies.stability.independent_check import check_solution
+from bemkit.studies.stability.records import StabilityRecord, Verdict
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""
-
-REFUSED = "refused"
-"""Status of a scene that is refused by a named error before any step."""
-
-
-class Verdict(Enum):
-    """What a row shows."""
-
-    RIGHT = "right"
-    """Called converged; the independent check and the similar twin agree, and so does the reference where it must."""
-    COARSE = "coarse"
-    """The same, but the mesh is so coarse that tractions and displacements hardly belong together."""
-    AMBIGUOUS = "ambiguous"
-    """The case and its twin each pass the independent check, and differ: nothing decides between several solutions."""
-    NAMED = "named"
-    """No answer, but a named status or error, and the same for the twin."""
-    WRONG = "wrong"
-    """Called converged against the evidence, refused although solvable, or an answer that the twin does not share."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line of the tables.
-
-    Parameters
-    ----------
-    axis : str
-    value : float
-    verdict, status : str
-        Values of `Verdict`; name of the solver's status in small letters, or `REFUSED`.
-    linear_solves : int
-    certificate : float
-        Worst entry, as the driver says.
-    check : float
-        Worst entry of the independent check, see `Evidence`.
-    reciprocity : float
-        Of the independent check: elasticity itself, up to the discretisation error.
-    condition : float
-        2-norm condition number of the contact stiffness with unit diagonal, free rigid motions left out.
-    drift : float
-        Largest difference to the reference, scaled back, relative to its largest displacement and traction.
-    twin : float
-        The same between the case and its similar twin: nothing but amplified round-off.
-    seconds : float [s]
-    message : str
-        The remark of the solver or the text of the error; what speaks against the row if it is wrong.
-    """
-
-    axis: str
-    value: float
-    verdict: str
-    status: str
-    linear_solves: int
-    certificate: float
-    check: float
-    reciprocity: float
-    condition: float
-    drift: float
-    twin: float
-    seconds: float
-    message: str
 
 
 class StabilityError(InputError):
     """A sweep that cannot begin."""
 
 
-class Attempt(NamedTuple):
-    """A solution, or why there is none."""
-
-    solution: Solution | None
-    message: str
-    seconds: float
-
-    @property
-    def status(self) -> str:
-        """The status in small letters."""
-        return REFUSED if self.solution is None else self.solution.status.name.lower()
-
-    @property
-    def is_converged(self) -> bool:
-        """Whether the solver vouches for a solution."""
-        return self.solution is not None and self.solution.is_converged
-
-    @property
-    def is_certified(self) -> bool:
-        """Whether there is a solution that is certified, be it as accurate as was wished or not."""
-        return self.solution is not None and self.solution.is_certified
-
-
 def sweep(
     scene: Scene,
     axes: Sequence[Axis],
-    *,
-    finished: Mapping[tuple[str, float], Row] | None = None,
-    begins: Callable[[Axis, float], None] | None = None,
-) -> Iterator[Row]:
-    """Compute the rows of some axes, one after the other.
+    run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
+) -> Iterator[StabilityRecord]:
+    """Compute the records of some axes, one axis after the other.
 
     Parameters
     ----------
     scene : Scene
         The baseline.
     axes : sequence of Axis
-    finished : mapping of (axis, value) to Row, optional
-        Rows of an earlier sweep, which are handed on instead of computed again.
-    begins : callable, optional
-        Called with axis and value before each row that is computed.
+    run_tasks : callable, optional
+        Computes the tasks of one axis, such as `bemkit.studies.engine.compute` with records of an earlier sweep.
 
     Yields
     ------
-    Row
+    StabilityRecord
 
     Raises
     ------
     StabilityError
         If the scene itself has no converged solution, or no contact.
     """
-    finished = {} if finished is None else finished
     if not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
-    baseline = attempt(scene)
+    baseline = attempt(lambda: run(scene))
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
     for axis in axes:
-        reference = None
-        for value in axis.values:
-            row = finished.get((axis.name, value))
-            if row is None:
-                if begins is not None:
-                    begins(axis, value)
-                if reference is None:
-                    reference = _reference(axis, baseline.solution)
-                row = compute(axis.name, axis.make(baseline.solution, value), reference)
-            yield row
+        yield from run_tasks(_tasks(axis, baseline.solution))
 
 
-def attempt(scene: Scene, case: Case | None = None) -> Attempt:
-    """Solve a scene on the mesh of its case; errors that bemkit names are answers too."""
-    begin = time.perf_counter()
-    try:
-        solution = run(scene, mesh=None if case is None else case.mesh(scene))
-    except BemkitError as error:
-        return Attempt(None, str(error), time.perf_counter() - begin)
-    return Attempt(solution, solution.message, time.perf_counter() - begin)
+def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
+    # the reference is solved when the first record needs it
+    reference = cache(lambda: _reference(axis, baseline))
+
+    def record(value: float) -> StabilityRecord:
+        return solve_and_judge(axis.name, axis.make(baseline, value), reference())
+
+    return [Task((axis.name, value), f"{axis.name} {value:.6g}", partial(record, value)) for value in axis.values]
 
 
-def compute(axis: str, case: Case, reference: Solution | None) -> Row:
+def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> StabilityRecord:
     """Solve a case and its twin, and judge them.
 
     Parameters
     ----------
     axis : str
-        Name of the axis, for the row.
+        Name of the axis, for the record.
     case : Case
     reference : Solution or None
         What the drift is measured against; None if the reference itself has no solution.
 
     Returns
     -------
-    Row
+    StabilityRecord
     """
     twin_scene = TWIN.apply(case.scene)
-    first, second = attempt(case.scene, case), attempt(twin_scene, case)
+    first, second = _attempt(case.scene, case), _attempt(twin_scene, case)
     solution = first.solution
     drift = twin = math.nan
-    evidence = None
+    check = None
     if solution is not None:
-        evidence = examine(solution)
+        check = check_solution(solution)
         if reference is not None:
             drift = difference(reference, solution, case.similarity)
         if second.solution is not None:
             twin = difference(solution, second.solution, TWIN, in_mean=case.levels > 0)
     verdict, objection = _judge(case, reference, first, second, drift, twin)
-    return Row(
+    return StabilityRecord(
         axis=axis,
         value=case.value,
         verdict=verdict.value,
         status=first.status,
         linear_solves=0 if solution is None else solution.linear_solves,
         certificate=math.nan if solution is None else solution.certificate.worst,
-        check=math.nan if evidence is None else evidence.worst,
-        reciprocity=math.nan if evidence is None else evidence.reciprocity,
+        check=math.nan if check is None else check.worst,
+        reciprocity=math.nan if check is None else check.reciprocity,
         condition=math.nan if solution is None else condition_number(twin_scene, case),
         drift=drift,
         twin=twin,
         seconds=first.seconds,
         message=objection or ("" if first.is_converged else first.message),
     )
+
+
+def _attempt(scene: Scene, case: Case) -> Attempt:
+    # the mesh is made inside: an error there is an answer too
+    return attempt(lambda: run(scene, mesh=case.mesh(scene)))
 
 
 def difference(reference: Solution, solution: Solution, similarity: Similarity, *, in_mean: bool = False) -> float:
@@ -265,7 +171,7 @@ def _apart(before: FloatArray, after: FloatArray) -> FloatArray:
 
 
 def condition_number(scene: Scene, case: Case) -> float:
-    """Return the condition number of the contact stiffness of a scene; see `Row`."""
+    """Return the condition number of the contact stiffness of a scene; see `StabilityRecord`."""
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(scene, mesh).body
@@ -280,24 +186,24 @@ def _reference(axis: Axis, baseline: Solution) -> Solution | None:
     if axis.reference is None:
         return baseline
     case = axis.make(baseline, axis.reference)
-    found = attempt(case.scene, case)
+    found = _attempt(case.scene, case)
     return found.solution if found.is_converged else None
 
 
 def _judge(
     case: Case, reference: Solution | None, first: Attempt, second: Attempt, drift: float, twin: float
 ) -> tuple[Verdict, str]:
-    """Return the verdict and what speaks against the row, if anything does."""
+    """Return the verdict and what speaks against the record, if anything does."""
     if first.status != second.status:
         return Verdict.WRONG, f"{first.status}, but its similar twin: {second.status} ({second.message})"
     if not first.is_converged or first.solution is None or second.solution is None:
         if case.is_solvable or case.keeps_steps:
             return Verdict.WRONG, f"solvable, but: {first.message}"
         return Verdict.NAMED, ""
-    evidence, other = examine(first.solution), examine(second.solution)
+    check, other = check_solution(first.solution), check_solution(second.solution)
     objections = {
         "no solution exists": case.is_solvable is False,
-        f"the independent check finds {evidence.worst:.1e}": not evidence.is_good,
+        f"the independent check finds {check.worst:.1e}": not check.is_good,
         "drifts from the reference": math.isfinite(case.drift_limit) and not drift <= case.drift_limit,
     }
     if case.keeps_steps and reference is not None:
@@ -311,6 +217,6 @@ def _judge(
         return Verdict.WRONG, "; ".join(found)
     if differs:
         return Verdict.AMBIGUOUS, "the similar twin is another solution by the independent check"
-    if evidence.is_coarse:
-        return Verdict.COARSE, f"Betti's theorem is missed by {evidence.reciprocity:.0%}: use more elements"
+    if check.is_coarse:
+        return Verdict.COARSE, f"Betti's theorem is missed by {check.reciprocity:.0%}: use more elements"
     return Verdict.RIGHT, ""

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from itertools import pairwise
+from pathlib import Path
 
 from bemkit.errors import BemkitError
+from bemkit.results.outputs import write_text
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run, run_history
-from bemkit.studies.stability.evidence import Evidence, examine
+from bemkit.studies.engine import Task
+from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
 from bemkit.studies.stability.random_scenes import RandomCase, random_case
-from bemkit.workers import worker_processes
 
 
 class Outcome(Enum):
@@ -52,6 +54,11 @@ class Trial:
     outcome: Outcome
     reason: str
     message: str
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """What tells trials apart."""
+        return self.seed, self.index
 
     @property
     def is_failure(self) -> bool:
@@ -96,11 +103,11 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     for before, step in pairwise((None, *steps)):
         if step is None or not step.is_converged:
             continue
-        evidence = examine(step, before)
-        if not evidence.is_good:
-            return Outcome.WRONG, evidence.faults[0], describe(evidence)
-        if evidence.is_coarse and not getattr(step, "warnings", ()):
-            return Outcome.WRONG, "reciprocity", describe(evidence)
+        check = check_solution(step, before)
+        if not check.is_good:
+            return Outcome.WRONG, check.faults[0], describe(check)
+        if check.is_coarse and not getattr(step, "warnings", ()):
+            return Outcome.WRONG, "reciprocity", describe(check)
     last = steps[-1]
     if not last.is_converged:
         return Outcome.NAMED, last.status.name.lower(), last.message or last.status.value
@@ -109,25 +116,21 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     return Outcome.SUCCESS, "", ""
 
 
-def describe(evidence: Evidence) -> str:
+def describe(check: IndependentCheck) -> str:
     """Return the entries of the check that are too large, with their values."""
-    entries = [f"{name} {evidence.exact[name]:.1e}" for name in evidence.faults]
-    doubts = [f"{name} {getattr(evidence, name):.1e}" for name in ("reciprocity", "hidden_overlap")]
+    entries = [f"{name} {check.exact[name]:.1e}" for name in check.faults]
+    doubts = [f"{name} {getattr(check, name):.1e}" for name in ("reciprocity", "hidden_overlap")]
     return "; ".join([*entries, *doubts])
 
 
-def try_cases(seed: int, indices: Iterable[int], *, processes: int = 1) -> Iterator[Trial]:
-    """Yield the outcomes of random scenes, in order.
+def trial_tasks(seed: int, indices: Iterable[int]) -> list[Task[Trial]]:
+    """Return the tasks of random scenes, for `bemkit.studies.engine.compute`."""
+    return [Task((seed, index), f"random scene {index}", partial(try_case, seed, index)) for index in indices]
 
-    Parameters
-    ----------
-    seed : int
-    indices : iterable of int
-    processes : int
-        Among which the scenes are spread.
-    """
-    if processes == 1:
-        yield from (try_case(seed, index) for index in indices)
-        return
-    with worker_processes(processes) as executor:
-        yield from executor.map(partial(try_case, seed), indices, chunksize=4)
+
+def save_trial(trial: Trial, folder: Path) -> None:
+    """Write the scenes of a trial as TOML into a folder, headed by what was found."""
+    lines = [f"{trial.outcome.value}: {trial.reason}", *trial.message.splitlines()]
+    head = "".join(f"# {line}\n" for line in lines)
+    for name, text in random_case(trial.seed, trial.index).files().items():
+        write_text(str(folder / name), head + text)

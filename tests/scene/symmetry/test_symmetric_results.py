@@ -14,7 +14,7 @@ from bemkit.operators.cache import StaleCacheError, load, save
 from bemkit.results.figures import draw_deformation, node_displacement
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
 from bemkit.scene.transform import Stretch, moved_scene
-from bemkit.studies.stability.evidence import examine
+from bemkit.studies.stability.independent_check import check_solution
 from tests.scene.symmetry.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 
 BOTH = bk.Symmetry(x=0.0, y=0.0)
@@ -63,14 +63,14 @@ def test_independent_evidence_says_of_the_half_what_it_says_of_the_whole(
     scene = replace(scene, discretisation=discretisation)
     half = bk.run(scene)
     whole = bk.run(replace(scene, symmetry=None), mesh=whole_mesh(scene, half.mesh))
-    evidence, expected = examine(half), examine(whole)
-    assert evidence.is_good
-    assert evidence.worst <= 1e-12
+    check, expected = check_solution(half), check_solution(whole)
+    assert check.is_good
+    assert check.worst <= 1e-12
     # the discretisation error, which shear does not enter by symmetry
-    assert evidence.reciprocity == pytest.approx(expected.reciprocity, rel=1e-6, abs=1e-12)
+    assert check.reciprocity == pytest.approx(expected.reciprocity, rel=1e-6, abs=1e-12)
     tilted = replace(half.contact, sigma_n=1.01 * half.contact.sigma_n)
     if len(scene.symmetry.rigid_motions):  # type: ignore[union-attr]
-        assert examine(replace(half, contact=tilted)).equilibrium > 1e-4  # 1 % of one of many forces
+        assert check_solution(replace(half, contact=tilted)).equilibrium > 1e-4  # 1 % of one of many forces
 
 
 def test_the_plan_counts_what_is_left() -> None:

@@ -12,19 +12,20 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 import bemkit as bk
-from bemkit.cli import outputs as outputs_module
-from bemkit.cli.errors import complaint
+from bemkit.cli.errors import one_line
 from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
 from bemkit.hdf5 import MARK, ResultFileError, seal
-from bemkit.reference import MEASURES
-from bemkit.studies.accuracy import sweep as sweep_module
-from bemkit.studies.accuracy.files import FILE, to_csv
+from bemkit.reference import MEASURES, find_reference
+from bemkit.results import outputs as outputs_module
+from bemkit.studies.accuracy import measure as measure_module
+from bemkit.studies.accuracy.measure import error_tasks
 from bemkit.studies.accuracy.plots import draw_errors
+from bemkit.studies.accuracy.records import FILE, to_csv
 from bemkit.studies.accuracy.runs import all_runs, uniform
-from bemkit.studies.accuracy.session import show_progress
 from bemkit.studies.accuracy.table import WIDE, print_study
-from tests.studies.accuracy.rows import row
+from bemkit.studies.engine import compute_with_progress
+from tests.studies.accuracy.records import row
 
 FEW = ("--elements", "12,24", "--discretisation", "linear", "--solver", "semismooth-newton", "--repeat", "1")
 FAST = ("study", "paper-1", *FEW, "--meshes", "uniform")
@@ -78,7 +79,7 @@ def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
     assert more.return_value == 0
     assert FILE.read(path)[1][:2] == before
     assert len(FILE.read(path)[1]) == 4
-    monkeypatch.setattr(sweep_module, "timed_row", None)  # calling it would fail
+    monkeypatch.setattr(measure_module, "measure", int)  # calling it would fail
     assert call(*FAST, "-q", "-o", path).return_value == 0
     assert len(FILE.read(path)[1]) == 4
 
@@ -124,7 +125,7 @@ def test_files_of_others_and_damaged_ones_stay(tmp_path: Path) -> None:
 def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:
     result = call("study", "receding-layer", *FEW)
     assert isinstance(result.exception, BemkitError)
-    message = complaint(result.exception)
+    message = one_line(result.exception)
     assert "receding-layer: no closed form or reference solution belongs to this scene" in message
     assert "add --over-resolve 600 to measure against a fine solution (600 elements, about " in message
     assert " GB)" in message
@@ -217,15 +218,15 @@ def test_narrow_terminals_show_less_and_nothing_is_cut(capsys: pytest.CaptureFix
 def test_progress_goes_to_standard_error(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FORCE_COLOR", "1")  # as if standard error were a terminal
     runs = all_runs(bk.load_scene("paper-1"), [bk.LinearGalerkin()], [uniform((20,))], [bk.SemismoothNewton()])
-    with show_progress(1, is_live=True) as (begins, ends):
-        begins(runs[0])
-        ends()
+    found = find_reference(bk.load_scene("paper-1"))
+    assert found is not None
+    tasks = error_tasks(runs, found, 1)
+    (computed,) = compute_with_progress(tasks, "error study", is_live=True)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert "linear, uniform 20, semismooth-newton" in shown.err
-    with show_progress(1, is_live=False) as (begins, ends):
-        begins(runs[0])
-    assert capsys.readouterr().err == ""
+    list(compute_with_progress(tasks, "error study", is_live=False, finished={computed.key: computed}))
+    assert capsys.readouterr() == ("", "")
 
 
 def test_figures_name_every_series_and_show_the_front() -> None:

@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 from bemkit.cli.main import commands
 from bemkit.hdf5 import ResultFileError
-from bemkit.studies.accuracy.files import FILE
-from tests.studies.accuracy.rows import row
+from bemkit.studies.accuracy.records import FILE
+from tests.studies.accuracy.records import row
 
 ARGUMENTS = ("study", "paper-1", "--elements", "12,16,20", "--meshes", "uniform", "--discretisation", "linear")
 STUDY = f"""
@@ -25,7 +25,7 @@ main([*{ARGUMENTS}, "--repeat", "1", "-q", "-o", sys.argv[1]])
 """
 WRITES_FOREVER = """
 import sys
-from bemkit.studies.accuracy.files import FILE
+from bemkit.studies.accuracy.records import FILE
 labels, rows = FILE.read(sys.argv[1])
 print("ready", flush=True)
 while True:

@@ -10,14 +10,14 @@ from click.testing import CliRunner, Result
 
 from bemkit.cli.main import commands
 from bemkit.scene.toml import load_scene
+from bemkit.studies.engine import compute, compute_with_progress
 from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import all_axes
 from bemkit.studies.stability.cases import find_axes
-from bemkit.studies.stability.files import cells, read_rows, to_csv, to_markdown
 from bemkit.studies.stability.plots import draw_axis
 from bemkit.studies.stability.random_scenes import random_case
-from bemkit.studies.stability.sweep import Row
-from bemkit.studies.stability.trials import Outcome, Trial, try_cases
+from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
+from bemkit.studies.stability.trials import Outcome, Trial, trial_tasks
 
 FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
 
@@ -35,8 +35,8 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
     assert result.return_value == 0
     assert "11 rows: 6 right, 5 named" in result.output
     assert "promise: solved below 1, refused above" in result.output
-    scene, rows = read_rows(files["h5"])
-    assert "title" in scene
+    labels, rows = FILE.read(files["h5"])
+    assert "title" in labels["scene"]
     assert len(rows) == 11
     assert [row["verdict"] for row in csv.DictReader(files["csv"].read_text().splitlines())] == [
         row.verdict for row in rows
@@ -48,15 +48,17 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
 
 def test_rows_in_the_file_are_not_computed_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert call(*FAST, "-q", "-o", tmp_path / "rows.h5").return_value == 0
-    before = read_rows(tmp_path / "rows.h5")
-    monkeypatch.setattr(sweep_module, "compute", None)  # calling it would fail
+    before = FILE.read(tmp_path / "rows.h5")
+    monkeypatch.setattr(sweep_module, "solve_and_judge", None)  # calling it would fail
     assert call(*FAST, "-q", "-o", tmp_path / "rows.h5").return_value == 0
-    assert repr(read_rows(tmp_path / "rows.h5")) == repr(before)
+    assert repr(FILE.read(tmp_path / "rows.h5")) == repr(before)
 
 
 def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = Row("sliding", 100.0, "wrong", "converged", 1, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, "the check finds 1.0")
-    monkeypatch.setattr(sweep_module, "compute", lambda *arguments: wrong)
+    wrong = StabilityRecord(
+        "sliding", 100.0, "wrong", "converged", 1, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, "the check finds 1.0"
+    )
+    monkeypatch.setattr(sweep_module, "solve_and_judge", lambda *arguments: wrong)
     result = call(*FAST)
     assert result.return_value == 1
     assert "the check finds 1.0" in result.output
@@ -91,7 +93,7 @@ def test_files_of_others_and_of_other_scenes_stay(tmp_path: Path) -> None:
 
 def test_tables_leave_out_what_does_not_exist() -> None:
     nan = float("nan")
-    row = Row("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
+    row = StabilityRecord("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
     assert cells(row) == ["2", "named", "refused", "", "", "", "", "", "", ""]
     axes = find_axes(all_axes(), ["sliding"])
     assert "| 2 | named | refused |" in to_markdown(axes, [row])
@@ -108,15 +110,14 @@ def test_random_scenes_are_counted() -> None:
 
 
 def test_random_scenes_are_the_same_in_processes() -> None:
-    alone = list(try_cases(7, range(40, 44)))
-    assert list(try_cases(7, range(40, 44), processes=2)) == alone
+    tasks = trial_tasks(7, range(40, 44))
+    together = list(compute_with_progress(tasks, "random scenes", is_live=False, processes=2))
+    assert sorted(together, key=lambda trial: trial.index) == list(compute(tasks))
 
 
 def test_random_scenes_that_fail_are_saved_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = Trial(7, 41, Outcome.WRONG, "status", "status 1.0e+00")
-    monkeypatch.setattr(
-        "bemkit.studies.stability.trial_session.try_cases", lambda seed, indices, processes: iter([found])
-    )
+    monkeypatch.setattr("bemkit.studies.stability.trials.try_case", lambda seed, index: found)
     result = call("stability", "--random", 1, "--seed", 7, "--first", 41, "--save", tmp_path / "failures")
     assert result.return_value == 1
     assert "wrong success: status: status 1.0e+00" in result.output

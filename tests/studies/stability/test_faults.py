@@ -17,11 +17,11 @@ import pytest
 import bemkit as bk
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.results.result_file import read_result, write_result
-from bemkit.studies.stability.files import read_rows, write_rows
-from bemkit.studies.stability.sweep import Row
+from bemkit.studies.stability.records import FILE, StabilityRecord
 from tests.studies.stability.scenes import small_paper_scene
 
-ROW = Row("friction", 0.1, "right", "converged", 4, 1e-16, 1e-16, 1e-3, 1e2, 0.0, 1e-12, 0.1, "")
+LABELS = {"scene": "title = 'x'\n"}
+ROW = StabilityRecord("friction", 0.1, "right", "converged", 4, 1e-16, 1e-16, 1e-3, 1e2, 0.0, 1e-12, 0.1, "")
 
 WRITES_FOREVER = """
 import sys
@@ -114,8 +114,8 @@ def test_any_flipped_bit_is_noticed(result: Path, is_rows: bool) -> None:
     path = result
     if is_rows:
         path = result.parent / "rows.h5"
-        write_rows(path, "title = 'x'\n", [ROW] * 20)
-    expected = read_rows(path) if is_rows else read_result(path).contact.sigma_n
+        FILE.write(path, LABELS, [ROW] * 20)
+    expected = FILE.read(path) if is_rows else read_result(path).contact.sigma_n
     content = path.read_bytes()
     chooser = random.Random(7)
     complaints: list[str] = []
@@ -124,7 +124,7 @@ def test_any_flipped_bit_is_noticed(result: Path, is_rows: bool) -> None:
         damaged[chooser.randrange(len(content))] ^= 1 << chooser.randrange(8)
         path.write_bytes(damaged)
         try:
-            found = read_rows(path) if is_rows else read_result(path).contact.sigma_n
+            found = FILE.read(path) if is_rows else read_result(path).contact.sigma_n
         except ResultFileError as error:
             complaints.append(str(error))
         else:  # unused bytes between the objects of the file
@@ -143,24 +143,24 @@ def test_a_changed_number_is_noticed(result: Path) -> None:
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_truncated_rows_are_refused(tmp_path: Path, share: float) -> None:
     path = tmp_path / "rows.h5"
-    write_rows(path, "title = 'x'\n", [ROW])
+    FILE.write(path, LABELS, [ROW])
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
     with pytest.raises(ResultFileError, match=r"rows\.h5: .*: "):
-        read_rows(path)
+        FILE.read(path)
 
 
 def test_rows_of_another_version_or_kind_are_refused(tmp_path: Path, result: Path) -> None:
     path = tmp_path / "rows.h5"
-    write_rows(path, "title = 'x'\n", [ROW])
-    assert read_rows(path) == ("title = 'x'\n", (ROW,))
+    FILE.write(path, LABELS, [ROW])
+    assert FILE.read(path) == (LABELS, (ROW,))
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = 99
     seal(path, MARK)
     with pytest.raises(ResultFileError, match="layout version 99, this bemkit reads version 1: use the bemkit that"):
-        read_rows(path)
+        FILE.read(path)
     with pytest.raises(ResultFileError, match="not of 'bemkit stability -o'"):
-        read_rows(result)
+        FILE.read(result)
 
 
 def sweep_process(path: Path) -> subprocess.Popen[bytes]:
@@ -175,17 +175,17 @@ def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
         deadline = time.monotonic() + 30.0
         while time.monotonic() < deadline and process.poll() is None:
             with contextlib.suppress(ResultFileError):
-                if len(read_rows(path)[1]) > n_before:
+                if len(FILE.read(path)[1]) > n_before:
                     break
             time.sleep(0.01)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        rows = read_rows(path)[1]
+        rows = FILE.read(path)[1]
         assert len(rows) > n_before
         n_before = len(rows)
-    finished = read_rows(path)[1]
+    finished = FILE.read(path)[1]
     assert sweep_process(path).wait() == 0
-    after = read_rows(path)[1]
+    after = FILE.read(path)[1]
     assert len(after) == 24
     # equal to the run times: finished rows are taken over, not computed again
     assert after[: len(finished)] == finished or any("nan" in repr(row) for row in finished)

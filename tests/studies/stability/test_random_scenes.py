@@ -11,8 +11,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.scene.toml import scene_from_toml
+from bemkit.studies.engine import compute_with_progress
 from bemkit.studies.stability.random_scenes import random_case
-from bemkit.studies.stability.trials import Outcome, Trial, judge, try_case, try_cases
+from bemkit.studies.stability.trials import Outcome, Trial, judge, trial_tasks, try_case
 from tests.studies.stability.scenes import FLOOR, block
 
 REMEDY = re.compile(
@@ -29,8 +30,12 @@ def assert_honest(trials: list[Trial]) -> None:
             assert REMEDY.search(trial.message), f"no remedy: {trial.index}: {trial.message}"
 
 
+def random_trials(seed: int, count: int) -> list[Trial]:
+    return list(compute_with_progress(trial_tasks(seed, range(count)), "random scenes", is_live=False, processes=2))
+
+
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = list(try_cases(1, range(200), processes=2))
+    trials = random_trials(1, 200)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
     assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 80  # a generator of scenes without answers tests nothing
@@ -39,7 +44,7 @@ def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3, 5])
 def test_many_random_scenes(seed: int) -> None:
-    assert_honest(list(try_cases(seed, range(2000), processes=2)))
+    assert_honest(random_trials(seed, 2000))
 
 
 def test_a_scene_is_a_function_of_its_numbers() -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import all_axes
 from bemkit.studies.stability.cases import Axis, Case, UnknownAxisError, find_axes
-from bemkit.studies.stability.evidence import examine
-from bemkit.studies.stability.sweep import Row, StabilityError, Verdict, compute, difference, sweep
+from bemkit.studies.stability.independent_check import check_solution
+from bemkit.studies.stability.records import StabilityRecord, Verdict
+from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
 from tests.studies.stability.scenes import CONSTANT, LINEAR, small_paper_scene
 
 EXTREMES = {
@@ -76,8 +79,8 @@ def altered(solution: bk.Solution) -> bk.Solution:
     return dataclasses.replace(solution, contact=dataclasses.replace(table, sigma_t=0.99 * table.sigma_t))
 
 
-def row_of(case: Case, reference: bk.Solution) -> Row:
-    return compute("axis", case, reference)
+def row_of(case: Case, reference: bk.Solution) -> StabilityRecord:
+    return solve_and_judge("axis", case, reference)
 
 
 def test_a_driver_that_lies_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,13 +142,12 @@ def test_a_scene_without_a_solution_is_no_baseline() -> None:
 
 def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
-    row = Row("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
-    begun: list[float] = []
-    rows = list(
-        sweep(small_paper_scene(1), [axis], finished={("friction", 0.1): row}, begins=lambda _, v: begun.append(v))
-    )
+    row = StabilityRecord("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
+    begun: list[Task[StabilityRecord]] = []
+    run = partial(compute, finished={row.key: row}, begins=begun.append)
+    rows = list(sweep(small_paper_scene(1), [axis], run))
     assert rows[0] is row
-    assert begun == [0.2]
+    assert [task.label for task in begun] == ["friction 0.2"]
     assert rows[1].verdict == "right"
 
 
@@ -161,6 +163,6 @@ def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:
 @pytest.mark.parametrize("name", ["paper-1", "paper-2"])
 def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.LinearGalerkin) -> None:
     scene = dataclasses.replace(bk.load_scene(name), discretisation=discretisation)
-    assert examine(bk.run(scene)).is_good
+    assert check_solution(bk.run(scene)).is_good
     wrong = [row for row in sweep(scene, all_axes()) if row.verdict == "wrong"]
     assert wrong == []

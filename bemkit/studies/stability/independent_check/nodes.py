@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Roller
-from bemkit.studies.stability.evidence.boundary import Boundary
-from bemkit.studies.stability.evidence.obstacles import distance_to
+from bemkit.studies.stability.independent_check.boundary import Boundary
+from bemkit.studies.stability.independent_check.obstacles import distance_to
 
 _FACING = 1e-6
 """Cosine between the body's normal and the direction of contact up to which a node may count as facing away."""

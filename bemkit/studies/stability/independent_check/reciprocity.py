@@ -13,10 +13,10 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.evidence.balance import strained_displacement
-from bemkit.studies.stability.evidence.boundary import Boundary
-from bemkit.studies.stability.evidence.kernels import State, centre_of_dilatation, point_force, uniform_stress
-from bemkit.studies.stability.evidence.nodes import Nodes
+from bemkit.studies.stability.independent_check.balance import strained_displacement
+from bemkit.studies.stability.independent_check.boundary import Boundary
+from bemkit.studies.stability.independent_check.kernels import State, centre_of_dilatation, point_force, uniform_stress
+from bemkit.studies.stability.independent_check.nodes import Nodes
 
 _N_OUTSIDE = 6
 _AWAY = 0.8

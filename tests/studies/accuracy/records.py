@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from bemkit.studies.accuracy.rows import Row
+from bemkit.studies.accuracy.records import ErrorRecord
 
 
-def row(**changes: Any) -> Row:
+def row(**changes: Any) -> ErrorRecord:
     """Return a plausible row with some entries changed."""
     values: dict[str, Any] = {
         "discretisation": "linear",
@@ -37,4 +37,4 @@ def row(**changes: Any) -> Row:
         "transitions": 5e-3,
         "message": "",
     }
-    return Row(**(values | changes))
+    return ErrorRecord(**(values | changes))

@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.evidence.balance import energy_mismatch, imbalance, negative_energy
-from bemkit.studies.stability.evidence.boundary import boundary_of
-from bemkit.studies.stability.evidence.contact import (
+from bemkit.studies.stability.independent_check.balance import energy_mismatch, imbalance, negative_energy
+from bemkit.studies.stability.independent_check.boundary import boundary_of
+from bemkit.studies.stability.independent_check.contact import (
     largest,
     measured_contact,
     obstacle_mismatch,
@@ -19,18 +19,18 @@ from bemkit.studies.stability.evidence.contact import (
     table_mismatch,
     traction_mismatch,
 )
-from bemkit.studies.stability.evidence.nodes import contact_nodes_of, hidden_overlap
-from bemkit.studies.stability.evidence.reciprocity import reciprocity_mismatch
-from bemkit.studies.stability.evidence.scales import CONTACT_LIMIT as CONTACT_LIMIT
-from bemkit.studies.stability.evidence.scales import scales_of
-from bemkit.studies.stability.evidence.supports import load_mismatch, support_mismatch, tractions_of
+from bemkit.studies.stability.independent_check.nodes import contact_nodes_of, hidden_overlap
+from bemkit.studies.stability.independent_check.reciprocity import reciprocity_mismatch
+from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT as CONTACT_LIMIT
+from bemkit.studies.stability.independent_check.scales import scales_of
+from bemkit.studies.stability.independent_check.supports import load_mismatch, support_mismatch, tractions_of
 
 COARSE_LIMIT = 0.1
 """Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
 that of fields which do not belong to the body at all."""
 COARSE_SHARE = 2.0
-"""The same for each unit of `Evidence.coarseness`: collocation with 35, 70 and 140 elements on a block between two
-obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
+"""The same for each unit of `IndependentCheck.coarseness`: collocation with 35, 70 and 140 elements on a block between
+two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
 OVERLAP_LIMIT = 1e-5
 """Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
 the warning takes for round-off."""
@@ -39,7 +39,7 @@ _INEXACT = ("reciprocity", "coarseness", "hidden_overlap")
 
 
 @dataclass(frozen=True)
-class Evidence:
+class IndependentCheck:
     """Violations found in the fields of a solution, dimensionless; zero is perfect.
 
     Parameters
@@ -125,8 +125,8 @@ class Evidence:
         return not self.reciprocity <= max(COARSE_LIMIT, COARSE_SHARE * self.coarseness)
 
 
-def examine(solution: Solution, before: Solution | None = None) -> Evidence:
-    """Check the fields of a solution; see `Evidence`.
+def check_solution(solution: Solution, before: Solution | None = None) -> IndependentCheck:
+    """Check the fields of a solution; see `IndependentCheck`.
 
     Parameters
     ----------
@@ -137,10 +137,10 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
 
     Returns
     -------
-    Evidence
+    IndependentCheck
     """
     if not _is_finite(solution):
-        return Evidence(float("inf"), *(float("nan"),) * 16)
+        return IndependentCheck(float("inf"), *(float("nan"),) * 16)
     scales, boundary = scales_of(solution), boundary_of(solution)
     nodes = contact_nodes_of(solution, boundary)
     measured = measured_contact(solution, before, nodes, scales)
@@ -148,7 +148,7 @@ def examine(solution: Solution, before: Solution | None = None) -> Evidence:
     has_history = before is None and len(solution.scene.load_factors) > 1
     held = np.minimum(measured.held, np.abs(measured.clearance))
     excess = (np.abs(measured.shear) - measured.bound)[measured.obeys_friction]
-    return Evidence(
+    return IndependentCheck(
         numbers=0.0,
         obstacle=obstacle_mismatch(solution, nodes, scales),
         table=max(table_mismatch(solution, nodes, scales), resultant_mismatch(solution)),

@@ -9,9 +9,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.studies.stability.evidence.boundary import Boundary
-from bemkit.studies.stability.evidence.contact import beyond, largest
-from bemkit.studies.stability.evidence.scales import Scales
+from bemkit.studies.stability.independent_check.boundary import Boundary
+from bemkit.studies.stability.independent_check.contact import beyond, largest
+from bemkit.studies.stability.independent_check.scales import Scales
 
 
 def held_directions(solution: Solution, boundary: Boundary) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.studies.stability.evidence import Evidence, examine
-from bemkit.studies.stability.evidence.obstacles import distance_to
+from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
+from bemkit.studies.stability.independent_check.obstacles import distance_to
 from tests.studies.stability.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 
 
@@ -22,29 +22,31 @@ def solved(number: int, discretisation: bk.LinearGalerkin | bk.ConstantCollocati
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
 @pytest.mark.parametrize("number", [1, 2])
 def test_right_answers_pass(number: int, discretisation: bk.LinearGalerkin) -> None:
-    evidence = examine(solved(number, discretisation))
-    assert evidence.worst <= 1e-12  # a solved system of this size carries about 1e-15
-    assert evidence.is_good
-    assert not evidence.is_coarse
-    assert evidence.reciprocity <= 0.02  # the discretisation error at N = 64
+    check = check_solution(solved(number, discretisation))
+    assert check.worst <= 1e-12  # a solved system of this size carries about 1e-15
+    assert check.is_good
+    assert not check.is_coarse
+    assert check.reciprocity <= 0.02  # the discretisation error at N = 64
 
 
-def tampered(solution: bk.Solution, **columns: np.ndarray) -> Evidence:
-    return examine(dataclasses.replace(solution, contact=dataclasses.replace(solution.contact, **columns)))
+def tampered(solution: bk.Solution, **columns: np.ndarray) -> IndependentCheck:
+    return check_solution(dataclasses.replace(solution, contact=dataclasses.replace(solution.contact, **columns)))
 
 
-def with_displacement(solution: bk.Solution, row: int, shift: np.ndarray) -> Evidence:
+def with_displacement(solution: bk.Solution, row: int, shift: np.ndarray) -> IndependentCheck:
     displacement = solution.boundary.displacement.copy()
     displacement[row] += shift
-    return examine(
+    return check_solution(
         dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, displacement=displacement))
     )
 
 
-def with_traction(solution: bk.Solution, element: int, factor: float) -> Evidence:
+def with_traction(solution: bk.Solution, element: int, factor: float) -> IndependentCheck:
     traction = solution.boundary.traction.copy()
     traction[element] *= factor
-    return examine(dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, traction=traction)))
+    return check_solution(
+        dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, traction=traction))
+    )
 
 
 def changed(solution: bk.Solution, name: str, node: int, factor: float) -> np.ndarray:
@@ -86,8 +88,8 @@ def test_a_table_that_is_not_that_of_the_boundary_is_seen(discretisation: bk.Lin
     assert tampered(solution, clearance=table.clearance - 1e-3 * np.abs(table.u_n).max()).table > 1e-6
     assert tampered(solution, x=table.x + 1e-6).table > 1e-6
     assert tampered(solution, sigma_t=changed(solution, "sigma_t", slipping, 1.01)).tractions > 1e-5
-    assert examine(dataclasses.replace(solution, force_normal=1.01 * solution.force_normal)).table > 1e-6
-    assert examine(dataclasses.replace(solution, force_tangential=0.0)).table > 1e-6
+    assert check_solution(dataclasses.replace(solution, force_normal=1.01 * solution.force_normal)).table > 1e-6
+    assert check_solution(dataclasses.replace(solution, force_tangential=0.0)).table > 1e-6
 
 
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT])
@@ -124,7 +126,7 @@ def test_wrong_supports_loads_and_energies_are_seen(discretisation: bk.LinearGal
     solution = bk.run(
         block(FLOOR, moved, bk.Part("wind", bk.Pressure(1e-4), sides=("left",)), discretisation=discretisation)
     )
-    assert examine(solution).worst <= 1e-12
+    assert check_solution(solution).worst <= 1e-12
     top = int(np.argmax(solution.boundary.points[:, 1] - 0.01 * np.abs(solution.boundary.points[:, 0] - 0.5)))
     assert with_displacement(solution, top, np.array([0.0, 1e-6])).faults[0] == "supports"
     assert with_displacement(solution, top, np.array([1e-6, 0.0])).faults[0] == "supports"
@@ -133,17 +135,20 @@ def test_wrong_supports_loads_and_energies_are_seen(discretisation: bk.LinearGal
         traction = solution.boundary.traction.copy()
         traction[elements[0], 0] += 1e-5
         boundary = dataclasses.replace(solution.boundary, traction=traction)
-        assert examine(dataclasses.replace(solution, boundary=boundary)).faults == ("tractions",)
-    negative = examine(dataclasses.replace(solution, energy=-solution.energy))
+        assert check_solution(dataclasses.replace(solution, boundary=boundary)).faults == ("tractions",)
+    negative = check_solution(dataclasses.replace(solution, energy=-solution.energy))
     assert negative.faults == ("negative_energy",)
 
 
 @pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT, bk.QuadraticGalerkin()])
 def test_energy_is_the_work_of_the_loads(discretisation: bk.LinearGalerkin) -> None:
     solution = bk.run(small_paper_scene(1, discretisation=discretisation))
-    assert examine(solution).energy <= 1e-12
-    assert examine(dataclasses.replace(solution, energy=1.001 * solution.energy)).faults == ("energy",)
-    assert examine(dataclasses.replace(solution, energy=-solution.energy)).faults == ("energy", "negative_energy")
+    assert check_solution(solution).energy <= 1e-12
+    assert check_solution(dataclasses.replace(solution, energy=1.001 * solution.energy)).faults == ("energy",)
+    assert check_solution(dataclasses.replace(solution, energy=-solution.energy)).faults == (
+        "energy",
+        "negative_energy",
+    )
 
 
 def test_numbers_that_are_none_are_seen() -> None:
@@ -152,15 +157,15 @@ def test_numbers_that_are_none_are_seen() -> None:
         seen = tampered(solution, **{name: changed(solution, name, 3, np.nan)})
         assert seen.faults[0] == "numbers"
         assert not seen.is_good
-    assert not examine(dataclasses.replace(solution, energy=np.inf)).is_good
+    assert not check_solution(dataclasses.replace(solution, energy=np.inf)).is_good
 
 
 def test_slip_counts_from_the_step_before() -> None:
     scene = dataclasses.replace(small_paper_scene(1), load_factors=(1.0, 0.5))
     first, second = bk.run_history([scene])
-    assert examine(first).is_good
-    assert examine(second, first).is_good
-    assert "status" in examine(second).faults  # nodes that stuck all the while have moved with the first step
+    assert check_solution(first).is_good
+    assert check_solution(second, first).is_good
+    assert "status" in check_solution(second).faults  # nodes that stuck all the while have moved with the first step
 
 
 def test_a_node_that_carries_load_above_the_floor_is_seen() -> None:
@@ -175,17 +180,17 @@ def test_a_node_that_carries_load_above_the_floor_is_seen() -> None:
 def test_displacements_of_another_body_are_seen(discretisation: bk.LinearGalerkin) -> None:
     solution = solved(2, discretisation)
     boundary = dataclasses.replace(solution.boundary, displacement=2.0 * solution.boundary.displacement)
-    assert examine(dataclasses.replace(solution, boundary=boundary)).is_coarse
+    assert check_solution(dataclasses.replace(solution, boundary=boundary)).is_coarse
     softer = dataclasses.replace(solution.scene, material=bk.Material(5e3, 0.3))
-    assert examine(dataclasses.replace(solution, scene=softer)).is_coarse
+    assert check_solution(dataclasses.replace(solution, scene=softer)).is_coarse
 
 
 def test_rigid_motions_do_not_hide_anything() -> None:
     pressed = bk.Part("top", bk.Pressure(1.0), sides=("top",))
     solution = bk.run(block(FLOOR, pressed, bk.Part("wall", bk.Roller(), sides=("right",))))
     far = dataclasses.replace(solution.boundary, displacement=solution.boundary.displacement + np.array([0.0, 1e3]))
-    assert examine(dataclasses.replace(solution, boundary=far)).reciprocity == pytest.approx(
-        examine(solution).reciprocity, abs=1e-9
+    assert check_solution(dataclasses.replace(solution, boundary=far)).reciprocity == pytest.approx(
+        check_solution(solution).reciprocity, abs=1e-9
     )
 
 
@@ -194,16 +199,16 @@ def test_tresca_friction_across_a_gap_and_loose_bodies_pass() -> None:
     load = bk.Part("load", bk.Traction(y=bk.Expression("-x")), sides=("top",))
     for law in (bk.Tresca(0.3), bk.Coulomb(bk.Expression("0.2 + x"))):
         for discretisation in (LINEAR, CONSTANT):
-            evidence = examine(bk.run(block(FLOOR, push, load, law=law, discretisation=discretisation)))
-            assert evidence.worst <= 1e-9
+            check = check_solution(bk.run(block(FLOOR, push, load, law=law, discretisation=discretisation)))
+            assert check.worst <= 1e-9
 
 
 def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on_it() -> None:
     inside = bk.Part("inside", bk.Contact(bk.Circle((0.5, -9.99), 10.0)), sides=("bottom",))
     solution = bk.run(block(inside))
     table = solution.contact
-    assert examine(solution).is_good
-    assert examine(solution).tension == 0.0
+    assert check_solution(solution).is_good
+    assert check_solution(solution).tension == 0.0
     # 1e-12 E' per displacement of the body's size: a thousandth of what the old measure, the overlap, let pass
     per_strain = solution.scene.material.plane_modulus * float(np.abs(table.u_n).max())
 
@@ -216,7 +221,7 @@ def test_a_body_that_an_overlap_pushed_aside_shows_the_smallest_traction_left_on
     assert tension(1e-14) <= 1e-6  # some eps, divided by the share of an element in the body
     displacement = solution.boundary.displacement - np.array([0.0, 1e-6 * float(np.abs(table.u_n).max())])
     inward = dataclasses.replace(solution, boundary=dataclasses.replace(solution.boundary, displacement=displacement))
-    assert examine(inward).penetration > 1e-6
+    assert check_solution(inward).penetration > 1e-6
 
 
 def test_polygonal_obstacles_and_given_directions_are_measured_anew() -> None:
@@ -239,7 +244,7 @@ def test_polygonal_obstacles_and_given_directions_are_measured_anew() -> None:
 
 def test_nodes_that_supports_push_into_an_obstacle_need_a_warning() -> None:
     pushed = bk.Part("wall", bk.PrescribedDisplacement(y=-0.01), sides=("right",))
-    evidence = examine(bk.run(block(FLOOR, pushed)))
-    assert evidence.is_good
-    assert evidence.hidden_overlap > 0.01  # a share of what the corner moves by, the rest is the way of the whole block
-    assert evidence.needs_warning == "hidden_overlap"
+    check = check_solution(bk.run(block(FLOOR, pushed)))
+    assert check.is_good
+    assert check.hidden_overlap > 0.01  # a share of what the corner moves by, the rest is the way of the whole block
+    assert check.needs_warning == "hidden_overlap"

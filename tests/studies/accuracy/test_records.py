@@ -10,12 +10,19 @@ import math
 import numpy as np
 import pytest
 
-from bemkit.studies.accuracy.files import CSV_START, to_csv
-from bemkit.studies.accuracy.rows import Row, by_series, fitted_order, orders, pareto_front
-from tests.studies.accuracy.rows import row
+from bemkit.studies.accuracy.records import (
+    CSV_START,
+    ErrorRecord,
+    by_series,
+    fitted_order,
+    orders,
+    pareto_front,
+    to_csv,
+)
+from tests.studies.accuracy.records import row
 
 
-def halving(order: float, *, meshes: str = "uniform") -> list[Row]:
+def halving(order: float, *, meshes: str = "uniform") -> list[ErrorRecord]:
     sizes = (10, 20, 40, 80)
     return [row(meshes=meshes, size=float(n), elements=n, seconds=1e-4 * n**2, energy=3.0 * n**-order) for n in sizes]
 

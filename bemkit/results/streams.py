@@ -1,15 +1,19 @@
-"""The standard streams as the command line meets them: closed, full, or of an encoding that lacks letters."""
+"""The standard streams, which may be closed, full, or of an encoding that lacks letters; what is printed to them."""
 
 from __future__ import annotations
 
 import io
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from bemkit.errors import BemkitError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
 
 _CLOSED = io.TextIOWrapper(io.BytesIO())
 _CLOSED.close()
@@ -145,3 +149,31 @@ def _open_closed_descriptors() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this one
+
+
+def stdout_console(console: Console | None = None, *, width: int | None = None) -> Console:
+    """Return a console of rich, by default one that writes plain numbers to standard output."""
+    from rich.console import Console
+
+    return Console(highlight=False, width=width) if console is None else console
+
+
+def plain_table(left: Sequence[str] = (), right: Sequence[str] = (), *, gap: int = 1) -> Table:
+    """Return a table of rich without frame: columns of texts, which may be folded, then columns of numbers.
+
+    Parameters
+    ----------
+    left, right : sequence of str
+        Heads of the columns that are justified to the left and to the right.
+    gap : int
+        Spaces between columns.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap, 0, 0))
+    for name in left:
+        table.add_column(name, overflow="fold")
+    for name in right:
+        table.add_column(name, justify="right", no_wrap=True)
+    return table

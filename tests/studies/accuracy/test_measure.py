@@ -15,9 +15,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
-from bemkit.studies.accuracy.rows import STAGES, Row, by_series, fitted_order
-from bemkit.studies.accuracy.runs import AdaptiveMeshes, Run, StudyError, all_runs, graded, uniform
-from bemkit.studies.accuracy.sweep import timed_rows, untimed_rows
+from bemkit.studies.accuracy.measure import error_tasks
+from bemkit.studies.accuracy.records import STAGES, ErrorRecord, by_series, fitted_order
+from bemkit.studies.accuracy.runs import AdaptiveMeshes, Run, all_runs, graded, uniform
+from bemkit.studies.engine import StudyError, Task, compute
 
 LINEAR, QUADRATIC, CONSTANT = bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation()
 NEWTON, AUGMENTED = bk.SemismoothNewton(), bk.AugmentedLagrangian()
@@ -59,7 +60,7 @@ def test_nothing_to_run_and_runs_that_are_the_same() -> None:
 
 
 def test_a_row_measures_times_memory_and_errors() -> None:
-    (row,) = timed_rows(paper_runs(uniform((40,))), reference(), repeat=2)
+    (row,) = compute(error_tasks(paper_runs(uniform((40,))), reference(), 2))
     stages = [getattr(row, f"seconds_{stage}") for stage in STAGES]
     assert all(seconds > 0.0 for seconds in stages)
     # medians of two repetitions: sums and totals agree
@@ -75,8 +76,9 @@ def test_a_row_measures_times_memory_and_errors() -> None:
 def test_rows_without_a_solution_say_why_and_claim_nothing() -> None:
     loads = tuple(part for part in bk.load_scene("paper-1").parts if part.name != "wall")
     few = bk.SemismoothNewton(max_steps=1)
-    (refused,) = timed_rows(paper_runs(uniform((20,)), parts=loads, law=bk.Frictionless()), reference())
-    (stopped,) = timed_rows(all_runs(bk.load_scene("paper-1"), [LINEAR], [uniform((40,))], [few]), reference())
+    floating = paper_runs(uniform((20,)), parts=loads, law=bk.Frictionless())
+    hasty = all_runs(bk.load_scene("paper-1"), [LINEAR], [uniform((40,))], [few])
+    refused, stopped = compute(error_tasks([*floating, *hasty], reference(), 3))
     assert refused.status == "refused"
     assert refused.message
     assert stopped.status == "max_steps"
@@ -88,7 +90,8 @@ def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> 
     iterative = dataclasses.replace(bk.load_scene("paper-1"), discretisation=LINEAR, linear_solver=bk.Krylov())
     stuck = dataclasses.replace(iterative, linear_solver=bk.Krylov(max_steps=1))
     runs = all_runs(iterative, [CONSTANT, LINEAR], [uniform((20,))], [NEWTON])
-    rows = list(timed_rows([*runs, *all_runs(stuck, [LINEAR], [uniform((24,))], [NEWTON])], reference(), repeat=1))
+    runs = (*runs, *all_runs(stuck, [LINEAR], [uniform((24,))], [NEWTON]))
+    rows = list(compute(error_tasks(runs, reference(), 1)))
     assert [row.status for row in rows] == ["refused", "converged", "refused"]
     assert "needs symmetric equations, and those of collocation are not" in rows[0].message
     assert "conjugate gradients stopped after 1 of 1 steps" in rows[2].message
@@ -96,7 +99,7 @@ def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> 
 
 def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
     meshes = AdaptiveMeshes((1e-2, 1e-6), most_elements=100)
-    near, far = timed_rows(paper_runs(meshes, elements=(QUADRATIC,)), reference(), repeat=1)
+    near, far = compute(error_tasks(paper_runs(meshes, elements=(QUADRATIC,)), reference(), 1))
     assert near.message == ""
     assert near.estimated_error <= 1e-2
     assert "The accuracy 1e-06 was not reached: more than 100 elements would be needed" in far.message
@@ -108,21 +111,23 @@ def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
 
 def test_finished_rows_are_handed_on() -> None:
     runs = paper_runs(uniform((20, 40)))
-    begun: list[float] = []
-    first = next(timed_rows(runs, reference(), repeat=1))
-    rows = list(timed_rows(runs, reference(), repeat=1, finished=[first], begins=lambda run: begun.append(run.size)))
+    tasks = error_tasks(runs, reference(), 1)
+    begun: list[Task[ErrorRecord]] = []
+    first = next(compute(tasks))
+    rows = list(compute(tasks, finished={first.key: first}, begins=begun.append))
     assert rows[0] is first
-    assert begun == [40]
+    assert begun == [tasks[1]]
+    assert begun[0].label == "linear, uniform 40, semismooth-newton"
     with pytest.raises(StudyError, match="repeat is 0: give at least one"):
-        next(timed_rows(runs, reference(), repeat=0))
+        error_tasks(runs, reference(), 0)
 
 
 def test_an_executor_finds_the_same_errors_without_times() -> None:
     runs = paper_runs(uniform((20, 40)), elements=(CONSTANT, LINEAR))
-    timed = {row.key: row for row in timed_rows(runs, reference(), repeat=1)}
+    timed = {row.key: row for row in compute(error_tasks(runs, reference(), 1))}
     kept = timed[runs[0].key]
     with ThreadPoolExecutor(2) as executor:
-        rows = list(untimed_rows(runs, reference(), executor, finished=[kept]))
+        rows = list(compute(error_tasks(runs, reference()), executor, finished={kept.key: kept}))
     assert rows[0] is kept
     assert {row.key for row in rows} == set(timed)
     for row in rows[1:]:
@@ -152,9 +157,9 @@ class Picky(Executor):
 def test_an_executor_that_fails_is_named() -> None:
     runs = paper_runs(uniform((20,)))
     with pytest.raises(StudyError, match=r"the executor broke down .a process was terminated abruptly.: finished rows"):
-        list(untimed_rows(runs, reference(), Doomed()))
+        list(compute(error_tasks(runs, reference()), Doomed()))
     with pytest.raises(TypeError, match="wrong operand"):
-        list(untimed_rows(runs, reference(), Picky()))
+        list(compute(error_tasks(runs, reference()), Picky()))
 
 
 def test_a_scene_with_functions_cannot_be_sent() -> None:
@@ -162,16 +167,16 @@ def test_a_scene_with_functions_cannot_be_sent() -> None:
     runs = paper_runs(uniform((20,)), parts=parts)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
         with pytest.raises(StudyError, match=r"cannot be sent to another process .*: write its functions as formulas"):
-            list(untimed_rows(runs, reference(), executor))
+            list(compute(error_tasks(runs, reference()), executor))
 
 
 @lru_cache
-def rows_of_the_angle(most: int) -> tuple[Row, ...]:
+def rows_of_the_angle(most: int) -> tuple[ErrorRecord, ...]:
     scene = bk.load_scene("clamped-angle")
     sizes = tuple(n for n in (20, 40, 80, 160, 320) if n <= most)
     runs = all_runs(scene, [LINEAR, QUADRATIC], [uniform(sizes), graded(sizes)], [NEWTON])
     with ThreadPoolExecutor(1) as executor:
-        rows = {row.key: row for row in untimed_rows(runs, over_resolved(scene, 400), executor)}
+        rows = {row.key: row for row in compute(error_tasks(runs, over_resolved(scene, 400)), executor)}
     return tuple(rows[run.key] for run in runs)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.evidence.boundary import Boundary
-from bemkit.studies.stability.evidence.nodes import Nodes
-from bemkit.studies.stability.evidence.scales import Scales, trusted_stress
-from bemkit.studies.stability.evidence.supports import held_directions
+from bemkit.studies.stability.independent_check.boundary import Boundary
+from bemkit.studies.stability.independent_check.nodes import Nodes
+from bemkit.studies.stability.independent_check.scales import Scales, trusted_stress
+from bemkit.studies.stability.independent_check.supports import held_directions
 
 
 def motions_at(solution: Solution, points: FloatArray) -> FloatArray:

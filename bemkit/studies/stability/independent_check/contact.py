@@ -10,9 +10,9 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
-from bemkit.studies.stability.evidence.boundary import Boundary
-from bemkit.studies.stability.evidence.nodes import Nodes
-from bemkit.studies.stability.evidence.scales import CONTACT_LIMIT, Scales
+from bemkit.studies.stability.independent_check.boundary import Boundary
+from bemkit.studies.stability.independent_check.nodes import Nodes
+from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT, Scales
 
 
 @dataclass(frozen=True, eq=False)

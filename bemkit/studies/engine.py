@@ -1,0 +1,279 @@
+"""The engine of all studies: tasks computed here or in other processes, kept as they finish, shown and written."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import time
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from multiprocessing import get_context, parent_process
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING, Generic, NamedTuple
+
+from bemkit.errors import BemkitError, InputError
+from bemkit.results.outputs import TextFile, check_figures, write_figures
+from bemkit.results.record_file import R, RecordFile
+from bemkit.results.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REFUSED = "refused"
+"""Status of a scene that is refused by a named error before any step."""
+
+
+class StudyError(InputError):
+    """A study that cannot begin or cannot go on."""
+
+
+class Attempt(NamedTuple):
+    """A solution, or why there is none."""
+
+    solution: Solution | None
+    message: str
+    seconds: float
+
+    @property
+    def status(self) -> str:
+        """The status in small letters."""
+        return REFUSED if self.solution is None else self.solution.status.name.lower()
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the solver vouches for a solution."""
+        return self.solution is not None and self.solution.is_converged
+
+
+def attempt(solve: Callable[[], Solution]) -> Attempt:
+    """Solve a scene; errors that bemkit names are answers too."""
+    begin = time.perf_counter()
+    try:
+        solution = solve()
+    except BemkitError as error:
+        return Attempt(None, str(error), time.perf_counter() - begin)
+    return Attempt(solution, solution.message, time.perf_counter() - begin)
+
+
+@dataclass(frozen=True)
+class Task(Generic[R]):
+    """One record to compute.
+
+    Parameters
+    ----------
+    key : hashable
+        That of the record.
+    label : str
+        For the progress bar.
+    compute : callable () -> record
+        To be sent to another process it must be picklable.
+    """
+
+    key: Hashable
+    label: str
+    compute: Callable[[], R]
+
+
+@dataclass(frozen=True)
+class StudyOutputs(Generic[R]):
+    """Where the records of a study go; each may be left out.
+
+    Parameters
+    ----------
+    file : RecordFile
+    path : str or None
+        File that is complete after every record.
+    texts : tuple of TextFile
+        Tables of all records.
+    folder : str or None
+        For figures.
+    figures : callable (records) -> mapping of str to Figure
+        By file names without ``.png``.
+    figure : str
+        Name of one of them.
+    dots_per_inch : int
+    """
+
+    file: RecordFile[R]
+    path: str | None = None
+    texts: tuple[TextFile[Sequence[R]], ...] = ()
+    folder: str | None = None
+    figures: Callable[[Sequence[R]], Mapping[str, Figure]] = field(default=lambda records: {})
+    figure: str = ""
+    dots_per_inch: int = 150
+
+    def check(self) -> list[Path]:
+        """Find out, before any work is done, whether everything can be written.
+
+        Returns
+        -------
+        list of Path
+            The file of records, to be reserved.
+
+        Raises
+        ------
+        OutputFileError, ResultFileError
+        """
+        if self.path is not None and Path(self.path).is_file():
+            self.file.read(self.path)  # says more about a broken file than that it stands in the way
+        target = [] if self.path is None else [self.file.check_target(self.path)]
+        for text in self.texts:
+            text.check()
+        if self.folder is not None:
+            check_figures(Path(self.folder), self.figure)
+        return target
+
+    def finished(self, labels: Mapping[str, str]) -> dict[Hashable, R]:
+        """Return the records that an earlier study under the same labels has left in the file, by their keys.
+
+        Raises
+        ------
+        ResultFileError
+            If the file belongs to another study.
+        """
+        return {} if self.path is None else self.file.finished(self.path, labels)
+
+    def keep(self, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]) -> Iterator[R]:
+        """Hand records on after those that are new were added to the finished ones and written to the file."""
+        for record in records:
+            if record.key not in finished:
+                finished[record.key] = record
+                if self.path is not None:
+                    self.file.write(self.path, labels, list(finished.values()))
+            yield record
+
+    def write(self, records: Sequence[R]) -> None:
+        """Write tables and figures of all records."""
+        for text in self.texts:
+            text.write(records)
+        if self.folder is not None:
+            write_figures(self.figures(records), Path(self.folder), self.dots_per_inch)
+
+
+def compute(
+    tasks: Sequence[Task[R]],
+    executor: Executor | None = None,
+    *,
+    finished: Mapping[Hashable, R] | None = None,
+    begins: Callable[[Task[R]], None] | None = None,
+) -> Iterator[R]:
+    """Compute the records of some tasks.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    executor : Executor, optional
+        For example a `ProcessPoolExecutor`, or the executor of a `distributed` client; without one the tasks are
+        computed here, one after the other.
+    finished : mapping of keys to records, optional
+        Of an earlier study; they are handed on instead of computed again.
+    begins : callable, optional
+        Called with each task before it is computed here.
+
+    Yields
+    ------
+    record
+        In the order of the tasks; from an executor finished ones first, the others as they are ready.
+
+    Raises
+    ------
+    StudyError
+        If the executor breaks down, or a task cannot be sent to another process.
+    """
+    finished = {} if finished is None else finished
+    if executor is not None:
+        yield from (finished[task.key] for task in tasks if task.key in finished)
+        yield from _computed_elsewhere([task for task in tasks if task.key not in finished], executor)
+        return
+    for task in tasks:
+        if task.key not in finished and begins is not None:
+            begins(task)
+        yield finished[task.key] if task.key in finished else task.compute()
+
+
+def compute_with_progress(
+    tasks: Sequence[Task[R]],
+    name: str,
+    *,
+    is_live: bool,
+    processes: int = 1,
+    finished: Mapping[Hashable, R] | None = None,
+) -> Iterator[R]:
+    """Compute records as `compute` does, here or in several processes, while a bar on standard error shows how far.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    name : str
+        Of the study, at the bar.
+    is_live : bool
+        Whether the bar is shown.
+    processes : int
+    finished : mapping of keys to records, optional
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with ExitStack() as stack:
+        executor = stack.enter_context(worker_processes(processes)) if processes > 1 else None
+        bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=not is_live)
+        row = stack.enter_context(bar).add_task(name, total=len(tasks))
+        for record in compute(
+            tasks, executor, finished=finished, begins=lambda task: bar.update(row, description=task.label)
+        ):
+            bar.advance(row)
+            yield record
+
+
+@contextmanager
+def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Give an executor of several processes; what has not begun when the ``with`` statement ends is left out.
+
+    The processes end at once when the one that started them ends, however that is killed, and on Ctrl-C.
+    """
+    # spawned processes do not inherit threads that hold locks
+    executor = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_prepare_process)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterator[R]:
+    futures = []
+    try:
+        futures = [executor.submit(task.compute) for task in tasks]
+        for future in as_completed(futures):
+            yield future.result()
+    except BrokenExecutor as error:
+        reason = str(error) or type(error).__name__
+        raise StudyError(
+            f"the executor broke down ({reason}): finished rows are good; go on with fewer processes or with one"
+        ) from error
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        if "pickle" not in str(error):
+            raise
+        raise StudyError(
+            f"the scene cannot be sent to another process ({error}): write its functions as formulas"
+        ) from error
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _prepare_process() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    Thread(target=_end_after_parent, daemon=True).start()
+
+
+def _end_after_parent() -> None:
+    """Wait for the end of the parent: a worker holds both ends of its queue, and would wait for work for ever."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
