@@ -1,7 +1,7 @@
 """Formulas in x and y that scene files may contain, evaluated safely.
 
-A formula is parsed by Python's own parser, checked node by node against a short list of what is allowed, and
-evaluated with numpy. Nothing is ever passed to ``eval``, every number is a float, and length and depth are limited,
+A formula is parsed by Python's own parser and turned node by node into functions of numpy, from a short list of what is
+allowed. Nothing is ever passed to ``eval``, every number is a float, and length and depth are limited,
 so that a file from a stranger can neither run code nor use up memory.
 """
 
@@ -11,13 +11,14 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial, reduce
 from types import MappingProxyType
 from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 
 MAX_LENGTH = 2000
@@ -96,7 +97,7 @@ class Expression:
     ----------
     text : str
         For example ``"-x**2 * (1 - x)**2"`` (a value) or ``"x > 0.5 and y < 1"`` (a condition). ``and``, ``or`` and
-        ``where(condition, a, b)`` evaluate their later arguments only at the points that need them.
+        ``where(condition, a, b)`` ignore what their other arguments are at points that do not need them.
 
     Raises
     ------
@@ -110,18 +111,18 @@ class Expression:
     """
 
     text: str
-    _tree: ast.expr = field(init=False, repr=False, compare=False)
-    _is_condition: bool = field(init=False, repr=False, compare=False)
+    _compiled: "_Compiled" = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        tree = _parse(self.text)
-        object.__setattr__(self, "_tree", tree)
-        object.__setattr__(self, "_is_condition", _Checker(self.text).check(tree, 1))
+        object.__setattr__(self, "_compiled", _Compiler(self.text).compile(_parse(self.text), 1))
+
+    def __reduce__(self) -> "tuple[type[Expression], tuple[str]]":
+        return Expression, (self.text,)
 
     @property
     def is_condition(self) -> bool:
         """Whether the formula is true or false (``x > 1``) rather than a number (``x + 1``)."""
-        return self._is_condition
+        return self._compiled.is_condition
 
     def __call__(self, x: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[Any]:
         """Evaluate the formula at points.
@@ -141,12 +142,17 @@ class Expression:
             Where the value, or a compared value, is not finite.
         """
         x_all, y_all = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        points = _Points(self.text, x_all.ravel(), y_all.ravel())
-        with np.errstate(all="ignore"):  # non-finite values are reported below, with the point
-            values = points.evaluate(self._tree)
-        if not self._is_condition:
-            points.require_finite(values)
-        return values.reshape(x_all.shape)
+        with np.errstate(all="ignore"):  # values that are not finite are reported below, with the point
+            values = np.array(np.broadcast_to(self._compiled.value(x_all, y_all), x_all.shape))
+        is_finite = np.isfinite(values)
+        if not is_finite.all():
+            index = int(np.flatnonzero(~is_finite.ravel())[0])
+            place = f"({x_all.ravel()[index]:.6g}, {y_all.ravel()[index]:.6g})"
+            raise ExpressionError(
+                f"expression {shorten(self.text)} is {values.ravel()[index]} at (x, y) = {place}; "
+                "guard it with where(condition, a, b) or change the formula"
+            )
+        return values == 1.0 if self.is_condition else values
 
 
 ScalarField: TypeAlias = float | Expression | Callable[[FloatArray, FloatArray], FloatArray]
@@ -228,161 +234,139 @@ def _parse(text: str) -> ast.expr:
         ) from None
 
 
+_Value: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
+
+
 @dataclass(frozen=True)
-class _Checker:
-    """Walks the parsed formula once and refuses everything that is not on the list."""
+class _Compiled:
+    """A piece of a formula as a function of x and y.
+
+    Conditions are 1 or 0. Where a compared value is not finite they are that value, and undefined: so what decides
+    without them hides them, and what depends on them is undefined as well.
+    """
+
+    value: _Value
+    is_condition: bool = False
+
+
+@dataclass(frozen=True)
+class _Compiler:
+    """Walks the parsed formula once; refuses everything that is not on the list, and turns the rest into functions."""
 
     text: str
 
-    def check(self, node: ast.expr, depth: int) -> bool:
-        """Return whether the node is a condition."""
+    def compile(self, node: ast.expr, depth: int) -> _Compiled:
         if depth > MAX_DEPTH:
             self.refuse(node, f"nested more than {MAX_DEPTH} deep", "split or simplify it")
         match node:
             case ast.Constant(value=value):
-                return self.check_number(node, value)
+                return _Compiled(_constant(self.number(node, value)))
             case ast.Name(id=name):
-                return self.check_name(node, name)
+                return _Compiled(self.name(node, name))
             case ast.BinOp(left=left, op=op, right=right):
-                self.check_operator(node, op)
-                return self.check_numbers(node, [left, right], depth)
+                operator = self.operator(node, op)
+                return _Compiled(_applied(operator, self.numbers(node, [left, right], depth)))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return self.check_conditions(node, [operand], depth)
+                return _Compiled(_applied(_negation, self.conditions(node, [operand], depth)), is_condition=True)
             case ast.UnaryOp(op=op, operand=operand):
-                self.check_operator(node, op)
-                return self.check_numbers(node, [operand], depth)
-            case ast.BoolOp(values=values):
-                return self.check_conditions(node, values, depth)
+                operator = self.operator(node, op)
+                return _Compiled(_applied(operator, self.numbers(node, [operand], depth)))
+            case ast.BoolOp(op=op, values=values):
+                join = _both if isinstance(op, ast.And) else _either
+                conditions = self.conditions(node, values, depth)
+                return _Compiled(reduce(lambda a, b: _applied(join, [a, b]), conditions), is_condition=True)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
-                for comparison in ops:
-                    self.check_operator(node, comparison)
-                self.check_numbers(node, [left, *comparators], depth)
-                return True
+                comparison = partial(_comparison, [self.operator(node, op) for op in ops])
+                compared = self.numbers(node, [left, *comparators], depth)
+                return _Compiled(_applied(comparison, compared), is_condition=True)
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                return self.check_call(node, name, arguments, depth)
+                return _Compiled(self.call(node, name, arguments, depth))
         self.refuse(node, "not allowed", _REMEDIES.get(type(node), _ALLOWED))
 
-    def check_number(self, node: ast.expr, value: object) -> bool:
+    def number(self, node: ast.expr, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.refuse(node, "not a number", _ALLOWED)
         try:
-            is_finite = math.isfinite(float(value))
+            number = float(value)
         except OverflowError:
-            is_finite = False
-        if not is_finite:
+            number = math.inf
+        if not math.isfinite(number):
             self.refuse(node, "too large for a floating-point number", "write a smaller number")
-        return False
+        return number
 
-    def check_name(self, node: ast.expr, name: str) -> bool:
+    def name(self, node: ast.expr, name: str) -> _Value:
         if name in _FUNCTIONS or name == "where":
             self.refuse(node, "a function without arguments", f"write {name}(...)")
         if name not in _NAMES:
             self.refuse(node, "unknown name", f"the names are x, y, pi and e{closest(name, _NAMES)}")
-        return False
+        if name in _CONSTANTS:
+            return _constant(_CONSTANTS[name])
+        return (lambda x, y: x) if name == "x" else (lambda x, y: y)
 
-    def check_operator(self, node: ast.expr, op: ast.AST) -> None:
+    def operator(self, node: ast.expr, op: ast.AST) -> Callable[..., Any]:
         if type(op) not in _OPERATORS:
             self.refuse(node, "uses an operator that is not allowed", _REMEDIES.get(type(op), _ALLOWED))
+        return _OPERATORS[type(op)]
 
-    def check_call(self, node: ast.expr, name: str, arguments: list[ast.expr], depth: int) -> bool:
+    def call(self, node: ast.expr, name: str, arguments: list[ast.expr], depth: int) -> _Value:
         if name == "where":
             if len(arguments) != 3:
                 self.refuse(node, f"where takes 3 arguments, not {len(arguments)}", "write where(condition, a, b)")
-            self.check_conditions(node, arguments[:1], depth)
-            return self.check_numbers(node, arguments[1:], depth)
+            conditions = self.conditions(node, arguments[:1], depth)
+            return _applied(_choice, [*conditions, *self.numbers(node, arguments[1:], depth)])
         if name not in _FUNCTIONS:
             names = (*_FUNCTIONS, "where")
             self.refuse(node, "unknown function", f"the functions are {', '.join(names)}{closest(name, names)}")
         n_needed = 2 if name in _TWO_ARGUMENTS else 1
         if len(arguments) != n_needed:
             self.refuse(node, f"{name} takes {n_needed} argument(s), not {len(arguments)}", "check the brackets")
-        return self.check_numbers(node, arguments, depth)
+        return _applied(_FUNCTIONS[name], self.numbers(node, arguments, depth))
 
-    def check_numbers(self, node: ast.expr, operands: list[ast.expr], depth: int) -> bool:
-        if any([self.check(operand, depth + 1) for operand in operands]):
+    def numbers(self, node: ast.expr, operands: list[ast.expr], depth: int) -> list[_Value]:
+        compiled = [self.compile(operand, depth + 1) for operand in operands]
+        if any(operand.is_condition for operand in compiled):
             self.refuse(node, "calculates with a condition", "turn it into a number with where(condition, 1, 0)")
-        return False
+        return [operand.value for operand in compiled]
 
-    def check_conditions(self, node: ast.expr, operands: list[ast.expr], depth: int) -> bool:
-        if not all([self.check(operand, depth + 1) for operand in operands]):
+    def conditions(self, node: ast.expr, operands: list[ast.expr], depth: int) -> list[_Value]:
+        compiled = [self.compile(operand, depth + 1) for operand in operands]
+        if not all(operand.is_condition for operand in compiled):
             self.refuse(node, "needs a condition (true or false)", "write a comparison such as x > 0.5")
-        return True
+        return [operand.value for operand in compiled]
 
     def refuse(self, node: ast.expr, what: str, remedy: str) -> NoReturn:
         piece = ast.get_source_segment(self.text.strip(), node) or self.text
         raise ExpressionError(f"expression {shorten(self.text)}: {shorten(piece, 40)}: {what}; {remedy}")
 
 
-@dataclass(frozen=True)
-class _Points:
-    """The points at which a checked formula is evaluated."""
+def _constant(value: float) -> _Value:
+    return lambda x, y: np.full(x.shape, value)
 
-    text: str
-    x: FloatArray
-    y: FloatArray
 
-    def evaluate(self, node: ast.expr) -> npt.NDArray[Any]:
-        """Return the value of the node, one per point."""
-        match node:
-            case ast.Constant(value=value):
-                return np.full(self.x.shape, float(value))  # type: ignore[arg-type]  # checked to be a number
-            case ast.Name(id="x"):
-                return self.x
-            case ast.Name(id="y"):
-                return self.y
-            case ast.Name(id=name):
-                return np.full(self.x.shape, _CONSTANTS[name])
-            case ast.BinOp(left=left, op=op, right=right):
-                return self._array(_OPERATORS[type(op)](self.evaluate(left), self.evaluate(right)))
-            case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return self._array(np.logical_not(self.evaluate(operand)))
-            case ast.UnaryOp(op=op, operand=operand):
-                return self._array(_OPERATORS[type(op)](self.evaluate(operand)))
-            case ast.BoolOp(op=op, values=[first, *rest]):
-                return self._all(first, rest) if isinstance(op, ast.And) else ~self._all(first, rest, negate=True)
-            case ast.Compare(left=left, ops=ops, comparators=comparators):
-                return self._compare(left, ops, comparators)
-            case ast.Call(func=ast.Name(id="where"), args=[condition, value, other_value]):
-                return self._choose(self.evaluate(condition), value, other_value)
-            case ast.Call(func=ast.Name(id=name), args=arguments):
-                return self._array(_FUNCTIONS[name](*map(self.evaluate, arguments)))
-        raise AssertionError(f"unchecked node {ast.dump(node)}")
+def _applied(function: Callable[..., Any], arguments: list[_Value]) -> _Value:
+    return lambda x, y: np.asarray(function(*(argument(x, y) for argument in arguments)))
 
-    def require_finite(self, values: FloatArray) -> None:
-        """Raise where a value is not finite, naming the formula and the point."""
-        if not np.all(np.isfinite(values)):
-            index = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise ExpressionError(
-                f"expression {shorten(self.text)} is {values[index]} at "
-                f"(x, y) = ({self.x[index]:.6g}, {self.y[index]:.6g}); "
-                "guard it with where(condition, a, b) or change the formula"
-            )
 
-    def at(self, mask: BoolArray) -> "_Points":
-        return _Points(self.text, self.x[mask], self.y[mask])
+def _negation(condition: FloatArray) -> FloatArray:
+    return np.where(np.isfinite(condition), 1.0 - condition, condition)
 
-    def _all(self, first: ast.expr, rest: list[ast.expr], *, negate: bool = False) -> BoolArray:
-        # "or" is evaluated as the negation of all negated arguments; later arguments only where they still matter
-        result = np.array(self.evaluate(first) ^ negate)
-        for operand in rest:
-            undecided = result.copy()
-            result[undecided] = self.at(undecided).evaluate(operand) ^ negate
-        return result
 
-    def _compare(self, left: ast.expr, ops: list[ast.cmpop], comparators: list[ast.expr]) -> BoolArray:
-        values = [self.evaluate(operand) for operand in (left, *comparators)]
-        for value in values:
-            self.require_finite(value)
-        result = np.ones(self.x.shape, dtype=bool)
-        for op, smaller, larger in zip(ops, values, values[1:], strict=False):
-            result &= _OPERATORS[type(op)](smaller, larger)
-        return result
+def _both(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.where(first == 1.0, second, first)
 
-    def _choose(self, condition: BoolArray, value: ast.expr, other_value: ast.expr) -> FloatArray:
-        result = np.empty(self.x.shape)
-        result[condition] = self.at(condition).evaluate(value)
-        result[~condition] = self.at(~condition).evaluate(other_value)
-        return result
 
-    def _array(self, value: object) -> npt.NDArray[Any]:
-        return np.asarray(value)
+def _either(first: FloatArray, second: FloatArray) -> FloatArray:
+    return np.where(first == 0.0, second, first)
+
+
+def _choice(condition: FloatArray, value: FloatArray, other_value: FloatArray) -> FloatArray:
+    return np.where(condition == 1.0, value, np.where(condition == 0.0, other_value, condition))
+
+
+def _comparison(operators: list[Callable[..., Any]], *values: FloatArray) -> FloatArray:
+    pairs = zip(operators, values, values[1:], strict=False)
+    holds = [operator(smaller, larger) for operator, smaller, larger in pairs]
+    result = np.asarray(np.all(holds, axis=0), dtype=float)
+    for value in reversed(values):
+        result = np.where(np.isfinite(value), result, value)
+    return result

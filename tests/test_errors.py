@@ -13,7 +13,7 @@ import pytest
 
 import bemkit
 import bemkit.runs.run
-from bemkit.cli.errors import one_line, concerning
+from bemkit.cli.errors import concerning, one_line
 from bemkit.cli.main import main
 from bemkit.errors import BemkitError, InputError, NoResultError
 
