@@ -13,12 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.atomic_files import replacing
+from bemkit.atomic_files import check_room, replacing
 from bemkit.errors import InputError, printable, shown_path
 
 if TYPE_CHECKING:
     import h5py
 
+_OVERHEAD = 65536
+"""More than what a file holds besides its arrays."""
 _MAX_TEXT = 10_000
 _MAX_ENTRIES_PER_GROUP = 1000
 _HDF5 = b"\x89HDF"
@@ -59,14 +61,19 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def created(target: Path) -> Iterator[h5py.File]:
+def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py.File]:
     """Give an empty HDF5 file that replaces the target, with a checksum of its content, if all goes well.
 
-    It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full.
+    It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full. A file
+    whose size is known is written at once, after it was made sure that there is room for it.
 
     Parameters
     ----------
     target : Path
+    mark : bytes
+        First line of the user block, by which files of this kind are known.
+    n_bytes : int
+        Size of large content, if it is known.
 
     Yields
     ------
@@ -75,17 +82,21 @@ def created(target: Path) -> Iterator[h5py.File]:
     Raises
     ------
     OutputFileError
-        If the system refuses, for example because the disk is full.
+        If there is no room, or the system refuses.
     """
     import h5py
 
+    if n_bytes:
+        check_room(target, n_bytes + _OVERHEAD)
+    in_memory: dict[str, Any] = {} if n_bytes else {"driver": "core", "backing_store": False}
     with replacing(target) as temporary:
-        with h5py.File(temporary.name, "w", driver="core", backing_store=False, userblock_size=USER_BLOCK) as file:
+        with h5py.File(str(temporary), "w", userblock_size=USER_BLOCK, locking=False, **in_memory) as file:
             yield file
             file.flush()
-            image = file.id.get_file_image()
-        temporary.write_bytes(bytes(USER_BLOCK) + image)  # the image begins after the user block
-        seal(temporary, MARK)
+            image = b"" if n_bytes else file.id.get_file_image()
+        if image:
+            temporary.write_bytes(bytes(USER_BLOCK) + image)  # the image begins after the user block
+        seal(temporary, mark)
 
 
 def seal(path: Path, mark: bytes) -> None:

@@ -2,9 +2,9 @@
 
 A cache file belongs to one operator. It carries a fingerprint of everything that the numbers depend on (geometry,
 material, spaces, kind of operator, version of bemkit's formulas) and a checksum of the numbers themselves. A file with
-another fingerprint is stale, one with another checksum is damaged; neither is ever used. The layout, version 1:
+another fingerprint is stale, one with another checksum is damaged; neither is ever used. It is a file of `bemkit.hdf5`
+with a mark of its own. The layout, version 1:
 
-    bytes 0 to 511   the marker "bemkit operator cache", then zeros (an HDF5 user block)
     /                attributes format, schema_version, bemkit, checksum, and one fingerprint for each of FINGERPRINTS
     /arrays          one dataset for each array
 
@@ -23,15 +23,16 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
-from bemkit.atomic_files import check_room, check_target, replacing
+from bemkit.atomic_files import check_target
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.hdf5 import USER_BLOCK, Reader, ResultFileError, opened, seal, write_attributes
+from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table
 from bemkit.operators.boundary import DoubleLayer, Hypersingular, Mass, SingleLayer
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
+from bemkit.version import __version__
 
 FORMAT = "bemkit-operator"
 SCHEMA_VERSION = 1
@@ -39,8 +40,6 @@ FORMULA_VERSION = 2
 """To be raised whenever a change of the code changes what an operator's matrix holds beyond round-off."""
 FINGERPRINTS = ("operator", "geometry", "material", "spaces", "formulas")
 MARKER = b"bemkit operator cache\n"
-_OVERHEAD = 65536
-"""More than what a file holds besides its arrays."""
 _CURVE_SAMPLES = 17
 
 CachedOperator: TypeAlias = SingleLayer | DoubleLayer | Hypersingular | Mass | GalerkinMap
@@ -78,20 +77,12 @@ def save(path: str | Path, operator: CachedOperator) -> None:
     OutputFileError
         If the file cannot be written, or a file that is not an operator cache stands in the way.
     """
-    import h5py
-
-    from bemkit.version import __version__
-
     target = check_target(Path(path), "bemkit operator cache", _is_own)
     arrays = _computed(operator)
-    check_room(target, sum(array.nbytes for array in arrays.values()) + _OVERHEAD)
-    with replacing(target) as temporary:
-        with h5py.File(str(temporary), "w", userblock_size=USER_BLOCK, locking=False) as file:
-            marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": __version__}
-            write_attributes(file, {**marks, **fingerprints(operator)})
-            for name, array in arrays.items():
-                file.create_dataset(f"arrays/{name}", data=array)
-        seal(temporary, MARKER)
+    with created(target, MARKER, sum(array.nbytes for array in arrays.values())) as file:
+        marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": __version__}
+        write_attributes(file, {**marks, **fingerprints(operator)})
+        write_table(file.create_group("arrays"), arrays)
 
 
 def load(path: str | Path, operator: CachedOperator) -> None:

@@ -1,7 +1,7 @@
 """Result files: HDF5 with a versioned layout, written atomically, safe to read.
 
 A result file holds plain arrays, texts and numbers only, so any HDF5 program can read it, and reading one from a
-stranger runs no code. The layout, version 1:
+stranger runs no code. The layout, version 2:
 
     /                attributes format = "bemkit-result" and schema_version
     /scene           text, the scene as TOML
@@ -10,13 +10,14 @@ stranger runs no code. The layout, version 1:
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
     /boundary        points, displacement, centres, traction
-    /contact, /transitions, /history, /plan, /work    tables: one dataset per column, all of one length;
-                     those of plan and work with numbers as attributes
-    /warnings, /plan/warnings    texts, one sentence each; a file without them has none
+    /contact, /transitions, /history    tables: one dataset per column, all of one length
+    /plan, /work     texts, the decisions, sizes and counts as JSON
+    /warnings        texts, one sentence each; a file without them has none
 """
 
 from __future__ import annotations
 
+import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
@@ -32,10 +33,12 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
-from bemkit.results.plan_file import read_plan, read_work, write_plan, write_work
+from bemkit.operators.counts import Work
+from bemkit.plan import Plan
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.scene import Scene
+from bemkit.scene.serialisation import structure, unstructure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
 from bemkit.version import __version__
@@ -46,7 +49,8 @@ if TYPE_CHECKING:
 __all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
 FORMAT = "bemkit-result"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+_MAX_PLAN = 1_000_000
 
 _COUNTS = ("linear_solves", "outer_steps")
 _FORCES = ("force_normal", "force_tangential", "energy")
@@ -104,8 +108,8 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_table(file.create_group("contact"), contact)
         write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
         write_table(file.create_group("history"), history_columns(solution.history))
-        write_plan(file.create_group("plan"), solution.plan)
-        write_work(file.create_group("work"), solution.work)
+        for name in ("plan", "work"):
+            write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
         write_attributes(file.create_group("memory"), solution.memory)
         write_texts(file, "warnings", solution.warnings)
 
@@ -134,7 +138,7 @@ def read_result(path: str | Path) -> Solution:
             raise reader.error(str(error)) from error
         try:
             solution = _read_solution(reader, scene)
-        except (ValueError, KeyError, OverflowError) as error:
+        except (ValueError, KeyError, OverflowError, RecursionError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
     return solution
 
@@ -232,8 +236,8 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         energy=float(summary["energy"]),
         transitions=_read_transitions(reader),
         timings={name: float(value) for name, value in reader.attributes("timings").items()},
-        plan=read_plan(reader, scene),
-        work=read_work(reader),
+        plan=structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
+        work=structure(json.loads(reader.text("work", _MAX_PLAN)), Work),
         memory={name: int(value) for name, value in reader.attributes("memory").items()},
         message=str(summary["message"]),
         warnings=reader.texts("warnings"),

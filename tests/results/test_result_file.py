@@ -89,7 +89,7 @@ def test_a_failed_solution_comes_back_as_failed(tmp_path: Path, solution: Soluti
 def test_provenance_names_versions_but_neither_people_nor_places(file: Path) -> None:
     with h5py.File(file) as stored:
         provenance = dict(stored["provenance"].attrs)
-        assert stored.attrs["schema_version"] == 1
+        assert stored.attrs["schema_version"] == 2
     assert set(provenance) == {"bemkit", "python", "numpy", "scipy", "h5py", "platform", "created"}
     text = " ".join(map(str, provenance.values()))
     assert str(Path.home()) not in text
@@ -118,7 +118,7 @@ def test_an_interrupt_while_writing_leaves_the_old_result(
     def interrupted(*arguments: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.results.result_file, "write_work", interrupted)
+    monkeypatch.setattr(bemkit.results.result_file, "write_texts", interrupted)
     with pytest.raises(error):
         write_result(file, dataclasses.replace(solution, message="never"))
     assert os.listdir(file.parent) == ["result.h5"]
@@ -264,16 +264,18 @@ def test_a_damaged_list_of_contents_is_named() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (attribute("/", "schema_version", 2), "has layout version 2, this bemkit .* reads version 1: use the bemkit"),
+        (attribute("/", "schema_version", 1), "has layout version 1, this bemkit .* reads version 2: use the bemkit"),
         (attribute("/", "format", "other"), "not a bemkit result"),
         (attribute("summary", "status", "GREAT"), "inconsistent content .*GREAT"),
         (attribute("summary", "energy", "much"), "inconsistent content"),
         (attribute("summary", "energy", np.zeros(3)), "'energy' of summary is not a single text or number"),
         (deleted("contact/x"), "contact/x is missing"),
         (deleted("plan"), "plan is missing"),
-        (deleted("plan/name"), "plan/name is missing"),
+        (replaced("plan", data=np.bytes_(b"{")), "inconsistent content"),
+        (replaced("plan", data=np.bytes_(b"[" * 100_000)), "inconsistent content"),
+        (replaced("plan", data=np.bytes_(b'{"items": 3}')), "inconsistent content .*decisions: missing"),
         (deleted("work"), "work is missing"),
-        (attribute("work", "element_pairs", "many"), "inconsistent content"),
+        (replaced("work", data=np.bytes_(b'{"element_pairs": "many"}')), "'many' is not a whole number"),
         (deleted("summary"), "summary is missing"),
         (replaced("contact/x", data=np.zeros(3)), "columns of contact differ in length"),
         (replaced("contact/x", data=np.zeros(11, "i8")), "contact/x holds .*int64"),
