@@ -18,15 +18,9 @@ PACKAGE = Path(bemkit.__file__).parent
 CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
 NAME = "bemkit"
 TO_BE_TURNED = {
-    "bemkit.model.contact_model imports bemkit.plan",
-    "bemkit.model.elastic_model imports bemkit.plan",
     "bemkit.studies.accuracy.session imports bemkit.cli.outputs",
     "bemkit.studies.stability.plots imports bemkit.cli.outputs",
     "bemkit.studies.stability.trial_session imports bemkit.cli.outputs",
-    "bemkit.runs.run -> bemkit.runs.adaptive -> bemkit.runs.run",
-    "bemkit.runs.adaptive -> bemkit.runs.run -> bemkit.runs.adaptive",
-    "bemkit.scene.scene -> bemkit.scene.symmetry -> bemkit.scene.scene",
-    "bemkit.scene.symmetry -> bemkit.scene.scene -> bemkit.scene.symmetry",
 }
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bemkit.atomic_files import OutputFileError, check_target, replacing
-from bemkit.plan import Wishes
 from bemkit.results.solution import Solution
 from bemkit.results.tables import CSV_STARTS, to_json, write_csv
 from bemkit.streams import print_data
@@ -47,11 +46,6 @@ class Outputs:
     def uses_stdout(self) -> bool:
         """Whether standard output is taken by data, so that nothing else may be printed there."""
         return STDOUT in (self.json, self.csv)
-
-    @property
-    def wishes(self) -> Wishes:
-        """What of this a plan knows."""
-        return Wishes(result_file=self.result is not None, figures=self.plots is not None)
 
     def check(self) -> list[Path]:
         """Find out, before any work is done, whether everything can be written.

@@ -9,7 +9,7 @@ stranger runs no code. The layout, version 1:
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
-    /boundary        points, displacement, centres, traction
+    /boundary        points, displacement, centres, traction, traction_dofs (not in older files)
     /contact, /transitions, /history, /plan, /work    tables: one dataset per column, all of one length;
                      those of plan and work with numbers as attributes
     /warnings, /plan/warnings    texts, one sentence each; a file without them has none
@@ -51,7 +51,7 @@ SCHEMA_VERSION = 1
 _COUNTS = ("linear_solves", "outer_steps")
 _FORCES = ("force_normal", "force_tangential", "energy")
 _NUMBERS = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "weight")
-_BOUNDARY = ("points", "displacement", "centres", "traction")
+_BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs")
 
 
 def check_result_target(path: str | Path) -> Path:
@@ -214,7 +214,8 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     summary = reader.attributes("summary")
     mesh = _read_mesh(reader, scene)
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
-    boundary = BoundaryFields(*(reader.floats(f"boundary/{name}") for name in _BOUNDARY))
+    names = [name for name in _BOUNDARY if name != "traction_dofs" or reader.has("boundary/traction_dofs")]
+    boundary = BoundaryFields(*(reader.floats(f"boundary/{name}") for name in names))
     if len(boundary.centres) != mesh.n_elements:
         raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return Solution(

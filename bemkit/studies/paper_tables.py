@@ -20,6 +20,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import NoResultError
 from bemkit.geometry.grading import Uniform
 from bemkit.model.contact_model import Model, build_model
+from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.scene.scene import ConstantCollocation, MeshOptions
 from bemkit.scene.toml import load_scene
@@ -131,7 +132,7 @@ def paper_model(number: int) -> Model:
     }
     mesh = MeshOptions(elements=_N_ELEMENTS, grading=Uniform(), density=density)
     scene = replace(scene, mesh=mesh, discretisation=ConstantCollocation(slopes=False))
-    return build_model(scene, scene.build_mesh())
+    return build_model(prepare(scene, scene.build_mesh()))
 
 
 def _table(number: int, progress: Callable[[int, float, float], None] | None) -> PaperTable:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from bemkit.plan import make_plan, this_machine
+from bemkit.plan import make_plan
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import QuadraticGalerkin, Scene
 
@@ -49,4 +49,4 @@ def over_resolution_cost(scene: Scene, n_elements: int = SUGGESTED) -> Cost:
     options = MeshOptions(elements=n_elements, density=scene.mesh.density)
     fine = replace(scene, discretisation=QuadraticGalerkin(), mesh=options)
     plan = make_plan(fine, fine.build_mesh())
-    return Cost(n_elements, MESHES_TOGETHER * sum(plan.seconds(this_machine()).values()), plan.memory)
+    return Cost(n_elements, MESHES_TOGETHER * plan.seconds, plan.memory)
