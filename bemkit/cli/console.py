@@ -12,7 +12,7 @@ from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
-from bemkit.plan import Machine, Plan
+from bemkit.plan import Plan
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
@@ -40,26 +40,21 @@ def print_summary(solution: Solution, console: Console | None = None) -> None:
     _print_warnings(solution.warnings, console)
 
 
-def print_plan(title: str, plan: Plan, machine: Machine) -> None:
-    """Print what a scene needs and what it leaves out, with the costs on a computer."""
+def print_plan(title: str, plan: Plan) -> None:
+    """Print what a scene needs and what it leaves out, and the time and memory of all."""
     console = Console(highlight=False)
     table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
     table.add_column("")
     table.add_column("item", overflow="fold")
     table.add_column("why", overflow="fold")
-    table.add_column("memory", justify="right", no_wrap=True)
-    table.add_column("time", justify="right", no_wrap=True)
     for item in plan.items:
         style = "" if item.is_needed else "dim"
         mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
-        size = format_size(item.cost.size) if item.cost.size else ""
-        seconds = item.cost.seconds(machine)
-        spent = format_seconds(seconds) if seconds else ""
-        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style), size, spent)
+        table.add_row(mark, Text(item.name, style=style), Text(item.reason, style=style))
     console.print(Text(title, style="bold"))
     console.print(table)
-    total = sum(plan.seconds(machine).values())
-    console.print(f"about {format_seconds(total)}, and {format_size(plan.memory)} of memory at the largest moment")
+    memory = format_size(plan.memory)
+    console.print(f"about {format_seconds(plan.seconds)}, and {memory} of memory at the largest moment")
     _print_warnings(plan.warnings, console)
 
 

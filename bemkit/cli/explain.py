@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tracemalloc
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, Group
@@ -13,29 +11,7 @@ from rich.text import Text
 
 from bemkit.cli.console import format_seconds, format_size
 from bemkit.operators.counts import Work
-from bemkit.plan import Stage, this_machine
 from bemkit.results.solution import Solution
-
-
-def with_memory(solution: Solution, solve_again: Callable[[], Solution]) -> Solution:
-    """Return a solution with the memory of another run, which is traced: that makes small scenes twice as slow.
-
-    Parameters
-    ----------
-    solution : Solution
-        Whose run also loaded what is loaded on first use, and is no memory of a stage.
-    solve_again : callable
-        Returns the same solution.
-
-    Returns
-    -------
-    Solution
-    """
-    tracemalloc.start()
-    try:
-        return replace(solution, memory=solve_again().memory)
-    finally:
-        tracemalloc.stop()
 
 
 def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
@@ -44,7 +20,7 @@ def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: b
     Parameters
     ----------
     solution : Solution
-        From `with_memory`.
+        Of a run whose memory was traced, which makes small scenes about twice as slow.
     output_seconds : float [s]
         What writing its outputs took.
     to_stderr : bool
@@ -56,17 +32,16 @@ def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: b
 
 
 def _stages(solution: Solution, output_seconds: float) -> Table:
-    table = _table("stage", "time planned", "time", "memory planned", "memory")
-    planned, peaks = solution.plan.seconds(this_machine()), solution.plan.peaks
-    measured = {**solution.timings, Stage.OUTPUTS.value: output_seconds}
-    for stage in Stage:
-        name = stage.value
-        sizes = [format_size(size) if size else "" for size in (peaks.get(stage, 0), solution.memory.get(name, 0))]
-        table.add_row(name, format_seconds(planned[stage]), format_seconds(measured[name]), *sizes)
-    totals = [format_seconds(sum(planned.values())), format_seconds(sum(measured[stage.value] for stage in Stage))]
-    memory = [format_size(solution.plan.memory), format_size(max(solution.memory.values(), default=0))]
+    table = _table("stage", "time", "memory")
+    for name, seconds in solution.timings.items():
+        if name != "total":
+            size = solution.memory.get(name, 0)
+            table.add_row(name, format_seconds(seconds), format_size(size) if size else "")
+    table.add_row("outputs", format_seconds(output_seconds), "")
     table.add_section()
-    table.add_row("all", *totals, *memory)
+    memory = format_size(max(solution.memory.values(), default=0))
+    table.add_row("all", format_seconds(solution.timings["total"] + output_seconds), memory)
+    table.add_row("planned", format_seconds(solution.plan.seconds), format_size(solution.plan.memory))
     return table
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import replace
+import tracemalloc
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -112,12 +112,12 @@ def run(
     chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):
-        solution = _solve(chosen, cascade=cascade, is_live=is_live)
         if explain:
-            from bemkit.cli.explain import with_memory
-
-            solution = with_memory(solution, lambda: _solve(chosen, cascade=cascade, is_live=False))
-    solution = replace(solution, plan=solution.plan.with_outputs(wanted.wishes))
+            tracemalloc.start()
+        try:
+            solution = _solve(chosen, cascade=cascade, is_live=is_live)
+        finally:
+            tracemalloc.stop()
     begin = time.perf_counter()
     wanted.write(solution)
     output_seconds = time.perf_counter() - begin
@@ -179,7 +179,7 @@ def scenes() -> None:
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
 def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.plan import check_elements, make_plan, this_machine
+    from bemkit.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
 
     chosen = _load(scene, elements, discretisation)
@@ -190,11 +190,11 @@ def plan(scene: str, elements: int | None, discretisation: str | None, is_json: 
     if is_json:
         import json
 
-        print(json.dumps(made.as_dict(this_machine()), indent=2))
+        print(json.dumps(made.as_dict(), indent=2))
     else:
         from bemkit.cli.console import print_plan
 
-        print_plan(chosen.title, made, this_machine())
+        print_plan(chosen.title, made)
 
 
 commands.add_command(study)

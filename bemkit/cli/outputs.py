@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bemkit.atomic_files import OutputFileError
-from bemkit.plan import Wishes
 from bemkit.results.outputs import JSON_START, STDOUT, TextFile, check_figures
 from bemkit.results.solution import Solution
 from bemkit.results.tables import CSV_STARTS, to_csv, to_json
@@ -38,11 +37,6 @@ class Outputs:
     def uses_stdout(self) -> bool:
         """Whether standard output is taken by data, so that nothing else may be printed there."""
         return STDOUT in (self.json, self.csv)
-
-    @property
-    def wishes(self) -> Wishes:
-        """What of this a plan knows."""
-        return Wishes(result_file=self.result is not None, figures=self.plots is not None)
 
     @property
     def _texts(self) -> tuple[TextFile[Solution], TextFile[Solution]]:

@@ -141,6 +141,52 @@ class ConstantSpace:
 
 
 @dataclass(frozen=True, eq=False)
+class ElementwiseSpace:
+    """The functions of another space with dofs of their own on each element, so that all of them may jump.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+    """
+
+    space: BoundarySpace
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """The mesh of the other space."""
+        return self.space.mesh
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the other space."""
+        return self.space.degree
+
+    @property
+    def is_continuous(self) -> bool:
+        """Functions jump from element to element."""
+        return False
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of vector dofs."""
+        return 2 * self.element_dofs.size
+
+    @cached_property
+    def element_dofs(self) -> IntArray:
+        """(n_elements, n_local) array of scalar dofs, element by element."""
+        return np.arange(self.space.element_dofs.size).reshape(self.space.element_dofs.shape)
+
+    @property
+    def local_nodes(self) -> FloatArray:
+        """Those of the other space."""
+        return self.space.local_nodes
+
+    def basis(self, xi: FloatArray) -> FloatArray:
+        """Evaluate the local basis of the other space."""
+        return self.space.basis(xi)
+
+
+@dataclass(frozen=True, eq=False)
 class _NodalSpace:
     """Polynomials with a dof at each end of an element, shared with the neighbour unless the node is broken."""
 

@@ -20,7 +20,8 @@ from bemkit.geometry.validity.magnitude import LARGEST, SMALLEST
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 from bemkit.operators.steklov_poincare.nodes import integrate_traction
-from bemkit.scene.scene import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Scene, Traction
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.scene import Scene
 
 
 class OutOfRangeError(InputError):

@@ -1,43 +1,37 @@
-"""From a scene to a dimensionless contact problem, and back to physical fields.
+"""From a prepared scene to a dimensionless contact problem, and back to physical fields.
 
 Inside, lengths are measured by the diameter of the body, stresses of the material by E', loads by their largest value
 p and displacements by p L / E', so that nothing depends on the user's units, on where the body sits, or on how stiff
-it is.
+it is. A scene without contact is a contact problem without nodes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import zip_longest
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.reduction import CondensedBody, ContactNodes, condense
+from bemkit.contact.condensation.reduction import CondensedBody, ContactNodes, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_data import Units, find_units, nodal_forces, parts_on, supports_on
-from bemkit.model.contact_data import ContactData, find_contact
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.model.boundary_data import Units, parts_on
+from bemkit.model.contact_data import ContactData
+from bemkit.model.free_motion import check_held
+from bemkit.model.prepared import Prepared
+from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import Work
-from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import without_motion
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.nodal_conditions import supported
-from bemkit.plan import Decisions, Formulation, Plan, make_plan
-from bemkit.scene.scene import Part, PrescribedDisplacement, Pressure, Scene, Traction
-from bemkit.scene.symmetry import check_symmetry
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.scene.conditions import Contact, Pressure, Traction
+from bemkit.scene.scene import Scene
 
-_FARTHEST = 1e7
-"""Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
-
-
-class TooFarError(InputError):
-    """A body whose coordinates are so large that they no longer hold its shape."""
+_N_POINTS = 5
+"""Gauss points of an element at which given loads are evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,63 +40,65 @@ class Model:
 
     Parameters
     ----------
-    scene : Scene
-    mesh : BoundaryMesh
-        In physical units.
-    units : Units
+    prepared : Prepared
     elastic : SteklovPoincare
         Dimensionless.
-    body : CondensedBody
-    contact : ContactData
-        Of the contact nodes of the body.
+    body : CondensedBody or UntouchedBody
     problem : ContactProblem
         Where supports hold contact nodes along the tangent its law is frictionless; see
         `bemkit.model.held_friction.with_held_friction`.
     """
 
-    scene: Scene
-    mesh: BoundaryMesh
-    units: Units
+    prepared: Prepared
     elastic: SteklovPoincare
-    body: CondensedBody
-    contact: ContactData
+    body: CondensedBody | UntouchedBody
     problem: ContactProblem
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, with a single load."""
+        return self.prepared.scene
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """The mesh, in physical units."""
+        return self.prepared.mesh
+
+    @property
+    def units(self) -> Units:
+        """The physical size of one dimensionless unit."""
+        return self.prepared.units
+
+    @property
+    def contact(self) -> ContactData:
+        """What the scene says of the contact nodes of the body."""
+        return self.prepared.contact
 
     @property
     def nodes(self) -> ContactNodes:
         """The contact nodes of the body."""
-        return self.body.nodes
+        return self.prepared.contact.nodes
 
-    def under(self, scene: Scene) -> Model:
+    def under(self, prepared: Prepared) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
-        Only a law with friction where this model's has none makes it condense the body anew.
+        Only a law with friction where this model's has none, or other directions of contact, make it condense the body
+        anew.
 
         Parameters
         ----------
-        scene : Scene
-            Differs from this model's in numbers of its conditions, its law and its solver alone.
-
-        Raises
-        ------
-        ValueError
-            If the scene has another body, other parts, or other kinds of conditions.
+        prepared : Prepared
+            From `Prepared.under` of this model's.
         """
-        check_same_body(self.scene, scene)
-        check_symmetry(scene, self.mesh)
-        space = self.elastic.displacement_space
-        supports = supports_on(scene, self.mesh, self.units, space)
-        force = nodal_forces(scene, self.mesh, space, self.units)
-        contact = find_contact(scene, self.mesh, space)
-        stays = contact.of(self.nodes)
+        stays = prepared.candidates.of(self.nodes)
         is_new_friction = self.nodes.is_frictionless & ~stays.nodes.is_frictionless
         if stays.has_same_directions(self.contact) and not is_new_friction.any():
-            body, contact = self.body.under(supported(space, supports).displacement, force), stays
+            body = self.body.under(prepared.conditions.displacement, prepared.force)
+            # a node that has lost its friction stays what it is in the condensed body
+            prepared = replace(prepared, conditions=body.conditions, contact=replace(stays, nodes=self.nodes))
         else:
-            body = condense(self.elastic, supports, contact.nodes, force)
-            contact = contact.of(body.nodes)
-        problem = _problem(scene, self.units, body, contact)
-        return replace(self, scene=scene, body=body, contact=contact, problem=problem)
+            body = contact_body(self.elastic, prepared)
+        return Model(prepared, self.elastic, body, _problem(prepared, body))
 
     @property
     def work(self) -> Work:
@@ -120,41 +116,62 @@ class Model:
         Returns
         -------
         displacement : (n_nodes, 2) array [m]
-        traction : (n_elements, 2) array [Pa]
-            Mean of each element: given loads where they are given, contact tractions on the contact boundary,
-            reactions elsewhere.
+        traction : (n_elements, n_local, 2) array [Pa]
+            Values at the local nodes of the traction space, element by element: given loads and contact tractions
+            projected onto its functions, reactions of supports, and zero on the free boundary.
         energy : float [J/m]
             Elastic energy 1/2 a(u, u).
         """
+        units, mesh = self.units, self.mesh
         displacement, force = self.body.recover(state)
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
-        return physical_fields(self.scene, self.mesh, self.units, displacement, force, traction)
+        traction *= units.stress
+        self._insert_loads(traction)
+        points = dof_points(self.prepared.space)
+        # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
+        strained = without_motion(mesh.unit, points, displacement)
+        energy = 0.5 * float(np.sum(strained * force)) * units.stress * units.displacement * units.length
+        return displacement * units.displacement, traction, energy
+
+    def mean_tractions(self, traction: FloatArray) -> FloatArray:
+        """Return the means (n_elements, 2) of tractions (n_elements, n_local, 2) at the local nodes."""
+        space = self.elastic.traction_space
+        xi, weights = gauss_legendre(space.degree + 1)
+        mean: FloatArray = np.einsum("l,elc->ec", space.basis(xi) @ weights / 2.0, traction)
+        return mean
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
-        """Give each contact element the mean of the tractions that its nodes interpolate."""
-        space = self.elastic.displacement_space
+        """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
+        space = self.prepared.space
         at_nodes = np.zeros((space.n_dofs // 2, 2))
         at_nodes[self.nodes.nodes] = np.einsum("nk,nkc->nc", state.traction, self.nodes.frame)
-        elements = np.concatenate([self.mesh.part(part.name) for part in self.scene.contact_parts])
         xi, weights = gauss_legendre(space.degree + 1)
-        traction[elements] = np.einsum(
-            "p,epc->ec", space.basis(xi) @ weights / 2.0, at_nodes[space.element_dofs[elements]]
-        )
+        projection = space.basis(xi) @ _projector(self.elastic.traction_space, xi, weights).T
+        for part, elements, _ in parts_on(self.scene, self.mesh):
+            if isinstance(part.condition, Contact):
+                traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes[space.element_dofs[elements]])
+
+    def _insert_loads(self, traction: FloatArray) -> None:
+        """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero."""
+        xi, weights = gauss_legendre(_N_POINTS)
+        projector = _projector(self.elastic.traction_space, xi, weights)
+        is_free = np.ones(self.mesh.n_elements, bool)
+        for part, elements, _ in parts_on(self.scene, self.mesh):
+            is_free[elements] = False
+            if isinstance(part.condition, Traction | Pressure):
+                points, normals = self.mesh.points(elements, xi), self.mesh.normals_at(elements, xi)
+                values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+                traction[elements] = np.einsum("lq,eqc->elc", projector, values)
+        traction[is_free] = 0.0
 
 
-def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None, plan: Plan | None = None) -> Model:
+def build_model(prepared: Prepared) -> Model:
     """Assemble the operators of a scene and condense the body onto its contact boundary.
 
     Parameters
     ----------
-    scene : Scene
-    mesh : BoundaryMesh
-        As made by `Scene.build_mesh`, or a refinement of it.
-    units : Units, optional
-        By default `find_units` of the scene.
-    plan : Plan, optional
-        Whose decisions are followed; by default `make_plan` of the scene.
+    prepared : Prepared
 
     Returns
     -------
@@ -162,109 +179,35 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None, pl
 
     Raises
     ------
-    TooFarError
-        If the body lies so far from the origin that its coordinates no longer hold its shape.
-    ConflictingSupportsError, SingularMatrixError, ValueError
-        If the supports contradict each other or do not hold the body even with glued contact, or an expression is not
-        finite somewhere.
+    FreeBodyError
+        If no part is in contact and the supports leave a rigid motion free, which the message names.
+    NoContactNodesError
+        If supports leave no node of the contact boundary free to move towards the obstacle.
+    SingularMatrixError
+        If the supports do not hold the body even with all contact nodes sticking.
     """
-    check_position(mesh)
-    check_symmetry(scene, mesh)
-    units = find_units(scene, mesh) if units is None else units
-    plan = make_plan(scene, mesh) if plan is None else plan
-    elastic = elastic_map(plan.decisions, mesh.unit, scene.material.scaled(units.modulus))
-    force = nodal_forces(scene, mesh, elastic.displacement_space, units)
-    supports = supports_on(scene, mesh, units, elastic.displacement_space)
-    contact = find_contact(scene, mesh, elastic.displacement_space)
-    body = condense(elastic, supports, contact.nodes, force)
-    contact = contact.of(body.nodes)
-    return Model(scene, mesh, units, elastic, body, contact, _problem(scene, units, body, contact))
+    discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
+    elastic = discretisation.elastic_map(mesh, prepared.material, prepared.linear_solver.solver)
+    body = contact_body(elastic, prepared)
+    return Model(prepared, elastic, body, _problem(prepared, body))
 
 
-def check_position(mesh: BoundaryMesh) -> None:
-    """Refuse a body so far from the origin that its coordinates hold too few digits of its shape."""
-    distance = float(np.abs(mesh.nodes).max()) / mesh.diameter
-    if distance > _FARTHEST:
-        x, y = mesh.centre.tolist()
-        raise TooFarError(
-            f"the body lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
-            f"of its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
-        )
+def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody | UntouchedBody:
+    """Return a body as contact sees it: condensed onto its contact nodes, if there are any."""
+    if prepared.scene.contact_parts:
+        return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
+    check_held(prepared)
+    condensed = elastic.condense(prepared.conditions, prepared.force)
+    return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)
 
 
-def _problem(scene: Scene, units: Units, body: CondensedBody, contact: ContactData) -> ContactProblem:
-    law = scene.law_at(contact.parts, contact.points, body.is_held)
+def _problem(prepared: Prepared, body: CondensedBody | UntouchedBody) -> ContactProblem:
+    contact, units = prepared.contact, prepared.units
+    law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return ContactProblem(body, contact.gap / units.displacement, law.scaled(units.stress))
 
 
-def physical_fields(
-    scene: Scene,
-    mesh: BoundaryMesh,
-    units: Units,
-    displacement: FloatArray,
-    force: FloatArray,
-    traction: FloatArray,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return the physical fields on the whole boundary that belong to dimensionless ones.
-
-    Parameters
-    ----------
-    scene : Scene
-    mesh : BoundaryMesh
-    units : Units
-    displacement, force : (n_nodes, 2) arrays [-]
-        Of the nodes of the displacement space.
-    traction : (n_elements, 2) array [-]
-        Its reactions and contact tractions are kept, loads come from the scene.
-
-    Returns
-    -------
-    displacement : (n_nodes, 2) array [m]
-    traction : (n_elements, 2) array [Pa]
-    energy : float [J/m]
-    """
-    traction = traction * units.stress
-    is_loose = np.ones(mesh.n_elements, bool)
-    for part, elements, _ in parts_on(scene, mesh):
-        is_loose[elements] = False
-        if isinstance(part.condition, Traction | Pressure):
-            traction[elements] = _mean_load(part.condition, mesh, elements)
-    traction[is_loose] = 0.0
-    points = dof_points(scene.discretisation.displacement_space(mesh.unit))
-    # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
-    strained = without_motion(mesh.unit, points, displacement)
-    energy = 0.5 * float(np.sum(strained * force)) * units.stress * units.displacement * units.length
-    return displacement * units.displacement, traction, energy
-
-
-def elastic_map(decisions: Decisions, mesh: BoundaryMesh, material: Material) -> SteklovPoincare:
-    """Return the map from displacements to forces that was chosen for a scene."""
-    if decisions.formulation is Formulation.COLLOCATION:
-        return CollocationMap(mesh, material, slopes=decisions.takes_slopes)
-    displacements, tractions = decisions.displacement_space(mesh), decisions.traction_space(mesh)
-    return GalerkinMap(mesh, material, displacements, tractions, decisions.linear_solver)
-
-
-def check_same_body(scene: Scene, other: Scene) -> None:
-    """Refuse another scene whose matrices would be others."""
-    for name in ("shape", "material", "symmetry", "discretisation"):
-        if getattr(scene, name) != getattr(other, name):
-            raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
-    for part, changed in zip_longest(scene.parts, other.parts):
-        if part is None or changed is None or _layout(part) != _layout(changed):
-            name = (part or changed).name
-            raise InputError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
-
-
-def _layout(part: Part) -> tuple[object, ...]:
-    condition = part.condition
-    components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
-    return part.name, part.sides, part.where, type(condition), components
-
-
-def _mean_load(load: Traction | Pressure, mesh: BoundaryMesh, elements: IntArray) -> FloatArray:
-    xi, weights = gauss_legendre(5)
-    points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
-    values = load.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
-    mean: FloatArray = np.einsum("q,eqc->ec", 0.5 * weights, values)
-    return mean
+def _projector(space: BoundarySpace, xi: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return (n_local, n_points): the local dofs of the least-squares fit to values at quadrature points."""
+    basis = space.basis(xi)
+    return np.asarray(np.linalg.solve((basis * weights) @ basis.T, basis * weights), float)

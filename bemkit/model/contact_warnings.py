@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.model.contact_data import find_contact
 from bemkit.model.contact_model import Model
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -52,14 +51,13 @@ def _oblique(model: Model, node_status: IntArray) -> list[str]:
 
 
 def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
-    everywhere = find_contact(model.scene, model.mesh, model.elastic.displacement_space)
+    everywhere = model.prepared.candidates
     nodes = everywhere.nodes
     overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - everywhere.gap
     overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
     found = []
     for part in dict.fromkeys(everywhere.parts):
-        own = np.array([name == part for name in everywhere.parts])
-        node = int(np.argmax(np.where(own, overlap, -math.inf)))
+        node = int(np.argmax(np.where(np.equal(everywhere.parts, part), overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
             x, y = everywhere.points[node]
             found.append(

@@ -13,10 +13,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model
-from bemkit.model.elastic_model import ElasticModel
 from bemkit.operators.equilibrium import round_off_of
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare import GalerkinMap
 from bemkit.solvers.base import ContactSolution, Status
 
 _ROUND_OFF = 1e-10
@@ -26,12 +24,12 @@ _CARRIED = 64.0 * float(np.finfo(float).eps)
 """Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
 
 
-def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) -> ContactSolution:
+def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named NEGATIVE_ENERGY if the energy of the body is negative or can become so.
 
     Parameters
     ----------
-    model : Model or ElasticModel
+    model : Model
     result : ContactSolution
 
     Returns
@@ -41,17 +39,12 @@ def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) ->
     """
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
-    if isinstance(model, ElasticModel):
-        condensed = model.condensed
-        displacement, force = condensed.recover(np.zeros(0))
-    else:
-        condensed = model.body.condensed
-        displacement, force = model.body.recover(result.state)
-        # by Galerkin's method no direction is negative but for round-off, which the work of the solution tells
-        is_galerkin = isinstance(model.elastic, GalerkinMap)
-        if not is_galerkin and is_indefinite(model.body.dense.stiffness, condensed.sensitivity):
-            return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
-    space = model.elastic.displacement_space
+    condensed = model.body.condensed
+    displacement, force = model.body.recover(result.state)
+    # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
+    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, condensed.sensitivity):
+        return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
+    space = model.prepared.space
     motions = resting_motions(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, condensed.sensitivity)
     return (

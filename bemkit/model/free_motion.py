@@ -1,12 +1,18 @@
-"""Name the rigid motion along which an unsolvable load carries the body away, in words and physical units."""
+"""Rigid body modes in words and physical units: those that nothing holds, and the one along which a load escapes."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.condensation.nodes import held_nodes
 from bemkit.contact.solvability import UnsolvableLoad
-from bemkit.model.contact_model import Model
+from bemkit.errors import InputError
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.boundary_data import Units
+from bemkit.model.prepared import Prepared
+from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import unsupported_motions
 
 _DIRECTIONS = (
     *("to the right", "up and to the right", "upward", "up and to the left"),
@@ -15,62 +21,119 @@ _DIRECTIONS = (
 _REMEDY = ": change the load or hold the body"
 _STRAIGHT = 1e-6
 """Turning by less than this, relative to the shift at the size of the body, counts as none."""
+_ROUND_OFF = 1e-9
+"""What is smaller than this share of a mode or of the size of the body is zero but for round-off."""
 
 
-def describe_escape(model: Model, escape: UnsolvableLoad) -> str:
-    """Say in one sentence how the load moves the body and that nothing holds it.
+class FreeBodyError(InputError):
+    """Supports that leave the body free to move, where no contact could hold it."""
+
+
+def check_held(prepared: Prepared) -> None:
+    """Refuse supports that leave a rigid body mode free.
 
     Parameters
     ----------
-    model : Model
-    escape : UnsolvableLoad
-        Found for the model's problem.
+    prepared : Prepared
+        Of a scene without contact.
+
+    Raises
+    ------
+    FreeBodyError
+        Naming the modes.
+    """
+    modes = unsupported_motions(prepared.space, prepared.conditions)
+    if not len(modes):
+        return
+    points = dof_points(prepared.space)
+    basis = rigid_motions(points, np.zeros(2), 1.0).reshape(-1, 3)
+    # (n_modes, 3): shift of the centre, and turn
+    free = np.asarray(np.linalg.lstsq(basis, modes.reshape(len(modes), -1).T, rcond=None)[0].T, float)
+    raise FreeBodyError(
+        f"nothing holds the body: it may {_modes_in_words(free, prepared.units)}; give it a part that is clamped, a "
+        "roller, in contact or of given displacement, or a symmetry"
+    )
+
+
+def _modes_in_words(modes: FloatArray, units: Units) -> str:
+    """Say how a body may move, by the shifts of its centre and the turns (n_modes, 3) of a basis of its motions."""
+    size = float(np.linalg.norm(modes[:, 2]))
+    turns = size > _ROUND_OFF
+    if turns:  # a basis in which only the first mode turns
+        modes = np.asarray(np.linalg.svd(modes[None, :, 2] / size)[2] @ modes)
+    shifts = modes[int(turns) :, :2]
+    words = []
+    if len(shifts) == 2:
+        words.append("move in any direction")
+    elif len(shifts):
+        x, y = (shifts[0] / np.linalg.norm(shifts[0])).tolist()
+        is_axis = min(abs(x), abs(y)) < _ROUND_OFF
+        words.append(f"move along {'xy'[abs(y) > abs(x)] if is_axis else f'({x:.3g}, {y:.3g})'}")
+    if turns and len(shifts):
+        words.append("turn")
+    elif turns:
+        words.append(f"turn {_pivot(modes[0], units)}")
+    return " and ".join(words)
+
+
+def _pivot(mode: FloatArray, units: Units) -> str:
+    """Name the point about which a mode (shift along x, along y, turn) turns the body."""
+    pivot = units.to_physical(np.array([-mode[1], mode[0]]) / mode[2])
+    x, y = np.where(np.abs(pivot) < _ROUND_OFF * units.length, 0.0, pivot).tolist()
+    return f"about ({x:.4g}, {y:.4g})"
+
+
+def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
+    """Say in one sentence how a load moves the body and that nothing holds it.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    load : UnsolvableLoad
+        Found for its problem.
 
     Returns
     -------
     str
         With the resultant force [N/m] for a translation, or the moment [N m/m] and the fixed point for a rotation.
     """
-    units = model.units
-    shift, turn = _rigid_motion(model, escape)
-    size = float(np.hypot(*shift))
+    units = prepared.units
+    mode = _rigid_mode(prepared, load)
+    size, turn = float(np.hypot(*mode[:2])), float(mode[2])
     if abs(turn) <= _STRAIGHT * size:
-        net = escape.work / size * units.stress * units.length
-        if escape.is_sliding:
+        net = load.work / size * units.stress * units.length
+        if load.is_sliding:
             return (
-                f"the load slides the body {_direction(shift)} with {net:.4g} N/m more than friction can hold; "
+                f"the load slides the body {_direction(mode[:2])} with {net:.4g} N/m more than friction can hold; "
                 "change the load, raise the friction or hold the body"
             )
-        return f"the load pushes the body {_direction(shift)} with {net:.4g} N/m; nothing holds it{_REMEDY}"
-    pivot = units.to_physical(np.array([-shift[1], shift[0]]) / turn)
-    x, y = np.where(np.abs(pivot) < 1e-9 * units.length, 0.0, pivot)
-    moment = escape.work / abs(turn) * units.stress * units.length**2
+        return f"the load pushes the body {_direction(mode[:2])} with {net:.4g} N/m; nothing holds it{_REMEDY}"
+    moment = load.work / abs(turn) * units.stress * units.length**2
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
-    words = f"the load turns the body {sense} about ({x:.4g}, {y:.4g}) with {moment:.4g} N m/m"
+    words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment:.4g} N m/m"
     return f"{words}; contact cannot hold it{_REMEDY}"
 
 
-def _rigid_motion(model: Model, escape: UnsolvableLoad) -> tuple[FloatArray, float]:
-    """Return the shift at the origin of the dimensionless points, and the turn (anticlockwise), of the escape."""
-    frame, points = model.nodes.frame, model.nodes.points
-    spin = frame[:, :, 1] * points[:, None, 0] - frame[:, :, 0] * points[:, None, 1]
-    matrix = np.concatenate([frame, spin[:, :, None]], axis=2).reshape(-1, 3)
-    moves = model.body.moves.ravel()  # where a support holds the tangent, that component says nothing
-    motion = np.linalg.lstsq(matrix[moves], escape.motion.ravel()[moves], rcond=1e-9)[0]
-    if escape.is_sliding:
-        motion = _along_obstacle(matrix[::2][~np.isnan(escape.lift) & model.body.moves[:, 0]], motion)
-    return motion[:2], float(motion[2])
+def _rigid_mode(prepared: Prepared, load: UnsolvableLoad) -> FloatArray:
+    """Return the shift at the origin of the dimensionless points and the turn (anticlockwise), (3,)."""
+    nodes = prepared.contact.nodes
+    modes = rigid_motions(nodes.points, np.zeros(2), 1.0)
+    matrix = np.einsum("nkc,ncm->nkm", nodes.frame, modes)
+    is_known = np.ones((len(matrix), 2), bool)
+    is_known[:, 1] = ~held_nodes(prepared.conditions, nodes)  # along a support that component says nothing
+    mode: FloatArray = np.linalg.lstsq(matrix[is_known], load.motion[is_known], rcond=_ROUND_OFF)[0]
+    return _along_obstacle(matrix[~np.isnan(load.lift), 0], mode) if load.is_sliding else mode
 
 
-def _along_obstacle(normal: FloatArray, motion: FloatArray) -> FloatArray:
-    """Return the part of a motion (3,) that does not lift the nodes whose normal components are (n, 3) @ motion.
+def _along_obstacle(normal: FloatArray, mode: FloatArray) -> FloatArray:
+    """Return the part of a mode (3,) that does not lift the nodes whose normal components are (n, 3) @ mode.
 
     Full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle. Where it
-    cannot, as on a curved one, the motion is returned as it is.
+    cannot, as on a curved one, the mode is returned as it is.
     """
-    lift = np.linalg.lstsq(normal, normal @ motion, rcond=1e-9)[0]
-    along = motion - lift
-    return along if np.abs(along).max() > _STRAIGHT * np.abs(motion).max() else motion
+    lift = np.linalg.lstsq(normal, normal @ mode, rcond=_ROUND_OFF)[0]
+    along = mode - lift
+    return along if np.abs(along).max() > _STRAIGHT * np.abs(mode).max() else mode
 
 
 def _direction(shift: FloatArray) -> str:

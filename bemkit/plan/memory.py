@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from bemkit.errors import InputError
 from bemkit.operators.linear.memory import physical_memory
-from bemkit.plan.make import Plan, make_plan
+from bemkit.plan.plan import Plan, make_plan
 from bemkit.scene.scene import Scene
 
 _MANY = 10_000

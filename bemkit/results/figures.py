@@ -25,7 +25,6 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.results.boundary_figure import draw_boundary_traction
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import ConstantCollocation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -141,7 +140,7 @@ def draw_contact_displacement(solution: Solution, part: str, *, units: Units | N
     matplotlib.figure.Figure
     """
     units = Units() if units is None else units
-    contact, chosen = solution.contact, _rows(solution, part)
+    contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Displacements on the contact boundary")
     axes.plot(s, contact.u_n[chosen], color=BLUE, label="normal $u_n$", **_LINE)
@@ -170,7 +169,7 @@ def draw_contact_traction(solution: Solution, part: str, *, units: Units | None 
     matplotlib.figure.Figure
     """
     units = Units() if units is None else units
-    contact, chosen = solution.contact, _rows(solution, part)
+    contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
     axes.plot(s, contact.sigma_n[chosen], color=BLUE, label=r"normal $\sigma_n$", **_LINE)
@@ -203,7 +202,7 @@ def draw_contact_status(solution: Solution, part: str, *, units: Units | None = 
     matplotlib.figure.Figure
     """
     units = Units() if units is None else units
-    contact, chosen = solution.contact, _rows(solution, part)
+    contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Contact pressure and clearance")
     pressure = axes.plot(s, -contact.sigma_n[chosen], color=BLUE, label=r"pressure $-\sigma_n$ (left)", **_LINE)
@@ -253,23 +252,18 @@ def node_displacement(solution: Solution) -> FloatArray:
     Returns
     -------
     (n_nodes, 2) array [m]
-        At the nodes of ``solution.mesh.whole``: given there directly, or interpolated between the two elements that
-        meet.
+        At the nodes of ``solution.mesh.whole``, interpolated between the two elements that meet where they differ.
     """
     mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
-    displacement = unfolded(make_space(solution.mesh), make_space(mesh), solution.boundary.displacement)
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        before, after = mesh.node_elements.T
-        share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
-        return np.asarray(share * displacement[before] + (1.0 - share) * displacement[after])
-    return displacement[: mesh.n_nodes]
+    space = make_space(mesh)
+    displacement = unfolded(make_space(solution.mesh), space, solution.boundary.displacement)
+    at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+    before, after = mesh.node_elements.T
+    share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
+    return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])
 
 
 _LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "markersize": 2.0})
-
-
-def _rows(solution: Solution, part: str) -> BoolArray:
-    return np.array([name == part for name in solution.contact.part])
 
 
 def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
@@ -311,7 +305,7 @@ def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
     """Paint the status along a part; name it where there is room, and in a legend where there is none."""
     from matplotlib.patches import Patch
 
-    chosen = _rows(solution, part)
+    chosen = solution.contact.rows(part)
     length = float(solution.mesh.lengths[solution.mesh.part(part)].sum())
     transitions = [transition for transition in solution.transitions if transition.part == part]
     first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bemkit.geometry.reflection import unfolded
-from bemkit.geometry.spaces import ConstantSpace
+from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.results.solution import Solution
 
@@ -25,14 +25,17 @@ def interior_fields(solution: Solution) -> InteriorFields:
 
     Notes
     -----
-    A solution holds one traction for each element, the mean over it, and displacements at nodes or element centres.
-    Inside, their error decays quickly with the distance from the boundary. Within about one element length of it,
-    stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
+    Displacements and tractions are those of the spaces of the discretisation (constant tractions in files of older
+    versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
+    of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
-    mesh = solution.mesh
-    make_space = solution.scene.discretisation.displacement_space
-    space = make_space(mesh.whole)
-    tractions = ConstantSpace(mesh.whole)
-    displacement = unfolded(make_space(mesh), space, solution.boundary.displacement)
-    traction = unfolded(ConstantSpace(mesh), tractions, solution.boundary.traction)
+    n_local = solution.boundary.traction_dofs.shape[1]
+    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.boundary
+    space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
+    displacement = unfolded(half_space, space, boundary.displacement)
+    tractions, half_tractions = (
+        ElementwiseSpace(discretisation.traction_space(each) if n_local > 1 else ConstantSpace(each))
+        for each in (mesh.whole, mesh)
+    )
+    traction = unfolded(half_tractions, tractions, boundary.traction_dofs.reshape(-1, 2))
     return InteriorFields(mesh.whole, solution.scene.material, space, displacement, tractions, traction)

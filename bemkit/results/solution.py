@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Work
 from bemkit.plan import Plan
 from bemkit.results.error_indicators import squared_errors
-from bemkit.scene.scene import ConstantCollocation, Scene
+from bemkit.scene.scene import Scene
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status, StepRecord
 
@@ -95,6 +95,15 @@ class ContactTable:
         """Number of contact nodes."""
         return len(self.part)
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names of the contact parts, in their order."""
+        return tuple(dict.fromkeys(self.part))
+
+    def rows(self, part: str) -> BoolArray:
+        """Return (n_contact,) bool: the nodes of one part."""
+        return np.array([name == part for name in self.part], bool)
+
     def columns(self) -> dict[str, FloatArray | IntArray]:
         """Return the numerical columns by name."""
         names = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
@@ -112,10 +121,14 @@ class BoundaryFields:
     Parameters
     ----------
     points : (n_points, 2) array [m]
-        Where the displacement is known, in mesh order: the mesh nodes (linear elements) or the element centres.
+        Where the displacement is known: the nodes of the displacement space of the scene's discretisation.
     displacement : (n_points, 2) array [m]
     centres : (n_elements, 2) array [m]
     traction : (n_elements, 2) array [Pa]
+        Mean of each element.
+    traction_dofs : (n_elements, n_local, 2) array [Pa], optional
+        Values at the local nodes of the traction space, element by element, because loads may jump anywhere: constant
+        tractions by default.
 
     Raises
     ------
@@ -127,8 +140,11 @@ class BoundaryFields:
     displacement: FloatArray
     centres: FloatArray
     traction: FloatArray
+    traction_dofs: FloatArray = field(default_factory=lambda: np.zeros((0, 1, 2)))
 
     def __post_init__(self) -> None:
+        dofs = self.traction_dofs if self.traction_dofs.size else self.traction[:, None].copy()
+        object.__setattr__(self, "traction_dofs", dofs)
         for place, value in (("points", "displacement"), ("centres", "traction")):
             shape = (len(getattr(self, place)), 2)
             for name in (place, value):
@@ -136,6 +152,11 @@ class BoundaryFields:
                 if array.shape != shape:
                     raise InputError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
                 read_only(array)
+        if dofs.ndim != 3 or dofs.shape[::2] != self.traction.shape:
+            raise InputError(
+                f"traction_dofs has the shape {dofs.shape}: give ({len(self.traction)}, n_local, 2) to match traction"
+            )
+        read_only(dofs)
 
 
 @dataclass(frozen=True)
@@ -212,7 +233,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
     found = []
     for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
-        rows = [k for k, part in enumerate(contact.part) if part == contact.part[i]]
+        rows = contact.rows(contact.part[i])
         x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
         found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
     return tuple(found)
@@ -224,7 +245,7 @@ def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -
     halfway = np.array([(contact.s[i] + contact.s[i + 1]) / 2.0 for i in changes])
     for part in dict.fromkeys(contact.part[i] for i in changes):
         own = [k for k, i in enumerate(changes) if contact.part[i] == part]
-        ends = contact.s[[name == part for name in contact.part]][[0, -1]]
+        ends = contact.s[contact.rows(part)][[0, -1]]
         least = _LEAST_ZONE * np.diff(halfway[own], prepend=ends[0], append=ends[1])
         for _ in own:  # what moves back may meet the next transition
             is_lost = np.diff(kept[own], prepend=ends[0], append=ends[1]) < least
@@ -344,18 +365,19 @@ class Solution:
 
     @cached_property
     def element_errors(self) -> FloatArray | None:
-        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None for collocation."""
-        if isinstance(self.scene.discretisation, ConstantCollocation):
+        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
+        discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
+        if not discretisation.estimates_error:
             return None
-        make_space, modulus = self.scene.discretisation.displacement_space, self.scene.material.plane_modulus
+        make_space = discretisation.displacement_space
         return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
 
     @cached_property
     def estimated_error(self) -> float | None:
         """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
-        None for collocation, and where the energy is not positive, so that an error is measured against nothing; zero
-        of a body at rest.
+        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
+        zero of a body at rest.
         """
         if self.element_errors is None:
             return None

@@ -11,7 +11,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
 from bemkit.results.error_indicators import blind_elements
 from bemkit.results.solution import ContactTable, Solution, are_neighbours
-from bemkit.scene.scene import Clamped, ConstantCollocation, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
@@ -43,7 +43,8 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
 
 def _error(solution: Solution) -> Iterator[str]:
     """Doubt an estimated error that is large, and one that could not be made."""
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
+    discretisation = solution.scene.discretisation
+    if not discretisation.estimates_error:
         return
     error = solution.estimated_error
     if error is None:
@@ -56,7 +57,7 @@ def _error(solution: Solution) -> Iterator[str]:
             f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
             "no error can be estimated: use more elements."
         )
-    is_blind = blind_elements(solution.mesh, solution.plan.decisions.traction_degree)
+    is_blind = blind_elements(solution.mesh, discretisation.traction_space(solution.mesh).degree)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
         if isinstance(part.condition, Clamped | Roller | PrescribedDisplacement) and is_blind[elements].any():
@@ -94,8 +95,8 @@ def _narrow_zones(solution: Solution) -> Iterator[str]:
     """Doubt zones of contact, stick and slip of few nodes; of parts without friction zones of contact alone."""
     words = np.array(solution.contact.status_words(), dtype=object)
     is_closed = words != "separated"
-    for part in dict.fromkeys(solution.contact.part):
-        own = np.array([name == part for name in solution.contact.part])
+    for part in solution.contact.parts:
+        own = solution.contact.rows(part)
         kinds = {"contact": own & is_closed}
         if not solution.scene.laws[part].is_frictionless:
             kinds |= {word: own & (words == word) for word in ("stick", "slip")}

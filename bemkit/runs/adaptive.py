@@ -19,10 +19,10 @@ from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partition
-from bemkit.plan import make_plan, this_machine
+from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.totals import with_totals
-from bemkit.runs.run import run
+from bemkit.runs.history import run_on_mesh
 from bemkit.scene.mesh_options import MOST_ELEMENTS
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
@@ -75,7 +75,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         started = time.perf_counter()
         start = solutions[-1] if solutions and contact else None
         try:
-            solution = run(scene, mesh=partition.mesh, start=start, callback=callback)
+            solution = run_on_mesh(scene, partition.mesh, start, callback)
         except BemkitError as error:
             if not solutions:
                 raise
@@ -105,9 +105,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
 
 def _expected_seconds(solution: Solution, spent: float, mesh: BoundaryMesh) -> float:
     """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
-    machine = this_machine()
-    planned, before = (sum(plan.seconds(machine).values()) for plan in (make_plan(solution.scene, mesh), solution.plan))
-    return spent * planned / before
+    return spent * make_plan(solution.scene, mesh).seconds / solution.plan.seconds
 
 
 def _error(solution: Solution) -> float:
@@ -163,8 +161,8 @@ def _zone_ends(solution: Solution) -> list[tuple[str, int, float]]:
     """
     table, mesh = solution.contact, solution.mesh
     found = []
-    for part in dict.fromkeys(table.part):
-        nodes = table.s[[name == part for name in table.part]]
+    for part in table.parts:
+        nodes = table.s[table.rows(part)]
         places = np.array([transition.s for transition in solution.transitions if transition.part == part])
         zone_sizes = np.histogram(nodes, np.concatenate([[-np.inf], places, [np.inf]]))[0]
         elements = along_boundary(mesh, mesh.part(part))

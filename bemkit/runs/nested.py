@@ -9,7 +9,7 @@ from bemkit.errors import InputError
 from bemkit.plan import check_elements
 from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
-from bemkit.runs.run import run
+from bemkit.runs.history import run_on_mesh
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -63,5 +63,5 @@ def run_cascade(
     for count in reversed(counts):
         level = scene if count == counts[0] else replace(scene, mesh=replace(scene.mesh, elements=count))
         start = solutions[-1] if solutions and solutions[-1].is_converged else None
-        solutions.append(run(level, start=start, callback=callback))
+        solutions.append(run_on_mesh(level, start=start, callback=callback))
     return tuple(solutions)

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import enum
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from bemkit.operators.stopwatch import AssemblyTime, traced_peak
-from bemkit.plan import Stage
+
+
+class Stage(enum.Enum):
+    """The parts of a run, by their names in `Solution.timings`; writing outputs comes after it."""
+
+    MESH = "mesh"
+    ASSEMBLE = "assemble"
+    CONDENSE = "condense"
+    SOLVE = "solve"
+    RECOVER = "recover"
 
 
 @dataclass(frozen=True)
@@ -30,8 +40,7 @@ class StageClock:
     def start(cls) -> StageClock:
         """Return a clock that has measured nothing yet."""
         traced_peak()
-        stages = [stage for stage in Stage if stage is not Stage.OUTPUTS]
-        return cls(dict.fromkeys(stages, 0.0), dict.fromkeys(stages, 0), time.perf_counter())
+        return cls(dict.fromkeys(Stage, 0.0), dict.fromkeys(Stage, 0), time.perf_counter())
 
     def closed(self, stage: Stage) -> StageClock:
         """Charge what has happened since the last call to a stage."""

@@ -39,10 +39,10 @@ def state_on(model: Model, solution: Solution) -> ContactState:
     parts, arc_length = model.contact.parts, model.contact.arc_length
     values = {name: np.zeros(len(parts)) for name in scales}
     for part in dict.fromkeys(parts):
-        known = np.flatnonzero([name == part for name in table.part])
+        known = np.flatnonzero(table.rows(part))
         if not known.size:
-            raise InputError(f"the start has no contact part {part!r}: it has {', '.join(dict.fromkeys(table.part))}")
-        own = np.flatnonzero([name == part for name in parts])
+            raise InputError(f"the start has no contact part {part!r}: it has {', '.join(table.parts)}")
+        own = np.flatnonzero(np.equal(parts, part))
         known = known[np.argsort(table.s[known])]
         for name, scale in scales.items():
             values[name][own] = np.interp(arc_length[own], table.s[known], getattr(table, name)[known]) / scale

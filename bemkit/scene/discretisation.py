@@ -1,38 +1,139 @@
-"""How displacements and tractions are discretised: by symmetric Galerkin or by collocation, with which elements."""
+"""How displacements and tractions are discretised: by symmetric Galerkin, by collocation, or in a way of one's own."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
+from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
+from bemkit.scene.thinness import thinness_warnings
 
 
-@dataclass(frozen=True)
-class LinearGalerkin:
-    """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
+class Discretisation(Protocol):
+    """Spaces of displacements and tractions, and the map between them; a frozen dataclass without a mesh.
 
+    A discretisation of one's own derives from this class, or from `Galerkin`, and writes the members without a
+    default; `bemkit.testing.check_discretisation` proves its promises.
+    """
+
+    @property
+    def method(self) -> str:
+        """What the method is called in messages; the name of the class unless given."""
+        return type(self).__name__
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether the map is symmetric and positive semidefinite, and follows the linear solver of the scene."""
+        return False
+
+    @property
+    def estimates_error(self) -> bool:
+        """Whether jumps of strains and steps of tractions estimate its error, so that meshes can follow an accuracy.
+
+        Displacements must then be continuous, of degree 1 or 2, and tractions of a degree less.
+        """
+        return False
+
+    @abstractmethod
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the space of the displacements; its nodes carry the contact conditions."""
-        return LinearSpace(mesh)
+
+    @abstractmethod
+    def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the space of the tractions."""
+
+    @abstractmethod
+    def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
+        """Return the map from the displacements to the forces of a body.
+
+        Parameters
+        ----------
+        mesh : BoundaryMesh
+        material : Material
+        linear_solver : LinearSolver
+            To be followed if `is_symmetric`.
+        """
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Foresee what the map takes; nothing is foreseen unless this is written."""
+        return BodyNeeds()
+
+
+class Galerkin(Discretisation, Protocol):
+    """Symmetric Galerkin; one of one's own writes its two spaces.
+
+    Displacements are continuous; tractions may jump where boundary parts end and the boundary has corners, at least.
+    """
+
+    @property
+    def method(self) -> str:
+        """Galerkin."""
+        return "Galerkin"
+
+    @property
+    def is_symmetric(self) -> bool:
+        """True."""
+        return True
+
+    def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
+        """Return the Galerkin map of the two spaces."""
+        displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
+        return GalerkinMap(mesh, material, displacements, tractions, linear_solver)
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return what the Galerkin map takes."""
+        degree = self.displacement_space(case.mesh).degree
+        return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
 
 
 @dataclass(frozen=True)
-class QuadraticGalerkin:
+class LinearGalerkin(Galerkin):
+    """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
+
+    @property
+    def estimates_error(self) -> bool:
+        """True."""
+        return True
+
+    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the continuous linear functions; their nodes are those of the mesh."""
+        return LinearSpace(mesh)
+
+    def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the constants on elements."""
+        return ConstantSpace(mesh)
+
+
+@dataclass(frozen=True)
+class QuadraticGalerkin(Galerkin):
     """Symmetric Galerkin: displacements continuous and quadratic, tractions linear on each element.
 
     Tractions are continuous except at corners and at ends of boundary parts. Contact conditions hold at the ends and
     the middles of elements.
     """
 
+    @property
+    def estimates_error(self) -> bool:
+        """True."""
+        return True
+
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the space of the displacements; the nodes of the mesh are its first dofs."""
+        """Return the continuous quadratic functions; the nodes of the mesh are their first dofs."""
         return QuadraticSpace(mesh)
+
+    def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the linear functions that may jump at corners and at ends of parts."""
+        return LinearSpace(mesh, break_nodes(mesh))
 
 
 @dataclass(frozen=True)
-class ConstantCollocation:
+class ConstantCollocation(Discretisation):
     """Direct collocation with displacements and tractions constant on each element.
 
     Parameters
@@ -45,9 +146,24 @@ class ConstantCollocation:
 
     slopes: bool = True
 
+    @property
+    def method(self) -> str:
+        """Collocation."""
+        return "collocation"
+
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the space of the displacements; its nodes are the centres of elements."""
+        """Return the constants on elements; their nodes are the centres."""
         return ConstantSpace(mesh)
 
+    def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
+        """Return the constants on elements."""
+        return ConstantSpace(mesh)
 
-Discretisation: TypeAlias = LinearGalerkin | QuadraticGalerkin | ConstantCollocation
+    def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
+        """Return the collocation map, which has a linear solver of its own."""
+        return CollocationMap(mesh, material, slopes=self.slopes)
+
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        """Return what collocation takes, and warn of bodies that are thin for their elements."""
+        needs = collocation_needs(case, takes_slopes=self.slopes)
+        return replace(needs, warnings=thinness_warnings(case.mesh))

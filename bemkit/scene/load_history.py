@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression, ScalarField
-from bemkit.scene.scene import Condition, PrescribedDisplacement, Pressure, Scene, Traction
+from bemkit.scene.conditions import Condition, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.scene import Scene
 
 
 def load_steps(scene: Scene) -> tuple[Scene, ...]:

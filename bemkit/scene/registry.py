@@ -110,12 +110,12 @@ CONDITIONS = Family(
     "condition",
     MappingProxyType(
         {
-            "clamped": "bemkit.scene.scene:Clamped",
-            "roller": "bemkit.scene.scene:Roller",
-            "displacement": "bemkit.scene.scene:PrescribedDisplacement",
-            "traction": "bemkit.scene.scene:Traction",
-            "pressure": "bemkit.scene.scene:Pressure",
-            "contact": "bemkit.scene.scene:Contact",
+            "clamped": "bemkit.scene.conditions:Clamped",
+            "roller": "bemkit.scene.conditions:Roller",
+            "displacement": "bemkit.scene.conditions:PrescribedDisplacement",
+            "traction": "bemkit.scene.conditions:Traction",
+            "pressure": "bemkit.scene.conditions:Pressure",
+            "contact": "bemkit.scene.conditions:Contact",
         }
     ),
 )
@@ -156,6 +156,7 @@ DISCRETISATIONS = Family(
             "constant": "bemkit.scene.discretisation:ConstantCollocation",
         }
     ),
+    "bemkit.discretisations",
 )
 
 LINEAR_SOLVERS = Family(

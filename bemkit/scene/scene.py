@@ -7,36 +7,40 @@ form can be turned into the other. All quantities are in one consistent set of u
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.contact.obstacle import Obstacle
 from bemkit.contact.piecewise_law import PartwiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
-from bemkit.formulas import Expression, ScalarField, check_field, closest, evaluate_field
+from bemkit.formulas import closest
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverWish
 from bemkit.operators.material import Material
+from bemkit.scene.conditions import Clamped as Clamped
+from bemkit.scene.conditions import Condition as Condition
+from bemkit.scene.conditions import Contact as Contact
+from bemkit.scene.conditions import Part as Part
+from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement
+from bemkit.scene.conditions import Pressure as Pressure
+from bemkit.scene.conditions import Region as Region
+from bemkit.scene.conditions import Roller as Roller
+from bemkit.scene.conditions import Traction as Traction
 from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
 from bemkit.scene.discretisation import Discretisation as Discretisation
 from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
 from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions as MeshOptions
+from bemkit.scene.symmetry import check_symmetry
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-
-Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
-"""A condition on the coordinates, such as ``Expression("x > 0.5")``."""
-
 
 LARGEST_KRYLOV_ERROR = 1e-4
 """Largest relative error of conjugate gradients: energies and forces on the contact boundary err by its square."""
@@ -44,166 +48,6 @@ LARGEST_KRYLOV_ERROR = 1e-4
 
 class NoContactError(InputError):
     """A question about contact, asked of a scene without any."""
-
-
-@dataclass(frozen=True)
-class Clamped:
-    """Both displacement components are zero."""
-
-
-@dataclass(frozen=True)
-class Roller:
-    """The normal displacement and the tangential traction are zero (also the condition on a symmetry line)."""
-
-
-@dataclass(frozen=True)
-class PrescribedDisplacement:
-    """Displacement components are given; a component that is left out is free of traction.
-
-    Parameters
-    ----------
-    x, y : float, Expression, callable or None [m]
-
-    Raises
-    ------
-    ValueError
-        If both are left out, or one is not a finite number, a formula or a function.
-    """
-
-    x: ScalarField | None = None
-    y: ScalarField | None = None
-
-    def __post_init__(self) -> None:
-        if self.x is None and self.y is None:
-            raise InputError("neither x nor y is given: give at least one displacement component, such as y = -0.01")
-        for name in ("x", "y"):
-            if getattr(self, name) is not None:
-                check_field(getattr(self, name), name)
-
-    @property
-    def is_prescribed(self) -> tuple[bool, bool]:
-        """Which of the components x and y are given."""
-        return self.x is not None, self.y is not None
-
-    def at(self, points: FloatArray) -> FloatArray:
-        """Evaluate the displacement at (n, 2) points [m] as an (n, 2) array [m]; free components are zero."""
-        components = [np.zeros(len(points)) if value is None else evaluate_field(value, points) for value in self._xy]
-        return np.stack(components, axis=1)
-
-    @property
-    def _xy(self) -> tuple[ScalarField | None, ScalarField | None]:
-        return self.x, self.y
-
-
-@dataclass(frozen=True)
-class Traction:
-    """A load per area in the directions x and y.
-
-    Parameters
-    ----------
-    x, y : float, Expression or callable [Pa]
-
-    Raises
-    ------
-    ValueError
-        If one is not a finite number, a formula or a function.
-    """
-
-    x: ScalarField = 0.0
-    y: ScalarField = 0.0
-
-    def __post_init__(self) -> None:
-        check_field(self.x, "x")
-        check_field(self.y, "y")
-
-    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Evaluate the traction at (n, 2) points [m] as an (n, 2) array [Pa]; the normals do not matter."""
-        return np.stack([evaluate_field(self.x, points), evaluate_field(self.y, points)], axis=1)
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """A load against the outward normal, and optionally along the boundary.
-
-    Parameters
-    ----------
-    pressure : float, Expression or callable [Pa]
-        Positive when it pushes the body inwards.
-    shear : float, Expression or callable [Pa]
-        Positive along the anticlockwise traversal of the boundary.
-
-    Raises
-    ------
-    ValueError
-        If one is not a finite number, a formula or a function.
-    """
-
-    pressure: ScalarField
-    shear: ScalarField = 0.0
-
-    def __post_init__(self) -> None:
-        check_field(self.pressure, "pressure")
-        check_field(self.shear, "shear")
-
-    def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Evaluate the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
-        tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
-        pressure = evaluate_field(self.pressure, points)[:, None]
-        return evaluate_field(self.shear, points)[:, None] * tangents - pressure * normals
-
-
-@dataclass(frozen=True)
-class Contact:
-    """The part may touch a rigid obstacle.
-
-    Parameters
-    ----------
-    obstacle : Obstacle
-    law : FrictionLaw, optional
-        The friction law on this part; the scene's law if left out.
-    """
-
-    obstacle: Obstacle
-    law: FrictionLaw | None = None
-
-
-Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
-
-
-@dataclass(frozen=True)
-class Part:
-    """A named piece of the boundary with its condition.
-
-    Parameters
-    ----------
-    name : str
-    condition : Condition
-    sides : tuple of str
-        Names of sides of the shape; empty means all sides.
-    where : Expression, callable or None
-        Keeps only the points where it is true; the ends are found to round-off and become mesh nodes.
-
-    Raises
-    ------
-    ValueError
-        If the name is empty, or `where` is not a condition.
-    """
-
-    name: str
-    condition: Condition
-    sides: tuple[str, ...] = ()
-    where: Region | None = None
-
-    def __post_init__(self) -> None:
-        if not self.name or not self.name.isprintable():
-            raise InputError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
-        if isinstance(self.where, Expression) and not self.where.is_condition:
-            raise InputError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
-
-    @property
-    def selection(self) -> Selection:
-        """The piece of the outline that the part covers."""
-        return Selection(sides=self.sides, where=self.where)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -292,10 +136,11 @@ class Scene:
                 )
 
     def _check_krylov(self, solver: Krylov) -> None:
-        if isinstance(self.discretisation, ConstantCollocation):
+        if not self.discretisation.is_symmetric:
             raise InputError(
-                f"linear_solver is {solver}, which needs symmetric equations, and those of collocation are not: choose "
-                "the discretisation 'linear' or 'quadratic', or leave the linear solver out"
+                f"linear_solver is {solver}, which needs symmetric equations, and those of "
+                f"{self.discretisation.method} are not: choose the discretisation 'linear' or 'quadratic', or leave "
+                "the linear solver out"
             )
         if (error := solver.error_at(self.material)) > LARGEST_KRYLOV_ERROR:
             raise InputError(
@@ -304,10 +149,10 @@ class Scene:
             )
 
     def _check_accuracy(self, accuracy: float) -> None:
-        if isinstance(self.discretisation, ConstantCollocation):
+        if not self.discretisation.estimates_error:
             raise InputError(
-                f"mesh.accuracy is {accuracy}: collocation has no error estimate: choose the discretisation "
-                "'quadratic' or 'linear', or give elements"
+                f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
+                "discretisation 'quadratic' or 'linear', or give elements"
             )
         if len(self.load_factors) > 1:
             raise InputError(
@@ -361,6 +206,8 @@ class Scene:
             except ValueError as error:
                 raise LawError(f"part {name!r}: friction law: {error}") from error
             nodes.append(own)
+        if not laws:  # a scene without contact
+            return self.law
         if len(laws) == 1 or all(law is laws[0] for law in laws):
             return laws[0]
         return PartwiseLaw(laws, nodes)
@@ -380,7 +227,5 @@ class Scene:
         names = [part.name for part in self.contact_parts]
         mesh = self.mesh.divide(self.shape.outline(), self.selections, names, self.symmetry)
         if self.symmetry is not None:
-            from bemkit.scene.symmetry import check_symmetry  # which compares the conditions defined here
-
             check_symmetry(self, mesh)
         return mesh

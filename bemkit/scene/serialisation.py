@@ -25,7 +25,7 @@ from bemkit.errors import BemkitError, InputError
 from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
-from bemkit.operators.linear.solvers import LinearSolverWish
+from bemkit.operators.linear.solvers import LinearSolver, LinearSolverWish
 from bemkit.scene.registry import (
     CONDITIONS,
     DISCRETISATIONS,
@@ -50,6 +50,7 @@ _FAMILIES: tuple[tuple[Any, Family], ...] = (
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),
     (LinearSolverWish, LINEAR_SOLVERS),
+    (LinearSolver, LINEAR_SOLVERS),
     (ContactSolver, SOLVERS),
 )
 

@@ -6,18 +6,24 @@ the image of what acts at the point. Friction is symmetric where its bound is: s
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.selection import Selection
+from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene.scene import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Scene, Traction
+from bemkit.operators.material import Material
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 
 _PER_PIECE = 4
 """Elements of each piece of the boundary in the coarse mesh on which images are looked for."""
@@ -29,16 +35,44 @@ _PRESSURES = (1e-6, 1e-4, 1e-2, 1.0)
 """In units of E': where the bounds of friction laws are compared."""
 
 
+class SymmetricScene(Protocol):
+    """What is compared of a scene; `bemkit.scene.scene.Scene` has it."""
+
+    @property
+    def shape(self) -> Shape:
+        """The whole body."""
+
+    @property
+    def material(self) -> Material:
+        """Whose modulus is the unit of pressures."""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """What acts where."""
+
+    @property
+    def selections(self) -> Mapping[str, Selection]:
+        """The pieces of the outline that the parts cover, by name."""
+
+    @property
+    def laws(self) -> Mapping[str, FrictionLaw]:
+        """The friction law of each contact part, by name."""
+
+    @property
+    def symmetry(self) -> Symmetry | None:
+        """The lines that the scene names."""
+
+
 class AsymmetricSceneError(GeometryError):
     """A scene that is not symmetric about a line it names."""
 
 
-def check_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
+def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
     """Raise unless a scene is symmetric about the lines it names, and so is its mesh.
 
     Parameters
     ----------
-    scene : Scene
+    scene : SymmetricScene
     mesh : BoundaryMesh
         Of one side of the lines; conditions are compared on all its elements.
 
@@ -66,12 +100,12 @@ def check_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
                 )
 
 
-def find_symmetry(scene: Scene) -> Symmetry | None:
+def find_symmetry(scene: SymmetricScene) -> Symmetry | None:
     """Find the lines through the middle of a body, along x and y, about which a scene is symmetric.
 
     Parameters
     ----------
-    scene : Scene
+    scene : SymmetricScene
 
     Returns
     -------
@@ -126,11 +160,11 @@ def _part_names(mesh: BoundaryMesh) -> list[str]:
 class _Whole:
     """A scene with a coarse mesh of its whole body."""
 
-    scene: Scene
+    scene: SymmetricScene
     mesh: BoundaryMesh
 
     @classmethod
-    def of(cls, scene: Scene) -> _Whole:
+    def of(cls, scene: SymmetricScene) -> _Whole:
         division = divide(scene.shape.outline(), scene.selections)
         positions = np.linspace(0.0, 1.0, _PER_PIECE + 1)
         return cls(scene, division.mesh([piece.at(positions) for piece in division.pieces]))
@@ -188,12 +222,12 @@ class _Whole:
         return None
 
 
-def _acting(scene: Scene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:
+def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:
     """Return the kind of condition in a part and its values (n, 1), or (n, 2) for vectors, by name."""
     points, normals = samples.points, samples.normals
     match None if part is None else part.condition:
-        case Contact(obstacle=obstacle, law=own_law):
-            law = (scene.law if own_law is None else own_law).at(points)
+        case Contact(obstacle=obstacle) if part is not None:
+            law = scene.laws[part.name].at(points)
             pressures = [np.full(len(points), -p * scene.material.plane_modulus) for p in _PRESSURES]
             bounds = {f"friction bound at the pressure {-p[0]:.3g}": law.bound(p)[:, None] for p in pressures}
             gap, direction = measure_contact(obstacle, points, normals)

@@ -15,7 +15,8 @@ from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene.scene import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Scene, Traction
+from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Traction
+from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import NoResultError
 from bemkit.geometry.grading import Uniform
 from bemkit.model.contact_model import Model, build_model
+from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.outputs import csv_text
 from bemkit.results.streams import plain_table, stdout_console
@@ -140,7 +141,7 @@ def paper_model(number: int) -> Model:
     }
     mesh = MeshOptions(elements=_N_ELEMENTS, grading=Uniform(), density=density)
     scene = replace(scene, mesh=mesh, discretisation=ConstantCollocation(slopes=False))
-    return build_model(scene, scene.build_mesh())
+    return build_model(prepare(scene, scene.build_mesh()))
 
 
 def to_json(tables: Sequence[PaperTable]) -> str:

@@ -15,6 +15,7 @@ from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactState, LawError
 from bemkit.model.boundary_data import nodal_forces, supports_on
 from bemkit.model.contact_model import Model, build_model
+from bemkit.model.prepared import prepare
 from bemkit.runs.run import UnsolvableSceneError
 from bemkit.scene.scene import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
@@ -157,7 +158,7 @@ def differences(model: Model, full: Model, solver: ContactSolver) -> tuple[float
 @pytest.mark.parametrize(("name", "discretisation"), CASES, ids=lambda value: getattr(value, "__name__", str(value)))
 def test_the_small_system_gives_what_the_full_one_gives(name: str, discretisation: Discretisation) -> None:
     scene = replace(SCENES[name](), discretisation=discretisation)
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     full = with_all_tangents(model)
     n_held = int(model.body.is_held.sum())  # where a support holds the tangent there never is a second unknown
     assert full.body.dense.n_unknowns == 2 * model.problem.n_contact - n_held > model.body.dense.n_unknowns
@@ -171,18 +172,19 @@ def test_the_small_system_gives_what_the_full_one_gives(name: str, discretisatio
 @pytest.mark.parametrize("name", ["paper-1", "rough and smooth", "oblique roller"])
 def test_every_driver_solves_the_small_system(name: str, solver: ContactSolver) -> None:
     scene = SCENES[name]()
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     # drivers stop at a certificate of 1e-9, of tractions that are up to 1e2 times those of the answer
     assert max(differences(model, with_all_tangents(model), solver)) < 1e-6
 
 
 def test_the_path_of_solutions_passes_over_free_tangents() -> None:
     scene = mixed()
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     lengths = set()
     for factor in np.linspace(1.0, 2.0, 40).tolist():
         load = bk.Traction(x=0.12 * factor, y=bk.Expression(f"{factor!r} * (-1 - 0.3 * x)"))
-        problem = model.under(replace(scene, parts=(*scene.parts[:2], replace(scene.parts[2], condition=load)))).problem
+        loaded = replace(scene, parts=(*scene.parts[:2], replace(scene.parts[2], condition=load)))
+        problem = model.under(model.prepared.under(loaded)).problem
         end = follow_path(problem, AffineBound.tangent(problem, np.zeros(problem.n_contact)))
         lengths.add(end.n_pieces)
         assert end.state is not None
@@ -194,7 +196,7 @@ def test_the_path_of_solutions_passes_over_free_tangents() -> None:
 
 def test_a_frictionless_scene_has_half_the_unknowns() -> None:
     scene = replace(bk.load_scene("paper-2"), law=SMOOTH, mesh=bk.MeshOptions(elements=60))
-    body = build_model(scene, scene.build_mesh()).body
+    body = build_model(prepare(scene, scene.build_mesh())).body
     assert body.dense.n_unknowns == body.n_contact
     assert body.condensed.stiffness.shape == (body.n_contact, body.n_contact)
     assert body.tangent_is_free.all()
@@ -202,7 +204,7 @@ def test_a_frictionless_scene_has_half_the_unknowns() -> None:
 
 def test_friction_brings_its_own_tangents_back() -> None:
     scene = mixed()
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     n_rough = sum(part == "rough" for part in model.contact.parts)
     assert 0 < n_rough < model.problem.n_contact
     assert model.body.dense.n_unknowns == model.problem.n_contact + n_rough
@@ -210,7 +212,7 @@ def test_friction_brings_its_own_tangents_back() -> None:
 
 @pytest.mark.parametrize(("scene", "n_kept"), [(block(), 1), (disc_in_cavity(), 1), (held(block()), 0), (pushed(), 0)])
 def test_what_is_eliminated_is_held(scene: bk.Scene, n_kept: int) -> None:
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     assert model.body.dense.n_unknowns == model.problem.n_contact + n_kept
 
 
@@ -267,7 +269,7 @@ def test_a_disc_in_a_smooth_cavity_cannot_be_turned() -> None:
 
 
 def test_a_node_that_a_support_pushes_goes_with_it() -> None:
-    model = build_model(pushed(), pushed().build_mesh())
+    model = build_model(prepare(pushed(), pushed().build_mesh()))
     solution = solve(model.problem, NEWTON)
     corner = int(np.argmax(model.nodes.points[:, 0]))
     # the tangent of the floor points to the right, and the wall moves by 0.05 at y = 0
@@ -276,7 +278,7 @@ def test_a_node_that_a_support_pushes_goes_with_it() -> None:
 
 @pytest.mark.parametrize("scene", [pushed(), oblique(), block(), mixed()])
 def test_tangential_displacements_are_those_of_the_body(scene: bk.Scene) -> None:
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     n_contact = model.problem.n_contact
     state = model.problem.respond(stick(np.random.default_rng(3).normal(size=n_contact), np.zeros(n_contact)))
     recovered, _ = model.body.recover(state)
@@ -286,7 +288,7 @@ def test_tangential_displacements_are_those_of_the_body(scene: bk.Scene) -> None
 
 def test_the_only_tangential_condition_is_no_traction() -> None:
     scene = held(block())
-    problem = build_model(scene, scene.build_mesh()).problem
+    problem = build_model(prepare(scene, scene.build_mesh())).problem
     none = np.zeros(problem.n_contact)
     with pytest.raises(ValueError, match=r"contact node 0 is without friction.*ask ContactProblem\.respond"):
         problem.body.respond(stick(none, none))
@@ -300,7 +302,7 @@ def test_the_only_tangential_condition_is_no_traction() -> None:
 
 def test_a_state_that_does_not_follow_is_out_of_balance() -> None:
     scene = held(block())
-    problem = build_model(scene, scene.build_mesh()).problem
+    problem = build_model(prepare(scene, scene.build_mesh())).problem
     state = solve(problem, NEWTON).state
     assert problem.body.imbalance(state).worst < 1e-12
     moved = np.stack([np.zeros(problem.n_contact), np.full(problem.n_contact, 1e-4)], axis=1)
@@ -310,17 +312,17 @@ def test_a_state_that_does_not_follow_is_out_of_balance() -> None:
 
 def test_a_law_with_friction_asks_for_another_body() -> None:
     scene = held(block())
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     rough = replace(scene, law=bk.Tresca(0.1))
     with pytest.raises(LawError, match=r"Tresca allows 0\.1 at contact node 0, where the body was condensed without"):
         replace(model.problem, law=bk.Tresca(0.1))
-    fresh = build_model(rough, model.mesh)
-    changed = model.under(rough)
+    fresh = build_model(prepare(rough, model.mesh))
+    changed = model.under(model.prepared.under(rough))
     assert changed.body.dense.n_unknowns == fresh.body.dense.n_unknowns
     one, other = (solve(each.problem, NEWTON).state for each in (changed, fresh))
     assert relative(one.traction, other.traction) < 1e-12
     # friction zero is still a law; at the corner the wall holds the tangent
-    assert fresh.under(scene).body.dense.n_unknowns == 2 * changed.problem.n_contact - 1
+    assert fresh.under(fresh.prepared.under(scene)).body.dense.n_unknowns == 2 * changed.problem.n_contact - 1
 
 
 def test_a_history_may_begin_without_friction() -> None:
@@ -338,10 +340,10 @@ def test_the_body_under_another_load_follows_as_if_built_anew() -> None:
     harder = replace(
         scene, parts=(*scene.parts[:1], replace(scene.parts[1], condition=bk.Traction(y=-2.0)), scene.parts[2])
     )
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     one, other = (
-        solve(model.under(harder).problem, NEWTON),
-        solve(build_model(harder, model.mesh, model.units).problem, NEWTON),
+        solve(model.under(model.prepared.under(harder)).problem, NEWTON),
+        solve(build_model(prepare(harder, model.mesh, model.units)).problem, NEWTON),
     )
     assert relative(one.state.displacement, other.state.displacement) < 1e-12
 

@@ -12,6 +12,7 @@ import bemkit as bk
 from bemkit.model.contact_data import find_contact
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.contact_warnings import contact_warnings
+from bemkit.model.prepared import prepare
 from bemkit.solvers.base import solve
 
 FLOOR = bk.HalfPlane()
@@ -98,7 +99,7 @@ def test_a_smooth_floor_pushes_a_tilted_block_straight_up(degrees: float, discre
         discretisation=discretisation,
         shape=bk.Polygon(corners, side_names=("bottom", "right", "top", "left")),
     )
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     result = solve(model.problem, scene.solver)
     force = np.einsum("n,nk,nkc->c", model.nodes.weights, result.state.traction, model.nodes.frame)
     assert force[1] > 0.0
@@ -184,7 +185,7 @@ def test_obstacles_may_turn_their_directions_from_step_to_step() -> None:
 
 
 def warnings_of(scene: bk.Scene) -> tuple[str, ...]:
-    model: Model = build_model(scene, scene.build_mesh())
+    model: Model = build_model(prepare(scene, scene.build_mesh()))
     result = solve(model.problem, scene.solver)
     displacement, _, _ = model.boundary_fields(result.state)
     return contact_warnings(model, displacement, result.node_status)

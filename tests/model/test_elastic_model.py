@@ -14,7 +14,10 @@ import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.cli.console import print_summary
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.elastic_model import FreeBodyError, build_elastic_model
+from bemkit.model.contact_model import build_model
+from bemkit.model.free_motion import FreeBodyError
+from bemkit.model.prepared import prepare
+from bemkit.model.untouched_body import certified, untouched_state
 from bemkit.results.figures import save_figures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
@@ -273,28 +276,28 @@ def test_questions_about_contact_are_refused(bent: Solution) -> None:
 
 def test_other_loads_need_no_other_matrices() -> None:
     scene = bending()
-    model = build_elastic_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     doubled = replace(scene, parts=(scene.parts[0], replace(scene.parts[1], condition=bk.Traction(y=0.1))))
-    u, _, energy = model.under(doubled).boundary_fields()
-    v, _, fresh = build_elastic_model(doubled, model.mesh, model.units).boundary_fields()
+    u, _, energy = model.under(model.prepared.under(doubled)).boundary_fields(untouched_state())
+    v, _, fresh = build_model(prepare(doubled, model.mesh, model.units)).boundary_fields(untouched_state())
     np.testing.assert_allclose(u, v, atol=1e-11 * np.abs(v).max())
     assert energy == pytest.approx(fresh, rel=1e-11)
     with pytest.raises(ValueError, match=r"material is .*: keep"):
-        model.under(replace(scene, material=bk.Material(1.0, 0.2)))
+        model.prepared.under(replace(scene, material=bk.Material(1.0, 0.2)))
 
 
 def test_only_forces_in_equilibrium_are_certified() -> None:
     scene = bending()
-    model = build_elastic_model(scene, scene.build_mesh())
-    points = dof_points(model.elastic.displacement_space)
-    displacement, force = model.condensed.recover(np.zeros(0))
-    assert model.certified().is_converged
+    body = build_model(prepare(scene, scene.build_mesh())).body
+    points = dof_points(body.space)
+    displacement, force = body.recover(untouched_state())
+    assert certified(body).is_converged
 
     def status_with(u: FloatArray, f: FloatArray) -> bk.Status:
-        return replace(model, condensed=replace(model.condensed, recover=lambda _: (u, f))).certified().status
+        return certified(replace(body, condensed=replace(body.condensed, recover=lambda _: (u, f)))).status
 
-    free = int(np.flatnonzero(model.conditions.is_free.all(axis=1))[0])
-    other = int(np.flatnonzero(model.conditions.is_fixed.all(axis=1))[0])
+    free = int(np.flatnonzero(body.conditions.is_free.all(axis=1))[0])
+    other = int(np.flatnonzero(body.conditions.is_fixed.all(axis=1))[0])
     bump = np.zeros_like(force)
     bump[free, 0] = 1e-6 * np.abs(force).sum()
     assert status_with(displacement, force + bump) is bk.Status.STALLED
@@ -303,7 +306,7 @@ def test_only_forces_in_equilibrium_are_certified() -> None:
     pair[other, 0] = -bump[free, 0]
     assert status_with(displacement, force + pair) is bk.Status.STALLED
     # on the supports alone only the balance can tell: of forces along x, or of moments
-    held = model.conditions.is_fixed.all(axis=1)
+    held = body.conditions.is_fixed.all(axis=1)
     for amounts in (np.ones(held.sum()), np.sign(points[held, 1])):
         bump = np.zeros_like(force)
         bump[held, 0] = 1e-6 * np.abs(force).sum() * amounts / np.abs(amounts).max()

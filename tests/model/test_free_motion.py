@@ -11,7 +11,8 @@ import pytest
 import bemkit as bk
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.model.contact_model import build_model
-from bemkit.model.free_motion import describe_escape
+from bemkit.model.free_motion import describe
+from bemkit.model.prepared import prepare
 from bemkit.runs.run import UnsolvableSceneError
 from tests.scene.test_load_history import block
 
@@ -98,7 +99,7 @@ def test_a_free_disc_finds_its_rest_on_friction_alone() -> None:
         assert solution.linear_solves <= 10
         assert solution.certificate.worst <= 1e-11
         assert abs(solution.force_tangential) <= 1e-10
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     motions = model.body.rigid_motions().reshape(3, -1)
     # curved elements would otherwise leave 1e-6 of the stiffness on rigid motions
     assert abs(model.body.dense.stiffness @ motions.T).max() <= 1e-12 * abs(model.body.dense.stiffness).max()
@@ -136,7 +137,7 @@ def test_a_column_on_a_round_obstacle_stands_or_has_a_named_escape(push: float, 
 def test_a_body_that_turns_about_the_only_node_that_touches_does_not_slide(node: int) -> None:
     """It neither lifts nor moves there, so that the motion along the obstacle is none."""
     scene = column(0.001, bk.Coulomb(0.3), bk.HalfPlane())
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     arms = model.nodes.points - model.nodes.points[node]
     turn = np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     motion = np.einsum("nc,nkc->nk", turn, model.nodes.frame)
@@ -145,4 +146,4 @@ def test_a_body_that_turns_about_the_only_node_that_touches_does_not_slide(node:
     assert not escape.is_sliding
     x, y = model.units.to_physical(model.nodes.points[node])
     assert abs(y) < 1e-15
-    assert describe_escape(model, escape).startswith(f"the load turns the body anticlockwise about ({x:.4g}, 0) with")
+    assert describe(model.prepared, escape).startswith(f"the load turns the body anticlockwise about ({x:.4g}, 0) with")

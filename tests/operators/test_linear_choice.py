@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.model.prepared import prepare
 from bemkit.operators.linear.choice import choose_linear_solver, direct_cost, krylov_cost
 from bemkit.plan import make_plan
-from bemkit.plan.decisions import decide
 
 AUTOMATIC = bk.Automatic()
 
@@ -61,8 +61,10 @@ def test_what_was_asked_for_is_taken() -> None:
 def test_nearly_incompressible_bodies_are_factored() -> None:
     scene = replace(SCENE, discretisation=bk.LinearGalerkin())
     rubber = replace(scene, material=bk.Material(1e4, 0.4999999))
-    assert decide(rubber, rubber.build_mesh(), 1).linear_solver == bk.DenseCholesky()
-    assert decide(scene, scene.build_mesh(), 1).linear_solver == AUTOMATIC
+    choices = [prepare(each, each.build_mesh()).linear_solver for each in (rubber, scene)]
+    assert all(choice.solver == bk.DenseCholesky() for choice in choices)
+    assert choices[0].reason == "asked for"  # whatever their sizes
+    assert choices[1].reason.startswith("Cholesky, because 31 of 120 displacements are open to contact")
     with pytest.raises(
         ValueError, match=r"at the Poisson ratio 0\.4999999, where its rtol leaves errors of 5e-03: choose"
     ):

@@ -16,22 +16,9 @@ from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.linear.solvers import DefiniteOperator, Factor, Krylov, LinearSolver
 from bemkit.operators.material import Material
-from bemkit.plan import (
-    Machine,
-    Plan,
-    Stage,
-    TooLargeError,
-    Wishes,
-    check_elements,
-    check_memory,
-    make_plan,
-    this_machine,
-)
+from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.scene import Clamped, Condition, Contact, MeshOptions, Part, PrescribedDisplacement, Roller, Scene
 from bemkit.scene.toml import load_scene, with_overrides
-
-SLOW = Machine(seconds_per_evaluation=1e-7, seconds_per_flop=1e-9, seconds_per_call=1e-6)
-FAST = Machine(seconds_per_evaluation=1e-8, seconds_per_flop=1e-11, seconds_per_call=1e-7)
 
 
 def plan_of(scene: Scene) -> Plan:
@@ -145,45 +132,25 @@ def test_the_pressure_of_an_incompressible_body_is_one_more_unknown_of_galerkin_
     assert reasons(constant)[name] == "collocation has it among the tractions"
 
 
-def test_a_plan_knows_the_outputs_that_are_asked_for() -> None:
-    plan = plan_of(load_scene("paper-1"))
-    wished = plan.with_outputs(Wishes(result_file=True))
-    outputs = {item.name: item.is_needed for item in wished.items if item.stage is Stage.OUTPUTS}
-    assert outputs == {"result file (h5py)": True, "figures (matplotlib)": False}
-    assert wished.with_outputs(Wishes()) == plan
-    assert sum(wished.seconds(FAST).values()) > sum(plan.seconds(FAST).values())
-
-
 def test_every_item_has_a_reason_and_costs_grow() -> None:
     scene = load_scene("paper-1")
-    small, large = (plan_of(with_overrides(scene, elements=n, discretisation="linear")) for n in (400, 800))
+    small, large, larger = (
+        plan_of(with_overrides(scene, elements=n, discretisation="linear")) for n in (400, 800, 1600)
+    )
     assert all(item.reason for item in small.items)
     assert large.memory == pytest.approx(4 * small.memory, rel=0.1)  # nodes at ends of parts and fixed buffers
-    # the time of dense algebra grows with the cube, that of assembly with the square
-    assert 7.0 < large.seconds(SLOW)[Stage.CONDENSE] / small.seconds(SLOW)[Stage.CONDENSE] < 8.2
+    # the time of dense algebra grows with the cube, that of assembly with the square, and some of it is fixed
+    assert 2.0 < large.seconds / small.seconds < larger.seconds / large.seconds < 8.0
     assert small.as_dict()["memory"] == small.memory
+    assert small.as_dict()["seconds"] == small.seconds
     assert small.as_dict()["work"] == small.work.as_dict()
-    assert all(item["seconds"] >= 0.0 for item in small.as_dict(SLOW)["items"])
-    assert small.as_dict(SLOW)["seconds"] > 10.0 * small.as_dict(FAST)["seconds"] * (1.0 - 1e-12)
+    assert small.as_dict()["items"][0] == {"name": "elements", "needed": True, "reason": "400 on 1 closed curve"}
 
 
-def test_a_machine_is_measured_once() -> None:
-    machine = this_machine()
-    assert machine is this_machine()
-    assert min(machine.seconds_per_evaluation, machine.seconds_per_flop, machine.seconds_per_call) > 0.0
-
-
-def test_a_run_measures_no_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A prediction that nobody asks for costs nothing."""
-
-    def measured(*_: object) -> None:
-        raise AssertionError("the machine was measured")
-
-    this_machine.cache_clear()
-    monkeypatch.setattr("bemkit.plan.machine._best", measured)
-    assert bk.run(block(("right", Roller()))).is_converged
-    with pytest.raises(AssertionError, match="was measured"):
-        this_machine()
+def test_more_load_steps_take_more_time() -> None:
+    scene = load_scene("paper-1")
+    single, twice = (plan_of(dataclasses.replace(scene, load_factors=factors)) for factors in ((1.0,), (0.5, 1.0)))
+    assert single.seconds < twice.seconds < 2.0 * single.seconds
 
 
 TRACED = {
@@ -214,8 +181,6 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
         tracemalloc.stop()
     assert solution.is_converged
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
-    for stage in (Stage.ASSEMBLE, Stage.CONDENSE, Stage.SOLVE, Stage.RECOVER):
-        assert solution.memory[stage.value] == pytest.approx(solution.plan.peaks[stage], rel=0.25), stage
 
 
 def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:

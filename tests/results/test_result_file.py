@@ -273,7 +273,7 @@ def test_a_damaged_list_of_contents_is_named() -> None:
         (deleted("plan"), "plan is missing"),
         (replaced("plan", data=np.bytes_(b"{")), "inconsistent content"),
         (replaced("plan", data=np.bytes_(b"[" * 100_000)), "inconsistent content"),
-        (replaced("plan", data=np.bytes_(b'{"items": 3}')), "inconsistent content .*decisions: missing"),
+        (replaced("plan", data=np.bytes_(b'{"items": 3}')), "inconsistent content .*linear_solver: missing"),
         (deleted("work"), "work is missing"),
         (replaced("work", data=np.bytes_(b'{"element_pairs": "many"}')), "'many' is not a whole number"),
         (deleted("summary"), "summary is missing"),

@@ -11,6 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.runs.nested import run_cascade
 from bemkit.runs.warm_start import state_on
 from bemkit.solvers.active_sets import contact_sets
@@ -58,7 +59,7 @@ def test_a_solution_is_its_own_start() -> None:
 def test_interpolation_keeps_fields_and_units() -> None:
     scene = example(1, "linear", 160)
     solution = bk.run(scene)
-    model = build_model(example(1, "constant", 240), example(1, "constant", 240).build_mesh())
+    model = build_model(prepare(example(1, "constant", 240), example(1, "constant", 240).build_mesh()))
     state = state_on(model, solution)
     x = model.units.to_physical(model.nodes.points)[:, 0]
     contact = solution.contact

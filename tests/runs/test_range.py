@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-import bemkit.runs.run
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.validity.magnitude import check_magnitude
 from bemkit.model.boundary_data import OutOfRangeError
+from bemkit.model.contact_model import Model
 
 ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 
@@ -92,12 +92,11 @@ def test_a_point_that_is_no_number_has_no_magnitude() -> None:
 @pytest.mark.parametrize("is_contact", [True, False])
 def test_results_that_are_not_finite_are_never_converged(is_contact: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever overflows on the way back to physical units."""
-    model = "Model" if is_contact else "ElasticModel"
-    actual = getattr(bemkit.runs.run, model).boundary_fields
+    actual = Model.boundary_fields
 
     def overflowing(*arguments: object) -> object:
         displacement, traction, _ = actual(*arguments)
         return displacement, traction, np.inf
 
-    monkeypatch.setattr(getattr(bemkit.runs.run, model), "boundary_fields", overflowing)
+    monkeypatch.setattr(Model, "boundary_fields", overflowing)
     assert bk.run(block(is_contact=is_contact)).status is bk.Status.NOT_FINITE

@@ -20,7 +20,7 @@ from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Rectangle
 from bemkit.hdf5 import MARK, seal
 from bemkit.operators.material import Material
-from bemkit.plan import make_plan, this_machine
+from bemkit.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
@@ -80,7 +80,7 @@ def test_the_summary_shows_warnings_in_yellow(solution: Solution) -> None:
 
 
 def test_the_plan_shows_warnings(capsys: pytest.CaptureFixture[str], solution: Solution) -> None:
-    print_plan("title", solution.plan, this_machine())
+    print_plan("title", solution.plan)
     assert f"warning: {WORDS[0]}" in capsys.readouterr().out
 
 

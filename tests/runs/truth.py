@@ -9,7 +9,6 @@ import numpy as np
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, QuadraticSpace, break_nodes
-from bemkit.model.contact_model import elastic_map
 from bemkit.operators.boundary import hypersingular, single_layer
 
 
@@ -43,11 +42,12 @@ def cauchy_error(solution: bk.Solution, n_graded: int = 5) -> float:
 
 def fields(solution: bk.Solution) -> tuple[BoundarySpace, FloatArray, BoundarySpace, FloatArray]:
     """Return displacements and tractions with their spaces."""
-    decisions, mesh, modulus = solution.plan.decisions, solution.mesh, solution.scene.material.plane_modulus
-    elastic = elastic_map(decisions, mesh.unit, solution.scene.material.scaled(modulus))
+    discretisation, mesh, modulus = solution.scene.discretisation, solution.mesh, solution.scene.material.plane_modulus
+    material = solution.scene.material.scaled(modulus)
+    elastic = discretisation.elastic_map(mesh.unit, material, solution.plan.linear_solver)
     u = solution.boundary.displacement
     tractions = elastic.tractions(u / mesh.diameter) * modulus  # type: ignore[attr-defined]  # of a Galerkin map
-    return decisions.displacement_space(mesh), u, decisions.traction_space(mesh), tractions
+    return discretisation.displacement_space(mesh), u, discretisation.traction_space(mesh), tractions
 
 
 def bisected(

@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
 from bemkit.runs.run import UnsolvableSceneError, run_history
 from bemkit.scene.load_history import load_steps, with_scaled_loads
@@ -129,9 +130,9 @@ def test_the_body_is_assembled_once_and_loads_are_exact(
     first = dataclasses.replace(first, discretisation=discretisation)
     second = with_scaled_loads(first, 0.6)
     mesh = first.build_mesh()
-    model = build_model(first, mesh)
-    moved = model.under(second)
-    fresh = build_model(second, mesh, model.units)
+    model = build_model(prepare(first, mesh))
+    moved = model.under(model.prepared.under(second))
+    fresh = build_model(prepare(second, mesh, model.units))
     assert len(calls) == 2
     np.testing.assert_allclose(
         moved.body.dense.load, fresh.body.dense.load, atol=1e-12 * np.abs(fresh.body.dense.load).max()

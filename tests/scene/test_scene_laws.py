@@ -10,6 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.contact.piecewise_law import PartwiseLaw
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.scene.shipped import shipped_files
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from tests.scene.test_load_history import block
@@ -51,7 +52,7 @@ def test_each_part_may_have_its_own_law() -> None:
     condition = f"condition = {{ kind = 'contact', obstacle = {OBSTACLE}, law = {law} }}"
     scene = scene_from_toml(PAPER_1.replace(WALL, condition))
     assert scene_from_toml(scene_to_toml(scene)).parts[1].condition.law.friction_coefficient == 0.1
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     parts = model.contact.parts
     assert isinstance(model.problem.law, PartwiseLaw)
     expected = np.where(np.array(parts) == "foundation", 0.5, 0.1)
@@ -64,7 +65,9 @@ def test_each_part_may_have_its_own_law() -> None:
     assert np.all(np.abs(solution.contact.sigma_t[pressed]) <= 0.1 * -solution.contact.sigma_n[pressed] * (1 + 1e-9))
     # a frictionless wall, either by its own law or as a roller that happens to stay in touch, gives one answer
     frictionless = scene_from_toml(PAPER_1.replace(WALL, condition.replace(law, "'frictionless'")))
-    assert {type(law).__name__ for law in build_model(frictionless, frictionless.build_mesh()).problem.law.laws} == {
+    assert {
+        type(law).__name__ for law in build_model(prepare(frictionless, frictionless.build_mesh())).problem.law.laws
+    } == {
         "Coulomb",
         "Frictionless",
     }

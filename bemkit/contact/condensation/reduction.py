@@ -193,13 +193,19 @@ def condense(
     SingularMatrixError
         If even glued contact does not hold the body.
     """
-    space = elastic.displacement_space
-    conditions, contact = contact_conditions(space, supports, candidates)
-    condensed = elastic.condense(conditions, force)
+    conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
+    return condensed_body(elastic, conditions, contact, force)
+
+
+def condensed_body(
+    elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
+) -> CondensedBody:
+    """Reduce a body to its contact boundary, with the conditions and nodes that `contact_conditions` has found."""
     if not contact.nodes.size:
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
+    space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
     is_free = find_tangents(conditions, contact)
     unknowns = find_unknowns(conditions, contact, is_free)
     stiffness = unknowns.to_open.T @ condensed.stiffness @ unknowns.to_open

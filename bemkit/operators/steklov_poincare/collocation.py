@@ -41,7 +41,7 @@ class CollocationMap:
         self.mesh = mesh
         self.material = material
         self.slopes = slopes
-        self.displacement_space = ConstantSpace(mesh)
+        self.displacement_space = self.traction_space = ConstantSpace(mesh)
 
     @cached_property
     def _matrix(self) -> FloatArray:
@@ -71,5 +71,5 @@ class CollocationMap:
         return ColumnExchange(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, 2) tractions."""
-        return force / self.mesh.lengths[:, None]
+        """Return the (n_elements, 1, 2) tractions: forces over lengths."""
+        return force[:, None] / self.mesh.lengths[:, None, None]

@@ -228,20 +228,27 @@ class GalerkinMap:
         return self.layers.tractions(displacement[:, None])[:, 0]
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, 2) mean tractions of V^-1 (1/2 M + K) u."""
-        points, weights = gauss_legendre(self.traction_space.degree + 1)
-        mean = self.traction_space.basis(points) @ weights / 2.0
+        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells."""
         tractions = self.tractions(displacement)
-        at_dofs = tractions[self.traction_space.element_dofs]
-        means: FloatArray = np.einsum("p,epc->ec", mean, at_dofs)
+        at_nodes: FloatArray = tractions[self.traction_space.element_dofs]
         if self.material.is_incompressible and not self.mesh.is_exterior:
             identity = mass(self.displacement_space, self.traction_space).matrix()
             missing = force.ravel() - identity.T @ tractions.ravel()
             pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
-            normals = turned_right(self.mesh.end - self.mesh.start) / self.mesh.lengths[:, None]  # their means
+            normals = self._normals_of_true_mean()
             for elements, pressure in zip(self._pressed, pressures, strict=True):
-                means[elements] += pressure * normals[elements]
-        return means
+                at_nodes[elements] += pressure * normals[elements]
+        return at_nodes
+
+    def _normals_of_true_mean(self) -> FloatArray:
+        """Return the normals (n_elements, n_local, 2) at the local nodes, with the mean of those along the curve."""
+        space, mesh = self.traction_space, self.mesh
+        xi, weights = gauss_legendre(space.degree + 1)
+        normals = mesh.normals_at(np.arange(mesh.n_elements), space.local_nodes)
+        mean = np.einsum("p,epc->ec", space.basis(xi) @ weights / 2.0, normals)
+        true_mean = turned_right(mesh.end - mesh.start) / mesh.lengths[:, None]
+        shifted: FloatArray = normals + (true_mean - mean)[:, None]
+        return shifted
 
 
 def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:

@@ -67,6 +67,10 @@ class SteklovPoincare(Protocol):
     def displacement_space(self) -> BoundarySpace:
         """The space of the displacements; its nodes carry the forces."""
 
+    @property
+    def traction_space(self) -> BoundarySpace:
+        """The space of the tractions."""
+
     def matrix(self) -> FloatArray:
         """Return the weak (n_dofs, n_dofs) matrix [Pa]; its forces are in equilibrium."""
 
@@ -77,4 +81,10 @@ class SteklovPoincare(Protocol):
         """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, 2) mean tractions [Pa] that belong to what `CondensedMap.recover` gives."""
+        """Return the tractions [Pa] that belong to what `CondensedMap.recover` gives.
+
+        Returns
+        -------
+        (n_elements, n_local, 2) array [Pa]
+            At the local nodes of the traction space, element by element; the caller's own.
+        """

@@ -10,7 +10,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.scene import ConstantCollocation, Discretisation, Scene
+from bemkit.scene.scene import Discretisation, Scene
 from bemkit.solvers.base import ContactSolver
 from bemkit.studies.engine import StudyError
 
@@ -136,7 +136,7 @@ class Run:
     @property
     def map(self) -> str:
         """Name of the Steklov-Poincare map that belongs to the elements."""
-        return "collocation" if isinstance(self.element, ConstantCollocation) else "Galerkin"
+        return self.element.method
 
     @property
     def solver(self) -> str:
@@ -183,7 +183,7 @@ def all_runs(
             Run(sequence.name, size, scene, element, sequence.options(scene, size), solver)
             for element in discretisations
             for sequence in meshes
-            if not (isinstance(element, ConstantCollocation) and isinstance(sequence, AdaptiveMeshes))
+            if element.estimates_error or not isinstance(sequence, AdaptiveMeshes)
             for solver in solvers
             for size in sequence.sizes
         )

@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
@@ -144,7 +145,7 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
     is_same_mesh = one.n_contact == other.n_contact
     worst = 0.0
     for part in dict.fromkeys(one.part):
-        rows, others = (np.array([name == part for name in table.part]) for table in (one, other))
+        rows, others = (table.rows(part) for table in (one, other))
         if not others.any():
             return math.inf
         places, scaled_places = one.s[rows], other.s[others] / similarity.length
@@ -174,10 +175,11 @@ def condition_number(scene: Scene, case: Case) -> float:
     """Return the condition number of the contact stiffness of a scene; see `StabilityRecord`."""
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
-        body = build_model(scene, mesh).body
-        diagonal = np.abs(np.diagonal(body.dense.stiffness))
+        body = build_model(prepare(scene, mesh)).body
+        stiffness = body.condensed.stiffness
+        diagonal = np.abs(np.diagonal(stiffness))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        singular = np.linalg.svd(scale[:, None] * body.dense.stiffness * scale, compute_uv=False)
+        singular = np.linalg.svd(scale[:, None] * stiffness * scale, compute_uv=False)
     smallest = float(singular[max(singular.size - 1 - len(body.rigid_motions()), 0)])
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 

@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.solvers.alm import BoundUpdate
 from bemkit.testing.lemke import LemkePivoting
 
@@ -159,7 +160,7 @@ def test_the_tie_on_the_whole_body_ends_whatever_the_driver() -> None:
         ),
         mesh=bk.MeshOptions(elements=60),
     )
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     for driver in DRIVERS.values():
         solution = bk.solve(model.problem, driver, throw=False)
         assert solution.is_converged or solution.status is bk.Status.STALLED

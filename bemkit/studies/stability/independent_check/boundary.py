@@ -8,7 +8,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import ConstantCollocation, QuadraticGalerkin
 
 _N_POINTS = 8
 """Gauss points of an element: exact for products of loads and displacements of degree 15."""
@@ -56,14 +55,8 @@ def boundary_of(solution: Solution) -> Boundary:
     """Return the elements of a solution with quadrature points, normals and interpolation."""
     mesh = solution.mesh
     places, weights = np.polynomial.legendre.leggauss(_N_POINTS)
-    ends = mesh.elements
-    middles = len(solution.boundary.points) - mesh.n_elements + np.arange(mesh.n_elements)
-    if isinstance(solution.scene.discretisation, ConstantCollocation):
-        node_places, nodes = np.zeros(1), np.arange(mesh.n_elements)[:, None]
-    elif isinstance(solution.scene.discretisation, QuadraticGalerkin):
-        node_places, nodes = np.array([-1.0, 0.0, 1.0]), np.column_stack([ends[:, 0], middles, ends[:, 1]])
-    else:
-        node_places, nodes = np.array([-1.0, 1.0]), ends
+    space = solution.scene.discretisation.displacement_space(mesh)  # which tells the rows of a result apart, no more
+    node_places, nodes = space.local_nodes, space.element_dofs
     elements = np.arange(mesh.n_elements)
     fitted = np.polynomial.legendre.leggauss(_N_FITTED)[0]
     curve = mesh.points(elements, fitted) - mesh.centre

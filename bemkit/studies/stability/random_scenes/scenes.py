@@ -122,7 +122,7 @@ def _collocation(random: np.random.Generator) -> Discretisation:
 
 
 def _mesh(random: np.random.Generator, shape: Any, discretisation: Discretisation) -> MeshOptions:
-    if not isinstance(discretisation, ConstantCollocation) and chance(random, 0.04):
+    if discretisation.estimates_error and chance(random, 0.04):
         return MeshOptions(accuracy=decades(random, -2.0, -0.7), most_elements=int(random.integers(40, 100)))
     low, high = one_by_weight(random, {(3, 9): 0.08, (10, 40): 0.67, (41, 80): 0.2, (81, 160): 0.05})
     gradings: dict[Grading, float] = {
@@ -151,7 +151,7 @@ def _solver(random: np.random.Generator) -> ContactSolver:
 def _linear_solver(random: np.random.Generator, discretisation: Discretisation, material: Material) -> LinearSolverWish:
     wishes: dict[LinearSolverWish, float] = {Automatic(): 7.0, DenseCholesky(): 1.0, Krylov(): 2.0}
     is_too_inexact = Krylov().error_at(material) > LARGEST_KRYLOV_ERROR
-    if isinstance(discretisation, ConstantCollocation) or is_too_inexact:  # scenes refuse both
+    if not discretisation.is_symmetric or is_too_inexact:  # scenes refuse both
         del wishes[Krylov()]
     return one_by_weight(random, wishes)
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.plan.decisions import Decisions, Formulation
 
 _LONGEST = 0.75
 """Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
@@ -17,12 +16,11 @@ _FACING = -0.5
 _ROWS = 256
 
 
-def thinness_warnings(decisions: Decisions, mesh: BoundaryMesh) -> tuple[str, ...]:
+def thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
     """Warn if elements of collocation are too long for the thickness of the body.
 
     Parameters
     ----------
-    decisions : Decisions
     mesh : BoundaryMesh
 
     Returns
@@ -30,7 +28,7 @@ def thinness_warnings(decisions: Decisions, mesh: BoundaryMesh) -> tuple[str, ..
     tuple of str
         One sentence or none.
     """
-    if decisions.formulation is not Formulation.COLLOCATION or mesh.is_exterior:
+    if mesh.is_exterior:
         return ()
     longest = mesh.lengths / thicknesses(mesh)
     is_thin = longest > _LONGEST

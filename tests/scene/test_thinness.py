@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry import BoundaryMesh, discretise
-from bemkit.plan.decisions import Decisions, decide
-from bemkit.plan.thinness import thicknesses, thinness_warnings
+from bemkit.geometry import discretise
+from bemkit.plan import make_plan
+from bemkit.scene.thinness import thicknesses
 
 
-def planned(shape: object, n: int, discretisation: object) -> tuple[Decisions, BoundaryMesh]:
+def warned(shape: object, n: int, discretisation: object) -> tuple[str, ...]:
     scene = bk.Scene(
         title="thin",
         shape=shape,  # type: ignore[arg-type]
@@ -20,8 +20,7 @@ def planned(shape: object, n: int, discretisation: object) -> tuple[Decisions, B
         parts=(),
         discretisation=discretisation,  # type: ignore[arg-type]
     )
-    mesh = scene.build_mesh()
-    return decide(scene, mesh, 1), mesh
+    return make_plan(scene, scene.build_mesh()).warnings
 
 
 @pytest.mark.parametrize("symmetry", [None, bk.Symmetry(x=0.0, y=0.0)])
@@ -49,11 +48,11 @@ def test_thickness_of_a_ring_and_of_a_strip(symmetry: bk.Symmetry | None) -> Non
     ],
 )
 def test_collocation_of_thin_bodies_is_warned_of(shape: object, n: int, is_weak: bool) -> None:
-    found = thinness_warnings(*planned(shape, n, bk.ConstantCollocation()))
+    found = warned(shape, n, bk.ConstantCollocation())
     assert len(found) == is_weak
     if is_weak:
         assert "bends too stiffly: take" in found[0]
-    assert thinness_warnings(*planned(shape, n, bk.LinearGalerkin())) == ()
+    assert warned(shape, n, bk.LinearGalerkin()) == ()
 
 
 def test_the_warning_reaches_plan_and_solution() -> None:

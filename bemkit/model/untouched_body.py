@@ -1,0 +1,138 @@
+"""A body without contact nodes: all of it is solved for at once, and the equilibrium of all forces certifies it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.certificate import Certificate
+from bemkit.contact.conditions import LinearConditions
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.counts import Work
+from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
+from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.steklov_poincare import CondensedMap
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.solvers.base import ContactSolution, Status, StepRecord
+
+_TOLERANCE = 1e-9
+"""Of the certificate, as for contact."""
+
+
+@dataclass(frozen=True, eq=False)
+class UntouchedBody:
+    """An elastic body held by its supports alone; fulfils `LinearBody` with no contact node.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        Of the displacements.
+    conditions : NodalConditions
+        Supports; every other direction is free.
+    force : (n_nodes, 2) array [N/m]
+        Given nodal forces.
+    condensed : CondensedMap
+        Without open directions: all that is unknown has been solved for.
+    """
+
+    space: BoundarySpace
+    conditions: NodalConditions
+    force: FloatArray
+    condensed: CondensedMap
+
+    n_contact = 0
+    stiffness_scale = 1.0
+
+    @property
+    def weights(self) -> FloatArray:
+        """(0,) array [m]."""
+        return np.zeros(0)
+
+    @property
+    def tangent_is_free(self) -> BoolArray:
+        """(0,) bool array."""
+        return np.zeros(0, bool)
+
+    @property
+    def is_held(self) -> BoolArray:
+        """(0,) bool array."""
+        return np.zeros(0, bool)
+
+    @property
+    def work(self) -> Work:
+        """What it took to come here, from the operators on."""
+        return self.condensed.work
+
+    def respond(self, conditions: LinearConditions) -> ContactState:
+        """Return the state without nodes."""
+        return untouched_state()
+
+    def rigid_motions(self) -> FloatArray:
+        """Return the motions that only contact can hold: none, the supports hold the body."""
+        return np.zeros((0, 0, 2))
+
+    def rigid_load(self) -> FloatArray:
+        """Return the work of the load on each of these motions."""
+        return np.zeros(0)
+
+    def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
+        return self.condensed.recover(np.zeros(0))
+
+    def under(self, displacement: FloatArray, force: FloatArray) -> UntouchedBody:
+        """Return the same body under other prescribed displacements and nodal forces; nothing is factored again."""
+        condensed = self.condensed.under(force, displacement)
+        condensed = replace(condensed, work=self.condensed.work + condensed.work)
+        return replace(
+            self, conditions=replace(self.conditions, displacement=displacement), force=force, condensed=condensed
+        )
+
+    def imbalance(self, state: ContactState) -> Imbalance:
+        """Return how far the forces are from those given on free directions, and all together from equilibrium."""
+        displacement, force = self.recover(state)
+        points, balanced = dof_points(self.space), possible_motions(self.space.mesh)
+        round_off = round_off_of(displacement, self.condensed.sensitivity)
+        total = float(np.abs(force).sum()) or 1.0
+        missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
+        residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
+        return residual.joined(resultant_imbalance(points, force, balanced, round_off))
+
+
+def untouched_state() -> ContactState:
+    """Return the contact state without nodes."""
+    return ContactState(np.zeros((0, 2)), np.zeros((0, 2)))
+
+
+def certified(body: UntouchedBody, callback: Callable[[StepRecord], None] | None = None) -> ContactSolution:
+    """Return the verdict on the displacements of a body, in the form in which contact problems have theirs.
+
+    Parameters
+    ----------
+    body : UntouchedBody
+    callback : callable, optional
+        Receives the only record.
+
+    Returns
+    -------
+    ContactSolution
+        CONVERGED if all forces are in equilibrium.
+    """
+    state = untouched_state()
+    off = body.imbalance(state)
+    certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, off.force, off.moment, off.round_off)
+    if not np.isfinite(body.recover(state)[0]).all():
+        status, message = Status.NOT_FINITE, Status.NOT_FINITE.value
+    elif certificate.is_below(_TOLERANCE):
+        status, message = Status.CONVERGED, "All forces are in equilibrium to the tolerance asked for."
+    else:
+        status = Status.STALLED
+        message = "Round-off leaves the forces out of equilibrium; use fewer or less unequal elements."
+    message += f" [worst certificate entry {certificate.worst:.1e}]"
+    record = StepRecord(0, 1, certificate, float("inf"), 0, 0, 0, 0, "")
+    if callback is not None:
+        callback(record)
+    return ContactSolution(state, status, certificate, np.zeros(0, np.intp), 0, 1, message, (record,))

@@ -1,0 +1,302 @@
+"""What a Steklov-Poincare map takes, foreseen from sizes alone: items, counts, memory and operations.
+
+Counts are exact. Memory adds up the matrices that are alive at the same time; the buffers of assembly in it, and the
+evaluations of its integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, Work
+from bemkit.operators.integrals.sweep import CHUNK_PAIRS
+from bemkit.operators.linear.choice import krylov_cost
+from bemkit.operators.linear.solvers import Choice, Krylov
+from bemkit.operators.linear.threads import n_threads
+from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.prescribed import GivenData
+
+_BYTES = 8
+
+
+@dataclass(frozen=True)
+class PlanItem:
+    """One thing that is needed or left out, and why.
+
+    Parameters
+    ----------
+    name : str
+    is_needed : bool
+    reason : str
+    """
+
+    name: str
+    is_needed: bool
+    reason: str
+
+    def as_dict(self) -> dict[str, str | bool]:
+        """Return the entries as JSON can hold them."""
+        return {"name": self.name, "needed": self.is_needed, "reason": self.reason}
+
+
+@dataclass(frozen=True, eq=False)
+class BodyCase:
+    """A body whose map is planned.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    conditions : NodalConditions
+        The contact nodes open.
+    loads : tuple of GivenData
+        Given forces and displacements of each load step.
+    linear_solver : Choice
+        Taken for a symmetric map.
+    """
+
+    mesh: BoundaryMesh
+    material: Material
+    conditions: NodalConditions
+    loads: tuple[GivenData, ...]
+    linear_solver: Choice
+
+    @property
+    def n_displacements(self) -> int:
+        """Components of all nodes."""
+        return self.conditions.is_fixed.size
+
+    @property
+    def n_fixed(self) -> int:
+        """Components that supports prescribe."""
+        return int(np.count_nonzero(self.conditions.is_fixed))
+
+    @property
+    def n_free(self) -> int:
+        """Components of known force."""
+        return int(np.count_nonzero(self.conditions.is_free))
+
+    @property
+    def n_open(self) -> int:
+        """Components that contact decides."""
+        return int(np.count_nonzero(self.conditions.is_open))
+
+    @property
+    def n_curved(self) -> int:
+        """Curved elements."""
+        return int(np.count_nonzero(~self.mesh.is_straight))
+
+
+@dataclass(frozen=True)
+class BodyNeeds:
+    """What the map of a body takes until it is condensed, and what of it is kept.
+
+    Parameters
+    ----------
+    items : tuple of PlanItem
+    work : Work
+        What `CondensedMap.work` will count after the last load step.
+    memory : int [bytes]
+        Largest sum of what exists at the same time.
+    kept : int [bytes]
+        Of what is alive while the contact problem is solved.
+    evaluations : float
+        Of closed-form integrals, at one point for one element, on each thread.
+    flops : float
+        Of dense linear algebra.
+    warnings : tuple of str
+        What will be doubtful about the result, one sentence each.
+    """
+
+    items: tuple[PlanItem, ...] = ()
+    work: Work = field(default_factory=Work)
+    memory: int = 0
+    kept: int = 0
+    evaluations: float = 0.0
+    flops: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+
+def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
+    """Return what a symmetric Galerkin map takes.
+
+    Parameters
+    ----------
+    case : BodyCase
+    n_tractions : int
+        Components of all traction dofs.
+    degree : int
+        Of the displacements.
+
+    Returns
+    -------
+    BodyNeeds
+    """
+    t, u, f, o = n_tractions, case.n_displacements, case.n_free, case.n_open
+    mesh, solver = case.mesh, case.linear_solver.solver
+    assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
+    holds_volume = case.material.is_incompressible and not mesh.is_exterior
+    n_pressures = len(mesh.loops) if holds_volume else int(not mesh.is_exterior)
+    # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
+    n_columns = len(possible_motions(mesh)) + n_pressures + min(n_pressures, 1) + o + len(case.loads)
+    factorisations = [Factorisation(FactorKind.CHOLESKY, t)]
+    if solver.forms_matrix:
+        n_columns += u
+        factorisations.append(Factorisation(FactorKind.CHOLESKY, f))
+        # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
+        largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
+        own = f * f + 2 * f * o + u * case.n_fixed
+        largest, kept = max(largest, assembled + 2 * u * u + own + o * o), assembled + own
+        flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * o + 2.0 * f * o * o)
+    else:
+        # two of the free part of W, while it is factored, and the blocks of the iteration
+        iterating = assembled + 2 * f * f + int(13.5 * u * (o + 1))
+        largest = t * t + max(3 * t * u + u * u, t * u + 3 * u * u if is_curved else 0)
+        largest, kept = max(largest, iterating), assembled + f * f + 3 * u * (o + 1)
+        flops = krylov_cost(u, o).flops
+    work = Work(
+        element_pairs=mesh.n_elements * mesh.whole.n_elements,
+        single_layer=Entries.full(t, t),
+        double_layer=Entries.full(t, u),
+        hypersingular=Entries.full(u, u),
+        factorisations=tuple(factorisations),
+        right_hand_sides=n_columns,
+    )
+    # bytes for each element and at most, of close pairs; for each element kept; for each pair of a chunk
+    close, most, listed, swept = (38e3, 14.5e6, 4e3, 160.0) if degree < 2 else (50e3, 13e6, 24e3, 160.0)
+    n = mesh.whole.n_elements
+    buffers = max(min(close * n, most), swept * _pairs_in_chunks(mesh)) + listed * n
+    memory = int(max(_BYTES * assembled + buffers, _BYTES * largest))
+    straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
+    evaluations = _evaluations(case, straight, curved)
+    return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
+
+
+def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
+    t, u, choice = n_tractions, case.n_displacements, case.linear_solver
+    inverse = f"V^-1 by Cholesky, because V is symmetric and positive definite; order {t}"
+    if not choice.solver.forms_matrix:
+        inverse += "; products with it are enough, it is not formed"
+    is_incompressible = case.material.is_incompressible and not case.mesh.is_exterior
+    volume = "Poisson's ratio is 1/2" if is_incompressible else "the body is compressible"
+    return (
+        PlanItem("single layer V", True, f"maps tractions to displacements; symmetric; {t} x {t}"),
+        PlanItem("double layer K", True, f"maps displacements to displacements; {t} x {u}"),
+        PlanItem("adjoint double layer K'", False, "it is the transpose of K"),
+        PlanItem("hypersingular operator W", True, f"makes the Steklov-Poincare map symmetric; {u} x {u}"),
+        PlanItem("Steklov-Poincare map", True, inverse),
+        PlanItem("linear solver of the body", True, f"{choice.reason}; order {case.n_free}"),
+        _multigrid(case),
+        PlanItem("pressure that keeps the volume", is_incompressible, volume),
+    )
+
+
+def _multigrid(case: BodyCase) -> PlanItem:
+    name, solver = "algebraic multigrid (pyamg)", case.linear_solver.solver
+    if solver.forms_matrix:
+        return PlanItem(name, False, "the linear solver is direct")
+    if not isinstance(solver, Krylov):
+        return PlanItem(name, False, f"the linear solver is {type(solver).__name__}")
+    if case.n_free <= solver.coarsest:
+        reason = f"the preconditioner is factored: its order {case.n_free} does not exceed {solver.coarsest}"
+        return PlanItem(name, False, reason)
+    return PlanItem(name, True, "preconditions the conjugate gradients")
+
+
+def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
+    """Return what direct collocation with exchanged columns takes.
+
+    Parameters
+    ----------
+    case : BodyCase
+    takes_slopes : bool
+        Whether the double layer takes slopes between neighbouring elements.
+
+    Returns
+    -------
+    BodyNeeds
+    """
+    u, o, mesh = case.n_displacements, case.n_open, case.mesh
+    n_single, n_double = case.n_fixed + o, case.n_free + o
+    sweeps = _different_loads(case)
+    n_loaded, n_moved = sum(each.n_loaded for each in sweeps), sum(each.n_moved for each in sweeps)
+    order = u + len(possible_motions(mesh)) + len(mesh.loops)
+    n_elements = mesh.n_elements  # all of them for the first data, later those with tractions if these suffice
+    for later in sweeps[1:]:
+        n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
+    work = Work(
+        element_pairs=n_elements * mesh.whole.n_elements,
+        single_layer=Entries.full(u, n_single) + Entries(u * n_loaded),
+        double_layer=Entries.full(u, n_double) + Entries(u * n_moved),
+        factorisations=(Factorisation(FactorKind.LU, order),),
+        right_hand_sides=o + len(sweeps),
+    )
+    # the system and its right-hand sides, and what LU copies of them
+    system = (u + len(possible_motions(mesh))) ** 2
+    memory = _BYTES * (system + u * o) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * o))
+    evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
+    flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * o)
+    items = _collocation_items(case, order, n_loaded, n_moved, takes_slopes)
+    return BodyNeeds(items, work, memory, _BYTES * (system + u * o), evaluations, flops)
+
+
+def _different_loads(case: BodyCase) -> list[GivenData]:
+    """Return the given data of the load steps that are no multiple of those before."""
+    found: list[GivenData] = []
+    for data in case.loads:
+        if not found or data.factor_of(found[-1]) is None:
+            found.append(data)
+    return found
+
+
+def _collocation_items(
+    case: BodyCase, order: int, n_loaded: int, n_moved: int, takes_slopes: bool
+) -> tuple[PlanItem, ...]:
+    u, n_single, n_double = case.n_displacements, case.n_fixed + case.n_open, case.n_free + case.n_open
+    n_given = n_loaded + n_moved
+    given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
+    slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
+    volume = "collocation has it among the tractions" if case.material.is_incompressible else "the body is compressible"
+    one_equation = "collocation takes the displacement equation alone"
+    return (
+        PlanItem("single layer V", True, f"unknown tractions: held and open directions; {u} x {n_single}"),
+        _zero_columns("columns of V on the free surface", "the traction is zero there", u - n_single - n_loaded, u),
+        PlanItem("double layer K", True, f"unknown displacements: free and open directions; {u} x {n_double}"),
+        _zero_columns("columns of K where supports hold", "the displacement is zero there", u - n_double - n_moved, u),
+        PlanItem("storage of columns under given data", False, given),
+        PlanItem("slopes between constant elements", takes_slopes, slopes),
+        PlanItem("adjoint double layer K'", False, one_equation),
+        PlanItem("hypersingular operator W", False, one_equation),
+        PlanItem(
+            "linear solver of the body",
+            True,
+            f"LU, because the equations of collocation are not symmetric; order {order}",
+        ),
+        PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
+        PlanItem("pressure that keeps the volume", False, volume),
+    )
+
+
+def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanItem:
+    if n_columns <= 0:
+        return PlanItem(name, True, "no column can be left out")
+    return PlanItem(name, False, f"{reason}; {n_columns} of {n_all} columns")
+
+
+def _pairs_in_chunks(mesh: BoundaryMesh) -> int:
+    """Return how many element pairs are evaluated at the same time."""
+    n_pairs = mesh.n_elements * mesh.whole.n_elements
+    return min(n_pairs, n_threads(n_pairs) * CHUNK_PAIRS)
+
+
+def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[float, float]) -> float:
+    """Return the evaluations of one sweep: for each pair, and for the close pairs of each element."""
+    mesh, share = case.mesh, case.n_curved / case.mesh.n_elements
+    far, near = ((1.0 - share) * one + share * other for one, other in zip(straight, curved, strict=True))
+    n_sources = mesh.whole.n_elements
+    return mesh.n_elements * (n_sources * far + near) / n_threads(mesh.n_elements * n_sources)

@@ -1,0 +1,212 @@
+"""Solve scenes that follow each other in time on one mesh: from what the user states to certified results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.contact_model import Model, build_model
+from bemkit.model.contact_warnings import contact_warnings
+from bemkit.model.energy import with_energy_checked
+from bemkit.model.free_motion import describe
+from bemkit.model.held_friction import with_held_friction
+from bemkit.model.prepared import Prepared, prepare_steps
+from bemkit.model.untouched_body import UntouchedBody, certified
+from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.stopwatch import assembly_time
+from bemkit.plan import Plan, check_elements, check_memory, plan_steps
+from bemkit.results.solution import BoundaryFields, ContactTable, Solution, find_transitions
+from bemkit.results.totals import with_totals
+from bemkit.results.warnings import find_warnings
+from bemkit.runs.timing import Stage, StageClock
+from bemkit.runs.warm_start import state_on
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.scene import NoContactError, Scene
+from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
+
+
+class UnsolvableSceneError(InputError):
+    """The scene has no solution; the message says why."""
+
+
+def run_history(
+    scenes: Sequence[Scene],
+    *,
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> tuple[Solution, ...]:
+    """Solve scenes that follow each other in time, slip counting from the end of the step before.
+
+    The body is factored once for all steps.
+
+    Parameters
+    ----------
+    scenes : sequence of Scene
+        One body under changing loads, obstacles or laws; a scene with several load factors stands for as many steps.
+    mesh, start, callback : optional
+        As for `run`.
+
+    Returns
+    -------
+    tuple of Solution
+        One for each step, up to the first that does not converge.
+
+    Raises
+    ------
+    UnsolvableSceneError, ValueError
+        As for `run`, also if the scenes differ by more than numbers.
+    """
+    steps = [step for scene in scenes for step in load_steps(scene)]
+    if not steps:
+        raise InputError("scenes is empty: give at least one scene")
+    prepared, plan, clock = prepared_and_planned(steps, mesh)
+    with blas_threads_for(plan.sizes.n_displacements):
+        return tuple(_solve_in_turn(prepared, plan, start, callback, clock))
+
+
+def prepared_and_planned(
+    steps: Sequence[Scene], mesh: BoundaryMesh | None
+) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
+    """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
+    clock = StageClock.start()
+    if mesh is None:
+        check_elements(steps[0])
+        mesh = steps[0].build_mesh()
+    prepared = prepare_steps(steps, mesh)
+    plan = plan_steps(prepared)
+    check_memory(plan)
+    return prepared, plan, clock.closed(Stage.MESH)
+
+
+def run_on_mesh(
+    scene: Scene,
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> Solution:
+    """Solve a scene on one mesh; of a load history return the last step with the solves, records and times of all."""
+    steps = run_history([scene], mesh=mesh, start=start, callback=callback)
+    if len(scene.load_factors) == 1:
+        return steps[0]
+    names = [f"load step {number} of {len(scene.load_factors)}" for number in range(1, len(steps) + 1)]
+    return replace(
+        with_totals(steps[-1], steps, names),
+        scene=scene,
+        message=f"{names[-1]}: {steps[-1].message}",
+        warnings=tuple(dict.fromkeys(warning for step in reversed(steps) for warning in step.warnings)),
+    )
+
+
+def _solve_in_turn(
+    steps: Sequence[Prepared],
+    plan: Plan,
+    start: Solution | None,
+    callback: Callable[[StepRecord], None] | None,
+    clock: StageClock,
+) -> list[Solution]:
+    if start is not None and not steps[0].scene.contact_parts:
+        raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+    model, clock = built(steps[0], clock)
+    state = None if start is None else state_on(model, start)
+    solutions: list[Solution] = []
+    for step in steps:
+        if solutions and state is not None:
+            model = model.under(step)
+            model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
+        clock = clock.closed(Stage.CONDENSE)
+        result = with_energy_checked(model, _solved(model, state, callback))
+        clock = clock.closed(Stage.SOLVE)
+        solutions.append(solution_of(model, result, plan, clock))
+        clock = StageClock.start()
+        state = result.state
+        if not result.is_converged:
+            break
+    return solutions
+
+
+def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
+    """Assemble and condense the body of a scene."""
+    with assembly_time() as assembly:
+        model = build_model(prepared)
+    return model, clock.closed_build(assembly)
+
+
+def _solved(model: Model, start: ContactState | None, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
+    if isinstance(model.body, UntouchedBody):
+        return certified(model.body, callback)
+    result = solve(model.problem, model.scene.solver, start=start, throw=False, callback=callback)
+    if not result.history:
+        load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+        raise UnsolvableSceneError(result.message if load is None else describe(model.prepared, load))
+    return result
+
+
+def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageClock) -> Solution:
+    """Turn what the driver found into physical fields."""
+    state, node_status = with_held_friction(model, result.state, result.node_status)
+    displacement, traction_dofs, energy = model.boundary_fields(state)
+    table = _contact_table(model, state, node_status, displacement)
+    transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
+    warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
+    points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
+    fields = BoundaryFields(points, displacement, centres, model.mean_tractions(traction_dofs), traction_dofs)
+    clock = clock.closed(Stage.RECOVER)
+    if result.is_converged and not (
+        np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction_dofs).all()
+    ):
+        result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
+    solution = Solution(
+        scene=model.scene,
+        mesh=model.mesh,
+        status=result.status,
+        certificate=result.certificate,
+        contact=table,
+        boundary=fields,
+        history=result.history,
+        linear_solves=result.linear_solves,
+        outer_steps=result.steps,
+        force_normal=float(np.sum(-table.weight * table.sigma_n)),
+        force_tangential=float(np.sum(table.weight * table.sigma_t)),
+        energy=energy,
+        transitions=transitions,
+        timings=clock.timings,
+        memory=clock.memory,
+        plan=plan,
+        work=model.work,
+        message=result.message,
+    )
+    return replace(solution, warnings=(*find_warnings(solution), *warnings))
+
+
+def _contact_table(
+    model: Model, state: ContactState, node_status: IntArray, boundary_displacement: FloatArray
+) -> ContactTable:
+    units, contact = model.units, model.contact
+    tangents = model.nodes.frame[:, 1]
+    # where the tangent is no unknown the body itself says how it moves
+    u_t = np.sum(boundary_displacement[model.nodes.nodes] * tangents, axis=1)
+    u_t = np.where(model.body.tangent_is_free, u_t, state.u_t * units.displacement)
+    displacement = state.displacement * units.displacement
+    return ContactTable(
+        part=contact.parts,
+        x=contact.points[:, 0].copy(),
+        y=contact.points[:, 1].copy(),
+        s=contact.arc_length.copy(),
+        u_n=displacement[:, 0].copy(),
+        u_t=u_t,
+        sigma_n=state.sigma_n * units.stress,
+        sigma_t=state.sigma_t * units.stress,
+        gap=contact.gap.copy(),
+        clearance=contact.gap - displacement[:, 0],
+        status=np.asarray(node_status).copy(),
+        weight=model.nodes.weights * units.length,
+    )
