@@ -1,19 +1,20 @@
-"""What the command line prints for people: the summary, the plan and the convergence table."""
+"""What the command line prints for people: summary, plan, convergence table, and what a run took."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
+from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
+from bemkit.operators.counts import Work
 from bemkit.plan import Plan
 from bemkit.results.solution import Solution
+from bemkit.results.streams import plain_table, stdout_console
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
 
@@ -29,7 +30,7 @@ def print_summary(solution: Solution, console: Console | None = None) -> None:
     console : rich.console.Console, optional
         Standard output by default.
     """
-    console = Console(highlight=False) if console is None else console
+    console = stdout_console(console)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
@@ -42,11 +43,8 @@ def print_summary(solution: Solution, console: Console | None = None) -> None:
 
 def print_plan(title: str, plan: Plan) -> None:
     """Print what a scene needs and what it leaves out, and the time and memory of all."""
-    console = Console(highlight=False)
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    table.add_column("")
-    table.add_column("item", overflow="fold")
-    table.add_column("why", overflow="fold")
+    console = stdout_console()
+    table = plain_table(("", "item", "why"), gap=2)
     for item in plan.items:
         style = "" if item.is_needed else "dim"
         mark = Text("needed", style="green") if item.is_needed else Text("left out", style="dim")
@@ -89,6 +87,65 @@ class ConvergenceTable:
             f"{record.n_slip:6d}  {record.n_changed:7d}  {record.certificate.worst:8.1e}"
         )
         self._console.print(Text(f"{line}  {record.message}".rstrip()))
+
+
+def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
+    """Print planned against measured time and memory, the counts, and what was left out.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of a run whose memory was traced, which makes small scenes about twice as slow.
+    output_seconds : float [s]
+        What writing its outputs took.
+    to_stderr : bool
+        Whether standard output is taken by data.
+    """
+    console = Console(stderr=to_stderr, highlight=False)
+    console.print(Group(_stages(solution, output_seconds), _counts(solution.plan.work, solution.work)))
+    console.print(_left_out(solution))
+
+
+def _stages(solution: Solution, output_seconds: float) -> Table:
+    table = plain_table(("stage",), ("time", "memory"), gap=2)
+    for name, seconds in solution.timings.items():
+        if name != "total":
+            size = solution.memory.get(name, 0)
+            table.add_row(name, format_seconds(seconds), format_size(size) if size else "")
+    table.add_row("outputs", format_seconds(output_seconds), "")
+    table.add_section()
+    memory = format_size(max(solution.memory.values(), default=0))
+    table.add_row("all", format_seconds(solution.timings["total"] + output_seconds), memory)
+    table.add_row("planned", format_seconds(solution.plan.seconds), format_size(solution.plan.memory))
+    return table
+
+
+def _counts(planned: Work, counted: Work) -> Table:
+    table = plain_table(("what was computed",), gap=2)
+    for name in ("planned", "counted"):
+        table.add_column(name, justify="right", overflow="fold")
+    for (name, one), (_, other) in zip(_lines(planned), _lines(counted), strict=True):
+        table.add_row(name, one, Text(other, style="" if one == other else "bold red"))
+    return table
+
+
+def _lines(work: Work) -> Iterator[tuple[str, str]]:
+    yield "element pairs integrated", f"{work.element_pairs:,}"
+    for name, entries in (("V", work.single_layer), ("K", work.double_layer), ("W", work.hypersingular)):
+        yield f"entries of {name} computed", f"{entries.computed:,}"
+        yield f"entries of {name} stored", f"{entries.stored:,}"
+    factorisations = ", ".join(f"{one.kind.value} {one.order}" for one in work.factorisations)
+    yield "factorisations and their orders", factorisations or "none"
+    yield "right-hand sides", f"{work.right_hand_sides:,}"
+    yield "unknowns of the contact system", f"{work.contact_unknowns:,}"
+
+
+def _left_out(solution: Solution) -> Table:
+    table = plain_table(("left out", "why"), gap=2)
+    for item in solution.plan.items:
+        if not item.is_needed:
+            table.add_row(item.name, item.reason)
+    return table
 
 
 def format_size(n_bytes: int) -> str:

@@ -126,7 +126,7 @@ def run(
 
         print_summary(solution)
     if explain:
-        from bemkit.cli.explain import print_explanation
+        from bemkit.cli.console import print_explanation
 
         print_explanation(solution, output_seconds, to_stderr=wanted.uses_stdout)
     if solution.is_converged:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemkit.results.drawing import BLUE, VERMILION, label_values, panel_above_strip
 from bemkit.results.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-NORMAL, TANGENTIAL, FREE, PARTS = "#0072B2", "#D55E00", "#F2F2F2", ("#C6DBEA", "#F3D9B1")
+FREE, PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
 _READABLE = 0.06
 """Share of the boundary from which on a piece is long enough for its name."""
 
@@ -32,31 +33,23 @@ def draw_boundary_traction(solution: Solution, *, length: str = "m", stress: str
     matplotlib.figure.Figure
         Closed curves of the boundary follow each other; a line marks where each of them begins.
     """
-    from matplotlib.figure import Figure
-
     mesh, traction = solution.mesh, solution.boundary.traction
     order = np.concatenate(mesh.loops)
     s = np.append(0.0, np.cumsum(mesh.lengths[order]))
     normals = mesh.normals[order]
     tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
-    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
-    axes, strip = figure.subplots(2, 1, sharex=True, height_ratios=[9, 1])
+    title = f"Tractions on the boundary\n{solution.scene.title}"
+    figure, axes, strip = panel_above_strip(title, f"arc length $s$ [{length}]")
     for directions, colour, label in (
-        (normals, NORMAL, r"normal $t_n$"),
-        (tangents, TANGENTIAL, r"tangential $t_t$"),
+        (normals, BLUE, r"normal $t_n$"),
+        (tangents, VERMILION, r"tangential $t_t$"),
     ):
         axes.stairs(np.einsum("ec,ec->e", traction[order], directions), s, color=colour, label=label, linewidth=1.4)
     starts = np.cumsum([0, *(len(loop) for loop in mesh.loops)])[1:-1]
     for place in s[starts]:
         axes.axvline(place, color="black", linewidth=0.8)
-    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
-    axes.tick_params(labelbottom=False)
-    axes.set_ylabel(f"traction [{stress}]")
-    axes.set_title(f"Tractions on the boundary\n{solution.scene.title}", parse_math=False, fontsize=11)
-    axes.legend(frameon=False)
+    label_values(axes, f"traction [{stress}]")
     _draw_parts(strip, solution, order.tolist(), s.tolist())
-    strip.set_xlabel(f"arc length $s$ [{length}]")
     return figure
 
 
@@ -71,5 +64,3 @@ def _draw_parts(strip: Axes, solution: Solution, order: list[int], s: list[float
         if name is not None and end - begin > _READABLE * s[-1]:
             strip.text((begin + end) / 2.0, 0.5, name, ha="center", va="center", fontsize=8, parse_math=False)
     strip.set_xlim(0.0, s[-1])
-    strip.set_ylim(0.0, 1.0)
-    strip.set_yticks([])

@@ -1,8 +1,6 @@
 """Figures of a solution: the deformed body, and displacements, tractions and status along the contact boundary.
 
 Without contact, the tractions along the whole boundary instead; see `bemkit.results.boundary_figure`.
-
-Drawn with matplotlib's object interface, so that no display and no global state is involved.
 """
 
 from __future__ import annotations
@@ -23,6 +21,7 @@ from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.geometry.reflection import unfolded
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.results.boundary_figure import draw_boundary_traction
+from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, new_figure, panel_above_strip
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
 
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
-BLUE, ORANGE, VERMILION, GREY = "#0072B2", "#E69F00", "#D55E00", "#9A9A9A"
 STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
 _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "slip": "#000000", "stick": "#FFFFFF"})
 
@@ -52,14 +49,17 @@ class Units:
     stress: str = "Pa"
 
 
-def save_figures(solution: Solution, folder: str | Path, *, units: Units | None = None) -> tuple[Path, ...]:
+SI = Units()
+
+
+def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -> tuple[Path, ...]:
     """Draw all figures into a folder, which is made if need be.
 
     Parameters
     ----------
     solution : Solution
     folder : str or Path
-    units : Units, optional
+    units : Units
         Metre and pascal by default.
 
     Returns
@@ -73,7 +73,6 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
     OutputFileError
         If the folder or a file in it cannot be written.
     """
-    units = Units() if units is None else units
     figures = {"deformation": draw_deformation(solution, units=units)}
     parts = list(dict.fromkeys(solution.contact.part))
     if not parts:
@@ -86,26 +85,23 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units | None 
     return write_figures(figures, Path(folder))
 
 
-def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figure:
+def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
     """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
 
     Parameters
     ----------
     solution : Solution
-    units : Units, optional
+    units : Units
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    from matplotlib.figure import Figure
-
-    units = Units() if units is None else units
     mesh = solution.mesh.whole
     displacement = node_displacement(solution)
     factor = exaggeration(mesh.diameter, displacement)
     deformed = mesh.nodes + factor * displacement
-    figure = Figure(figsize=(5.6, 5.6), layout="constrained")
+    figure = new_figure(5.6, 5.6)
     axes = figure.add_subplot()
     for number, loop in enumerate(mesh.loops):
         order = np.append(mesh.elements[loop, 0], mesh.elements[loop[0], 0])
@@ -125,7 +121,7 @@ def draw_deformation(solution: Solution, *, units: Units | None = None) -> Figur
     return figure
 
 
-def draw_contact_displacement(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
+def draw_contact_displacement(solution: Solution, part: str, *, units: Units = SI) -> Figure:
     """Draw normal and tangential displacement and the gap along one contact part, above its status.
 
     Parameters
@@ -133,86 +129,50 @@ def draw_contact_displacement(solution: Solution, part: str, *, units: Units | N
     solution : Solution
     part : str
         Name of the contact part.
-    units : Units, optional
+    units : Units
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    units = Units() if units is None else units
     contact, chosen = solution.contact, solution.contact.rows(part)
-    s = contact.s[chosen]
+    s, gap = contact.s[chosen], contact.gap[chosen]
     figure, axes = _contact_axes(solution, part, units, "Displacements on the contact boundary")
-    axes.plot(s, contact.u_n[chosen], color=BLUE, label="normal $u_n$", **_LINE)
-    axes.plot(s, contact.u_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label="tangential $u_t$")
-    gap = contact.gap[chosen]
+    axes.plot(s, contact.u_n[chosen], label="normal $u_n$", **_FIRST)
+    axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **_SECOND)
     if np.any(np.isfinite(gap) & (gap != 0.0)):
-        axes.plot(s, _near(gap, solution, chosen), color="black", linestyle=":", linewidth=1.2, label="gap $g$")
-    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
-    axes.set_ylabel(f"displacement [{units.length}]")
-    axes.legend(frameon=False)
+        axes.plot(s, _near(gap, solution, chosen), label="gap $g$", **_LIMIT)
+    label_values(axes, f"displacement [{units.length}]")
     return figure
 
 
-def draw_contact_traction(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
-    """Draw normal and tangential traction and the friction bound along one contact part, above its status.
-
-    Parameters
-    ----------
-    solution : Solution
-    part : str
-        Name of the contact part.
-    units : Units, optional
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    units = Units() if units is None else units
+def draw_contact_traction(solution: Solution, part: str, *, units: Units = SI) -> Figure:
+    """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
-    axes.plot(s, contact.sigma_n[chosen], color=BLUE, label=r"normal $\sigma_n$", **_LINE)
-    axes.plot(
-        s, contact.sigma_t[chosen], color=VERMILION, linestyle="--", linewidth=1.6, label=r"tangential $\sigma_t$"
-    )
+    axes.plot(s, contact.sigma_n[chosen], label=r"normal $\sigma_n$", **_FIRST)
+    axes.plot(s, contact.sigma_t[chosen], label=r"tangential $\sigma_t$", **_SECOND)
     law = _friction_law(solution)
     if not law.is_frictionless:
         bound = _friction_bound(solution, law)[chosen]
-        axes.plot(s, bound, color="black", linestyle=":", linewidth=1.2, label="friction bound")
-        axes.plot(s, -bound, color="black", linestyle=":", linewidth=1.2)
-    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
-    axes.set_ylabel(f"traction [{units.stress}]")
-    axes.legend(frameon=False)
+        axes.plot(s, bound, label="friction bound", **_LIMIT)
+        axes.plot(s, -bound, **_LIMIT)
+    label_values(axes, f"traction [{units.stress}]")
     return figure
 
 
-def draw_contact_status(solution: Solution, part: str, *, units: Units | None = None) -> Figure:
-    """Draw clearance and contact pressure along one contact part, above its status.
-
-    Parameters
-    ----------
-    solution : Solution
-    part : str
-        Name of the contact part.
-    units : Units, optional
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    units = Units() if units is None else units
+def draw_contact_status(solution: Solution, part: str, *, units: Units = SI) -> Figure:
+    """Draw contact pressure and clearance; see `draw_contact_displacement`."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Contact pressure and clearance")
-    pressure = axes.plot(s, -contact.sigma_n[chosen], color=BLUE, label=r"pressure $-\sigma_n$ (left)", **_LINE)
+    pressure = axes.plot(s, -contact.sigma_n[chosen], label=r"pressure $-\sigma_n$ (left)", **_FIRST)
     axes.set_ylabel(f"pressure [{units.stress}]")
     right = axes.twinx()
     right.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
     clearance = _near(contact.clearance[chosen], solution, chosen)
-    opening = right.plot(
-        s, clearance, color=VERMILION, linestyle="--", linewidth=1.6, label="clearance $g - u_n$ (right)"
-    )
+    opening = right.plot(s, clearance, label="clearance $g - u_n$ (right)", **_SECOND)
     right.set_ylabel(f"clearance [{units.length}]")
     for each in (axes, right):
         bottom, top = each.get_ylim()
@@ -263,7 +223,9 @@ def node_displacement(solution: Solution) -> FloatArray:
     return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])
 
 
-_LINE: Mapping[str, Any] = MappingProxyType({"linewidth": 1.6, "marker": "o", "markersize": 2.0})
+_FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
+_SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
+_LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
 
 
 def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
@@ -286,18 +248,12 @@ def _friction_bound(solution: Solution, law: FrictionLaw) -> FloatArray:
 
 def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
     """Return a figure with a large panel above a strip that shows the status along the part."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
-    axes, strip = figure.subplots(2, 1, sharex=True, height_ratios=[9, 1])
+    abscissa = f"arc length $s$ along '{part}' [{units.length}]"
+    figure, axes, strip = panel_above_strip(f"{subject}\n{solution.scene.title}", abscissa, parse_math="$" not in part)
     _draw_status(strip, solution, part)
-    strip.set_xlabel(f"arc length $s$ along '{part}' [{units.length}]", parse_math="$" not in part)
     for transition in solution.transitions:
         if transition.part == part:
             axes.axvline(transition.s, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
-    axes.tick_params(labelbottom=False)
-    axes.set_title(f"{subject}\n{solution.scene.title}", parse_math=False, fontsize=11)
     return figure, axes
 
 
@@ -322,8 +278,6 @@ def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
     if handles:
         strip.figure.legend(handles=handles, loc="outside lower right", ncols=3, frameon=False)
     strip.set_xlim(0.0, length)
-    strip.set_ylim(0.0, 1.0)
-    strip.set_yticks([])
 
 
 def _fill(axes: Axes, loops: list[FloatArray]) -> None:

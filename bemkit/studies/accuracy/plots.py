@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.reference.values import MEASURES
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, pareto_front
 
 if TYPE_CHECKING:
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
 
 FIGURE = "error-against-run-time"
 
-# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _FRONT = "#D8D8D8"
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
@@ -40,11 +40,9 @@ def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, titl
     -------
     matplotlib.figure.Figure
     """
-    from matplotlib.figure import Figure
-
     n_columns = min(len(measures), 2)
     n_rows = -(-len(measures) // n_columns)
-    figure = Figure(figsize=(5.2 * n_columns, 3.9 * n_rows + 1.1), layout="constrained")
+    figure = new_figure(5.2 * n_columns, 3.9 * n_rows + 1.1)
     axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
     for panel, measure in zip(axes, measures, strict=False):
         _draw_panel(panel, records, measure)
@@ -86,8 +84,7 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.set_xlabel("run time [s]" if abscissa == "seconds" else "number of elements")
     panel.set_title(f"relative error: {MEASURES[measure]}", loc="left", fontsize=10)
-    panel.grid(visible=True, which="major", color="#E5E5E5", linewidth=0.6)
-    panel.spines[["top", "right"]].set_visible(False)
+    show_grid(panel)
 
 
 def _write_order(panel: Axes, text: str, place: tuple[float, float], colour: str) -> None:

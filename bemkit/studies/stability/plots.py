@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
 from bemkit.studies.stability.cases import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# the colours of Okabe and Ito, which people with colour-vision deficiencies can tell apart
 _SERIES = (
-    ("certificate", "certificate of the driver", "#0072B2", "o"),
-    ("check", "independent check", "#009E73", "s"),
-    ("twin", "difference to the similar twin", "#E69F00", "^"),
-    ("drift", "drift from the reference", "#9A9A9A", "x"),
+    ("certificate", "certificate of the driver", BLUE, "o"),
+    ("check", "independent check", GREEN, "s"),
+    ("twin", "difference to the similar twin", ORANGE, "^"),
+    ("drift", "drift from the reference", GREY, "x"),
 )
 _FLOOR = 1e-18
 
@@ -35,9 +35,7 @@ def figure_name(axis: Axis) -> str:
 
 def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
     """Draw one axis."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    figure = new_figure(6.4, 4.0)
     plot = figure.add_subplot()
     values = np.array([record.value for record in records])
     is_logarithmic = axis.is_logarithmic and bool((values > 0.0).any())
@@ -47,7 +45,7 @@ def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
         plot.plot(
             values[shown], numbers[shown], marker, color=colour, label=label, markersize=5, linestyle="-", linewidth=0.8
         )
-    for verdict, colour in ((Verdict.NAMED, "#56B4E9"), (Verdict.WRONG, "#D55E00")):
+    for verdict, colour in ((Verdict.NAMED, SKY), (Verdict.WRONG, VERMILION)):
         marked = [
             record.value
             for record in records
@@ -61,7 +59,6 @@ def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
     plot.set_xlabel(axis.label)
     plot.set_ylabel("dimensionless")
     plot.set_title(axis.name, loc="left")
-    plot.grid(visible=True, color="#E5E5E5", linewidth=0.6)
-    plot.spines[["top", "right"]].set_visible(False)
+    show_grid(plot)
     plot.legend(fontsize="small", frameon=False)
     return figure
