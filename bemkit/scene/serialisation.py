@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 import types
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
-from functools import cache
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from functools import cache, reduce
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from cattrs import AttributeValidationNote, BaseValidationError, Converter, ForbiddenExtraKeysError
@@ -21,7 +22,7 @@ from cattrs.gen import make_dict_structure_fn
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
-from bemkit.errors import BemkitError, InputError
+from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
@@ -74,15 +75,6 @@ class StructureError(InputError):
 
 class UnstructureError(InputError):
     """An object that cannot be written as a table."""
-
-
-class _LocatedError(BemkitError):
-    """An error met below a key."""
-
-    def __init__(self, key: str, cause: Exception) -> None:
-        super().__init__(key)
-        self.key = key
-        self.cause = cause
 
 
 def structure(table: object, wanted: type[T]) -> T:
@@ -257,15 +249,19 @@ def _tuple(converter: Converter, value: object, wanted: Any) -> tuple[Any, ...]:
         inner = (inner[0],) * len(items)
     if len(items) != len(inner):
         raise InputError(f"{_show(value)} has {len(items)} entries: give {len(inner)}")
-    return tuple(
-        _at(f"[{index}]", converter.structure, item, kind)
-        for index, (item, kind) in enumerate(zip(items, inner, strict=True))
-    )
+    structured = []
+    for index, (item, kind) in enumerate(zip(items, inner, strict=True)):
+        with _at(f"[{index}]"):
+            structured.append(converter.structure(item, kind))
+    return tuple(structured)
 
 
 def _mapping(converter: Converter, value: object, wanted: Any) -> dict[str, Any]:
-    table = _exactly(value, dict, "a table")
-    return {key: _at(key, converter.structure, item, get_args(wanted)[1]) for key, item in table.items()}
+    structured = {}
+    for key, item in _exactly(value, dict, "a table").items():
+        with _at(key):
+            structured[key] = converter.structure(item, get_args(wanted)[1])
+    return structured
 
 
 def _enum(value: object, wanted: type[Enum]) -> Enum:
@@ -329,55 +325,49 @@ def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], An
 
 
 def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
-    family = _family(wanted)
-    if family is None:  # the hook is chosen by this very test
-        raise TypeError(f"{wanted} is not a tagged type")
+    family = cast(Family, _family(wanted))  # the hook is chosen by it
     if isinstance(value, str):
         value = {"kind": value}
     table = _exactly(value, dict, f"a {family.role} as a word or as a table with its kind")
     if "kind" not in table:
         raise InputError(f"kind is missing: add kind = one of {', '.join(family.built_in)}")
-    kind = _at("kind", _exactly, table["kind"], str, "a text")
-    found = _at("kind", family.find, kind)
+    with _at("kind"):
+        found = family.find(_exactly(table["kind"], str, "a text"))
     return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
 
 
 def _parts(converter: Converter, value: object) -> tuple[Part, ...]:
-    tables = _exactly(value, dict, "a table of parts: write [parts.NAME]")
-    return tuple(_at(name, _part, converter, name, table) for name, table in tables.items())
+    parts = []
+    for name, options in _exactly(value, dict, "a table of parts: write [parts.NAME]").items():
+        with _at(name):
+            table = _exactly(options, dict, "a table with sides and condition")
+            if "name" in table:
+                raise InputError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
+            parts.append(converter.structure({"name": name, **table}, Part))
+    return tuple(parts)
 
 
-def _part(converter: Converter, name: str, value: object) -> Part:
-    table = _exactly(value, dict, "a table with sides and condition")
-    if "name" in table:
-        raise InputError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
-    return converter.structure({"name": name, **table}, Part)
-
-
-def _at(key: str, function: Callable[..., T], *arguments: Any) -> T:
-    """Call the function; an error in it is an error at this key."""
+@contextmanager
+def _at(key: str) -> Iterator[None]:
+    """Note on errors inside that they are errors at this key, as cattrs does for the fields of classes."""
     try:
-        return function(*arguments)
-    except RecursionError:
-        raise
+        yield
     except Exception as error:
-        raise _LocatedError(key, error) from error
+        error.add_note(AttributeValidationNote("", key, None))
+        raise
 
 
 def _explain(error: BaseException, path: str) -> str:
     """Turn the first of the errors found into ``key: value: remedy``."""
-    note = next((note for note in getattr(error, "__notes__", ()) if isinstance(note, AttributeValidationNote)), None)
-    if note is not None:
-        path = _join(path, note.name)
-        if isinstance(error, KeyError):
-            remedy = _MISSING_REMEDIES.get(note.name, f"add {note.name} = ...")
-            return f"{path}: missing: {remedy}"
+    # the innermost key was noted first
+    keys = [note.name for note in getattr(error, "__notes__", ()) if isinstance(note, AttributeValidationNote)]
+    path = reduce(_join, reversed(keys), path)
+    if keys and isinstance(error, KeyError):
+        return f"{path}: missing: {_MISSING_REMEDIES.get(keys[0], f'add {keys[0]} = ...')}"
     if isinstance(error, BaseValidationError):
         # an unknown key comes first: it is often the reason why another one is missing
         found = sorted(error.exceptions, key=lambda inner: not isinstance(inner, ForbiddenExtraKeysError))
         return _explain(found[0], path)
-    if isinstance(error, _LocatedError):
-        return _explain(error.cause, _join(path, error.key))
     if isinstance(error, ForbiddenExtraKeysError):
         key = min(error.extra_fields)
         names = [entry.name for entry in fields(error.cl) if entry.init]
