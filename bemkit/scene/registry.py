@@ -12,7 +12,7 @@ from bemkit.formulas import closest, shorten
 
 
 @dataclass(frozen=True)
-class Family:
+class Registry:
     """Classes of one role and the words that name them in scene files.
 
     Parameters
@@ -79,7 +79,7 @@ class Family:
         return loaded
 
 
-SHAPES = Family(
+SHAPES = Registry(
     "shape",
     MappingProxyType(
         {
@@ -95,7 +95,7 @@ SHAPES = Family(
     "bemkit.shapes",
 )
 
-GRADINGS = Family(
+GRADINGS = Registry(
     "grading",
     MappingProxyType(
         {
@@ -106,7 +106,7 @@ GRADINGS = Family(
     ),
 )
 
-CONDITIONS = Family(
+CONDITIONS = Registry(
     "condition",
     MappingProxyType(
         {
@@ -120,7 +120,7 @@ CONDITIONS = Family(
     ),
 )
 
-OBSTACLES = Family(
+OBSTACLES = Registry(
     "obstacle",
     MappingProxyType(
         {
@@ -134,7 +134,7 @@ OBSTACLES = Family(
     "bemkit.obstacles",
 )
 
-LAWS = Family(
+LAWS = Registry(
     "friction law",
     MappingProxyType(
         {
@@ -147,7 +147,7 @@ LAWS = Family(
     "bemkit.laws",
 )
 
-DISCRETISATIONS = Family(
+DISCRETISATIONS = Registry(
     "discretisation",
     MappingProxyType(
         {
@@ -159,7 +159,7 @@ DISCRETISATIONS = Family(
     "bemkit.discretisations",
 )
 
-LINEAR_SOLVERS = Family(
+LINEAR_SOLVERS = Registry(
     "linear solver",
     MappingProxyType(
         {
@@ -170,7 +170,7 @@ LINEAR_SOLVERS = Family(
     ),
 )
 
-SOLVERS = Family(
+SOLVERS = Registry(
     "solver",
     MappingProxyType(
         {

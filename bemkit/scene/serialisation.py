@@ -36,14 +36,14 @@ from bemkit.scene.registry import (
     OBSTACLES,
     SHAPES,
     SOLVERS,
-    Family,
+    Registry,
 )
 from bemkit.scene.scene import Condition, Discretisation, Part
 from bemkit.solvers.base import ContactSolver
 
 T = TypeVar("T")
 
-_FAMILIES: tuple[tuple[Any, Family], ...] = (
+_REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Shape, SHAPES),
     (Grading, GRADINGS),
     (Condition, CONDITIONS),
@@ -154,11 +154,11 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
         for entry, content in _written_fields(value, keep_defaults)
     }
-    family = _family(declared)
-    if family is None:
+    registry = _registry(declared)
+    if registry is None:
         return table
     try:
-        kind = family.kind_of(value)
+        kind = registry.kind_of(value)
     except InputError as error:
         raise UnstructureError(f"{path}: {error}") from error
     return {"kind": kind, **table} if table else kind
@@ -198,15 +198,15 @@ def _converter() -> Converter:
     add(lambda wanted: bool(_options(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
     converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
     add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
-    add(lambda wanted: _family(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
+    add(lambda wanted: _registry(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
     add(lambda wanted: wanted == _PARTS, lambda value, _: _parts(converter, value))
     return converter
 
 
-def _family(declared: Any) -> Family | None:
+def _registry(declared: Any) -> Registry | None:
     options = _options(declared)
     declared = options[0] if len(options) == 1 else declared
-    return next((family for wanted, family in _FAMILIES if declared == wanted), None)
+    return next((registry for wanted, registry in _REGISTRIES if declared == wanted), None)
 
 
 def _is_class(wanted: Any, parent: type) -> bool:
@@ -299,19 +299,19 @@ def _fits(value: object, option: Any) -> bool:
         case int() | float():
             return option is float or (option is int and isinstance(value, int))
         case str():
-            return option is str or option is Expression or _is_class(option, Enum) or _family(option) is not None
+            return option is str or option is Expression or _is_class(option, Enum) or _registry(option) is not None
         case list():
             return get_origin(option) in (tuple, np.ndarray)
         case dict():
-            return is_dataclass(option) or _family(option) is not None
+            return is_dataclass(option) or _registry(option) is not None
     return False
 
 
 def _name(option: Any) -> str:
     names = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", Expression: "a formula"}
-    family = _family(option)
-    if family is not None:
-        return f"a {family.role}"
+    registry = _registry(option)
+    if registry is not None:
+        return f"a {registry.role}"
     return names.get(option, "a list" if get_origin(option) in (tuple, np.ndarray) else "a table")
 
 
@@ -325,14 +325,14 @@ def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], An
 
 
 def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
-    family = cast(Family, _family(wanted))  # the hook is chosen by it
+    registry = cast(Registry, _registry(wanted))  # the hook is chosen by it
     if isinstance(value, str):
         value = {"kind": value}
-    table = _exactly(value, dict, f"a {family.role} as a word or as a table with its kind")
+    table = _exactly(value, dict, f"a {registry.role} as a word or as a table with its kind")
     if "kind" not in table:
-        raise InputError(f"kind is missing: add kind = one of {', '.join(family.built_in)}")
+        raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
     with _at("kind"):
-        found = family.find(_exactly(table["kind"], str, "a text"))
+        found = registry.find(_exactly(table["kind"], str, "a text"))
     return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
 
 

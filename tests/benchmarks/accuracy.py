@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 import bemkit as bk
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.runs.refinement_problems import contact_values, paper, reference_values, table_error
+from tests.scenes import contact_values, paper, reference_values, table_error
 
 
 @dataclasses.dataclass(frozen=True)

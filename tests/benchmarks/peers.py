@@ -38,7 +38,7 @@ from bemkit.geometry.meshing.partition import better_partition
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks.accuracy import FIELDS, TARGETS, Target, errors_of, measured_errors
 from tests.benchmarks.fem import FiniteElementSolution, Line, graded_line, solve_scene, uniform_line
-from tests.runs.refinement_problems import paper, reference_table, reference_values
+from tests.scenes import paper, reference_table, reference_values
 
 GETFEM_PYTHON = "/usr/bin/python3"
 """Debian's `python3-getfem` is for Debian's interpreter."""

@@ -26,7 +26,7 @@ from bemkit.runs import adaptive
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks.accuracy import measured_errors
-from tests.runs.refinement_problems import paper
+from tests.scenes import paper
 
 ACCURACIES = (4e-3, 1e-3, 6e-5)
 SPLIT = 2.0**0.5

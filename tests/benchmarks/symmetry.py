@@ -12,7 +12,7 @@ from dataclasses import replace
 from statistics import median
 
 import bemkit as bk
-from tests.scene.symmetry.scenes import DISCRETISATIONS, squeezed
+from tests.scenes import DISCRETISATIONS, squeezed
 
 LINES = {
     "whole": None,

@@ -7,7 +7,7 @@ import pytest
 from scipy import sparse
 
 from tests.benchmarks import fem
-from tests.runs.refinement_problems import paper, reference_values
+from tests.scenes import paper, reference_values
 
 
 @pytest.fixture(params=["PARDISO", "SuperLU"])

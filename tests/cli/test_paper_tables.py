@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ import pytest
 import bemkit.studies.paper_tables as module
 from bemkit.cli.main import main
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
-from bemkit.studies.engine import Task, compute, compute_with_progress
+from bemkit.studies.engine import Task, compute_with_progress
 from bemkit.studies.paper_tables import (
     PRINTED,
     RHO,
@@ -144,9 +144,16 @@ def test_the_command(
     assert Path("mine.txt").read_text() == "not a table"
 
 
-def test_the_progress_bar_sees_every_pair(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_pair_is_a_task_and_finds_its_place(tables: tuple[PaperTable, PaperTable]) -> None:
     seen: list[Task[PaperCell]] = []
-    paper_tables(partial(compute, begins=seen.append))
+
+    def run(tasks: Sequence[Task[PaperCell]]) -> list[PaperCell]:
+        seen.extend(tasks)
+        return [PaperCell((number, i, j), 100 * number + 10 * i + j, 7) for number, i, j in (t.key for t in tasks)]
+
+    first, second = paper_tables(run)
     assert len({task.label for task in seen}) == len(seen) == 50
-    assert paper_tables(partial(compute_with_progress, name="paper tables", is_live=True))[0].number == 1
-    assert capsys.readouterr().out == ""
+    assert (first.outer_steps[1, 3], second.outer_steps[4, 0], second.linear_solves[0, 0]) == (113, 240, 7)
+    assert seen[9].label == "Table 1, rho_1 = 1e+03, rho_2 = 1e+06"
+    (cell,) = compute_with_progress(seen[9:10], "paper tables", is_live=False)
+    assert (cell.key, cell.outer_steps) == ((1, 1, 4), tables[0].outer_steps[1, 4])

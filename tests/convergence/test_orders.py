@@ -12,7 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.runs.adaptive import run_adaptive
-from tests.runs.refinement_problems import angle, contact_error, paper, reference_values
+from tests.scenes import angle, contact_error, paper, reference_values
 
 ELEMENTS: dict[str, Any] = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
 

@@ -96,19 +96,19 @@ def check_keys(owner: type, rows: list[Row]) -> None:
 
 @pytest.mark.parametrize("heading", FAMILIES)
 def test_every_kind_stands_on_the_page_with_its_keys_and_defaults(heading: str) -> None:
-    family, rows_of = FAMILIES[heading], dict[str, list[Row]]()
+    registry, rows_of = FAMILIES[heading], dict[str, list[Row]]()
     for kind, *row in table(section(PAGE, heading)):
         rows_of[plain(kind) or list(rows_of)[-1]] = [*rows_of.get(plain(kind) or list(rows_of)[-1], []), row]
-    assert list(rows_of) == list(family.built_in)
+    assert list(rows_of) == list(registry.built_in)
     for kind, rows in rows_of.items():
-        check_keys(family.find(kind), [row for row in rows if row[0]])
+        check_keys(registry.find(kind), [row for row in rows if row[0]])
 
 
 def test_no_family_of_kinds_is_left_out() -> None:
-    families = [value for value in vars(kinds).values() if isinstance(value, kinds.Family)]
-    assert {family.role for family in families} == {family.role for family in FAMILIES.values()}
-    for family in families:
-        assert not family.group or f"`{family.group}`" in PAGE
+    registries = [value for value in vars(kinds).values() if isinstance(value, kinds.Registry)]
+    assert {registry.role for registry in registries} == {registry.role for registry in FAMILIES.values()}
+    for registry in registries:
+        assert not registry.group or f"`{registry.group}`" in PAGE
 
 
 @pytest.mark.parametrize("heading", TABLES)

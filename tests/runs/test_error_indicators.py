@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
 from bemkit.results.error_indicators import element_errors
-from tests.runs.refinement_problems import angle, disc, paper, true_error, wavy
+from tests.scenes import angle, disc, paper, true_error, wavy
 
 PROBLEMS: dict[str, Callable[[], bk.Scene]] = {
     "paper-1": lambda: paper(1),

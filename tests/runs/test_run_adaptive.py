@@ -14,8 +14,7 @@ import bemkit.runs.adaptive
 from bemkit.geometry.meshing.partition import STEEPEST
 from bemkit.reference import DiscBetweenPlates
 from bemkit.runs.adaptive import _expected_seconds, run_adaptive
-from tests.runs.refinement_problems import contact_error, disc, paper, reference_values, wavy
-from tests.scene.symmetry.scenes import square
+from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 
 
 @lru_cache

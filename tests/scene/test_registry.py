@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bemkit.runs.run import run
-from bemkit.scene.registry import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, OBSTACLES, SHAPES, SOLVERS, Family
+from bemkit.scene.registry import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, OBSTACLES, SHAPES, SOLVERS, Registry
 from bemkit.scene.shipped import shipped_files
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 
@@ -76,11 +76,13 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.parametrize(
-    "family", [SHAPES, GRADINGS, CONDITIONS, OBSTACLES, LAWS, DISCRETISATIONS, SOLVERS], ids=lambda family: family.role
+    "registry",
+    [SHAPES, GRADINGS, CONDITIONS, OBSTACLES, LAWS, DISCRETISATIONS, SOLVERS],
+    ids=lambda registry: registry.role,
 )
-def test_every_built_in_word_names_a_class(family: Family) -> None:
-    for kind, reference in family.built_in.items():
-        found = family.find(kind)
+def test_every_built_in_word_names_a_class(registry: Registry) -> None:
+    for kind, reference in registry.built_in.items():
+        found = registry.find(kind)
         assert f"{found.__module__}:{found.__qualname__}" == reference
 
 

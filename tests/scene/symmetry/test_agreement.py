@@ -13,7 +13,7 @@ from bemkit.geometry.spaces import BoundarySpace, break_nodes
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import check_double_layer, check_operator, check_space
-from tests.scene.symmetry.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
+from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 
 X, Y, BOTH = bk.Symmetry(x=0.0), bk.Symmetry(y=0.0), bk.Symmetry(x=0.0, y=0.0)
 PLATE = bk.PlateWithHole(3.0, 2.0, 0.4, (-1.5, -1.0))

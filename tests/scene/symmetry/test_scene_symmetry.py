@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.reflection import element_images
 from bemkit.scene.symmetry import AsymmetricSceneError, find_symmetry
-from tests.scene.symmetry.scenes import EccentricRing, square, squeezed
+from tests.scenes import EccentricRing, square, squeezed
 
 HALF = bk.Symmetry(x=0.5)
 

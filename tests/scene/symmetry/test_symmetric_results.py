@@ -15,7 +15,7 @@ from bemkit.results.figures import draw_deformation, node_displacement
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
 from bemkit.scene.transform import Stretch, moved_scene
 from bemkit.studies.stability.independent_check import check_solution
-from tests.scene.symmetry.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
+from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 
 BOTH = bk.Symmetry(x=0.0, y=0.0)
 RING = squeezed(bk.Ring(0.5, 1.0), symmetry=BOTH)

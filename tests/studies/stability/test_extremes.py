@@ -14,7 +14,7 @@ from bemkit.solvers.base import Status
 from bemkit.studies.stability.axes import all_axes
 from bemkit.studies.stability.cases import find_axes
 from bemkit.studies.stability.independent_check import check_solution
-from tests.studies.stability.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
+from tests.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 
 DISCRETISATIONS = pytest.mark.parametrize("discretisation", [LINEAR, CONSTANT], ids=["linear", "constant"])
 WALL = bk.Part("wall", bk.Roller(), sides=("right",))

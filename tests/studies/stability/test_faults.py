@@ -18,7 +18,7 @@ import bemkit as bk
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.results.result_file import read_result, write_result
 from bemkit.studies.stability.records import FILE, StabilityRecord
-from tests.studies.stability.scenes import small_paper_scene
+from tests.scenes import small_paper_scene
 
 LABELS = {"scene": "title = 'x'\n"}
 ROW = StabilityRecord("friction", 0.1, "right", "converged", 4, 1e-16, 1e-16, 1e-3, 1e2, 0.0, 1e-12, 0.1, "")
@@ -66,7 +66,7 @@ def kill_while_writing(path: Path, delays: list[float]) -> None:
 
 
 def test_a_process_killed_while_writing_leaves_a_whole_result(result: Path) -> None:
-    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(10)])
+    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(4)])
 
 
 @pytest.mark.slow
@@ -119,7 +119,7 @@ def test_any_flipped_bit_is_noticed(result: Path, is_rows: bool) -> None:
     content = path.read_bytes()
     chooser = random.Random(7)
     complaints: list[str] = []
-    for _ in range(60):
+    for _ in range(30):
         damaged = bytearray(content)
         damaged[chooser.randrange(len(content))] ^= 1 << chooser.randrange(8)
         path.write_bytes(damaged)
@@ -167,6 +167,7 @@ def sweep_process(path: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", SWEEPS, str(path)])
 
 
+@pytest.mark.slow  # the error study goes through the same engine, in the quick tests
 def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     path = tmp_path / "rows.h5"
     n_before = 0

@@ -13,7 +13,7 @@ from bemkit.scene.transform import Stretch, moved_scene, with_gap_offset, with_t
 from bemkit.studies.stability.cases import Similarity, elements_at_ends
 from bemkit.studies.stability.degenerate import degenerate_diameters
 from bemkit.studies.stability.sweep import difference
-from tests.studies.stability.scenes import FLOOR, block, small_paper_scene
+from tests.scenes import FLOOR, block, small_paper_scene
 
 SIMILARITY = Similarity(length=3.0, modulus=70.0, stress=11.0, shift=(5.0, -7.0))
 

@@ -14,7 +14,7 @@ from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.engine import compute_with_progress
 from bemkit.studies.stability.random_scenes import random_case
 from bemkit.studies.stability.trials import Outcome, Trial, judge, trial_tasks, try_case
-from tests.studies.stability.scenes import FLOOR, block
+from tests.scenes import FLOOR, block
 
 REMEDY = re.compile(
     r"\b(give|use|change|hold|raise|make|check|try|start|allow|choose|remove|restrict|list|subtract|move|keep|press|name|take|leave|describe|let|bring|put)\b"
@@ -35,14 +35,14 @@ def random_trials(seed: int, count: int) -> list[Trial]:
 
 
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = random_trials(1, 200)
+    trials = random_trials(1, 100)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 80  # a generator of scenes without answers tests nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 40  # a generator of scenes without answers tests nothing
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3, 5])
+@pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_many_random_scenes(seed: int) -> None:
     assert_honest(random_trials(seed, 2000))
 

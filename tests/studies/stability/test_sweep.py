@@ -17,7 +17,7 @@ from bemkit.studies.stability.cases import Axis, Case, UnknownAxisError, find_ax
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
-from tests.studies.stability.scenes import CONSTANT, LINEAR, small_paper_scene
+from tests.scenes import CONSTANT, LINEAR, small_paper_scene
 
 EXTREMES = {
     "youngs-modulus": (1e-12, 1e15),
