@@ -1,7 +1,9 @@
-"""The base classes of all errors that bemkit raises on purpose, and texts of strangers made fit for their messages."""
+"""The base classes of all errors that bemkit raises on purpose, and their messages as one line that is fit to print."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -32,3 +34,18 @@ def printable(text: str) -> str:
 def shown_path(path: Path) -> str:
     """Return the name of a file for messages."""
     return printable(str(path))[:200]
+
+
+@contextmanager
+def concerning(name: str) -> Iterator[None]:
+    """Let the message of an error in this context begin with a name, such as that of the scene."""
+    try:
+        yield
+    except BemkitError as error:
+        error.add_note(name)
+        raise
+
+
+def one_line(error: BemkitError) -> str:
+    """Return the names that an error concerns, the outermost first, and its message."""
+    return ": ".join([*reversed(getattr(error, "__notes__", [])), str(error)])

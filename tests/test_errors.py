@@ -13,9 +13,8 @@ import pytest
 
 import bemkit
 import bemkit.runs.run
-from bemkit.cli.errors import concerning, one_line
 from bemkit.cli.main import main
-from bemkit.errors import BemkitError, InputError, NoResultError
+from bemkit.errors import BemkitError, InputError, NoResultError, concerning, one_line
 
 MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
 """Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""

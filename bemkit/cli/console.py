@@ -13,8 +13,8 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.operators.counts import Work
 from bemkit.plan import Plan
+from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
-from bemkit.results.streams import plain_table, stdout_console
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
 

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.cli.errors import concerning, one_line
 from bemkit.cli.stability import stability
 from bemkit.cli.study import study
-from bemkit.errors import BemkitError, NoResultError, printable
-from bemkit.results.streams import PipeClosedError, guarded_streams, print_data
+from bemkit.errors import BemkitError, NoResultError, concerning, one_line, printable
+from bemkit.results.outputs import PipeClosedError, guarded_streams, print_data
 from bemkit.version import __version__
 
 if TYPE_CHECKING:
@@ -164,7 +163,7 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
 @commands.command()
 def scenes() -> None:
     """List the scenes that are shipped with bemkit."""
-    from bemkit.scene.shipped import shipped_scenes
+    from bemkit.scene.toml import shipped_scenes
 
     titles = shipped_scenes()
     width = max(map(len, titles))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.cli.errors import concerning
+from bemkit.errors import concerning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -222,7 +222,7 @@ def _print_solutions(found: Sequence[Solution], n_starts: int) -> None:
     """Print how many distinct solutions there are, and what tells them apart."""
     from rich.text import Text
 
-    from bemkit.results.streams import plain_table, stdout_console
+    from bemkit.results.outputs import plain_table, stdout_console
 
     console = stdout_console()
     if not found:

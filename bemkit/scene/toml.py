@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import fields, replace
+from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, cast
@@ -17,7 +18,6 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
 from bemkit.scene.scene import Discretisation, Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
-from bemkit.scene.shipped import shipped_files
 from bemkit.solvers.base import ContactSolver
 
 MAX_BYTES = 1_000_000
@@ -32,6 +32,18 @@ _PART_KEYS = ("sides", "where", "condition")
 
 class SceneError(InputError):
     """A scene that cannot be read, understood or written; one line with file, key, value and remedy."""
+
+
+def shipped_files() -> dict[str, Traversable]:
+    """Return the shipped scene files by name."""
+    folder = resources.files("bemkit") / "scene" / "shipped"
+    files = sorted((file for file in folder.iterdir() if file.name.endswith(".toml")), key=lambda file: file.name)
+    return {file.name.removesuffix(".toml"): file for file in files}
+
+
+def shipped_scenes() -> dict[str, str]:
+    """Return the titles of the shipped scenes by name."""
+    return {name: tomllib.loads(file.read_text("utf-8"))["title"] for name, file in shipped_files().items()}
 
 
 def load_scene(source: str | Path) -> Scene:

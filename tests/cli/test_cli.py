@@ -24,8 +24,7 @@ from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import main
 from bemkit.results.result_file import read_result
 from bemkit.scene.scene import MeshOptions, QuadraticGalerkin
-from bemkit.scene.shipped import shipped_files
-from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml
+from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
 
 SMALL = ["--elements", "40"]

@@ -11,8 +11,7 @@ import pytest
 
 from bemkit.runs.run import run
 from bemkit.scene.registry import CONDITIONS, DISCRETISATIONS, GRADINGS, LAWS, OBSTACLES, SHAPES, SOLVERS, Registry
-from bemkit.scene.shipped import shipped_files
-from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
+from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, shipped_files
 
 PAPER_1 = shipped_files()["paper-1"].read_text("utf-8")
 

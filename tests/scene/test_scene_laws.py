@@ -11,8 +11,7 @@ import bemkit as bk
 from bemkit.contact.piecewise_law import PartwiseLaw
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.scene.shipped import shipped_files
-from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
+from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, shipped_files
 from tests.scene.test_load_history import block
 
 PAPER_1 = shipped_files()["paper-1"].read_text("utf-8").replace("elements = 320", "elements = 60")

@@ -30,8 +30,7 @@ from bemkit.scene.scene import (
     Scene,
     Traction,
 )
-from bemkit.scene.shipped import shipped_scenes
-from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
+from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.text import Text
 
 from bemkit.reference.values import MEASURES, Reference
-from bemkit.results.streams import plain_table, stdout_console
+from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, orders, pareto_front
 
 WIDE = 100

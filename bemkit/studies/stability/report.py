@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.text import Text
 
-from bemkit.results.streams import plain_table, stdout_console
+from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.stability.cases import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 from bemkit.studies.stability.trials import Outcome, Trial

@@ -12,9 +12,8 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 import bemkit as bk
-from bemkit.cli.errors import one_line
 from bemkit.cli.main import commands
-from bemkit.errors import BemkitError
+from bemkit.errors import BemkitError, one_line
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES, find_reference
 from bemkit.results import outputs as outputs_module
