@@ -158,7 +158,8 @@ def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageC
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
-    fields = BoundaryFields(points, displacement, centres, model.mean_tractions(traction_dofs), traction_dofs)
+    means = model.mean_tractions(traction_dofs)
+    fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2))
     clock = clock.closed(Stage.RECOVER)
     if result.is_converged and not (
         np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction_dofs).all()
