@@ -14,11 +14,10 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.contact_warnings import contact_warnings
 from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
-from bemkit.model.held_friction import with_held_friction
 from bemkit.model.prepared import Prepared, prepare_steps
+from bemkit.model.solved_contact import contact_warnings, with_held_friction
 from bemkit.model.untouched_body import UntouchedBody, certified
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
