@@ -18,7 +18,7 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_held_friction
-from bemkit.model.untouched_body import UntouchedBody, certified
+from bemkit.model.untouched_body import certified
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, find_transitions
@@ -140,8 +140,8 @@ def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
 
 
 def _solved(model: Model, start: ContactState | None, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
-    if isinstance(model.body, UntouchedBody):
-        return certified(model.body, callback)
+    if not model.problem.n_contact:
+        return certified(model.problem.body, callback)
     result = solve(model.problem, model.scene.solver, start=start, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
