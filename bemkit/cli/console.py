@@ -15,7 +15,7 @@ from bemkit.operators.counts import Work
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
-from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Family
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS = 12
@@ -169,7 +169,7 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
-    discretisation = DISCRETISATIONS.kind_of(solution.scene.discretisation)
+    discretisation = _word(DISCRETISATIONS, solution.scene.discretisation)
     rows = [
         ("status", status),
         ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
@@ -214,7 +214,7 @@ def _contact(solution: Solution) -> list[tuple[str, Text]]:
 def _solve(solution: Solution) -> list[tuple[str, Text]]:
     if not solution.contact.n_contact:
         return []
-    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_solver_name(solution)})"
+    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_word(SOLVERS, solution.scene.solver)})"
     return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
 
 
@@ -227,11 +227,11 @@ def _nan_first(value: float) -> float:
     return value if value == value else float("inf")
 
 
-def _solver_name(solution: Solution) -> str:
+def _word(family: Family, value: object) -> str:
     try:
-        return SOLVERS.kind_of(solution.scene.solver)
+        return family.kind_of(value)
     except InputError:  # a class of one's own
-        return type(solution.scene.solver).__name__
+        return type(value).__name__
 
 
 def _transition_lines(solution: Solution) -> list[str]:

@@ -19,10 +19,9 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.boundary_data import Units, parts_on
 from bemkit.model.contact_data import ContactData
 from bemkit.model.free_motion import check_held
-from bemkit.model.prepared import Prepared
+from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import Work
 from bemkit.operators.rigid_modes import without_motion
@@ -46,7 +45,7 @@ class Model:
     body : CondensedBody or UntouchedBody
     problem : ContactProblem
         Where supports hold contact nodes along the tangent its law is frictionless; see
-        `bemkit.model.held_friction.with_held_friction`.
+        `bemkit.model.solved_contact.with_held_friction`.
     """
 
     prepared: Prepared

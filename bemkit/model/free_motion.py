@@ -9,8 +9,7 @@ from bemkit.contact.condensation.nodes import held_nodes
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_data import Units
-from bemkit.model.prepared import Prepared
+from bemkit.model.prepared import Prepared, Units
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.nodal_conditions import unsupported_motions
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.body import ContactState
+from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
 from bemkit.contact.conditions import LinearConditions
 from bemkit.geometry.spaces import BoundarySpace, dof_points
@@ -92,8 +92,13 @@ class UntouchedBody:
         )
 
     def imbalance(self, state: ContactState) -> Imbalance:
-        """Return how far the forces are from those given on free directions, and all together from equilibrium."""
+        """Return how far the forces are from those given on free directions, and all together from equilibrium.
+
+        Not a number if the displacements are none.
+        """
         displacement, force = self.recover(state)
+        if not np.isfinite(displacement).all():
+            return Imbalance(np.nan, np.nan)
         points, balanced = dof_points(self.space), possible_motions(self.space.mesh)
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         total = float(np.abs(force).sum()) or 1.0
@@ -107,12 +112,12 @@ def untouched_state() -> ContactState:
     return ContactState(np.zeros((0, 2)), np.zeros((0, 2)))
 
 
-def certified(body: UntouchedBody, callback: Callable[[StepRecord], None] | None = None) -> ContactSolution:
-    """Return the verdict on the displacements of a body, in the form in which contact problems have theirs.
+def certified(body: LinearBody, callback: Callable[[StepRecord], None] | None = None) -> ContactSolution:
+    """Return the verdict on a body without contact nodes, where there is nothing to iterate.
 
     Parameters
     ----------
-    body : UntouchedBody
+    body : LinearBody
     callback : callable, optional
         Receives the only record.
 
@@ -124,7 +129,7 @@ def certified(body: UntouchedBody, callback: Callable[[StepRecord], None] | None
     state = untouched_state()
     off = body.imbalance(state)
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, off.force, off.moment, off.round_off)
-    if not np.isfinite(body.recover(state)[0]).all():
+    if np.isnan(certificate.worst):
         status, message = Status.NOT_FINITE, Status.NOT_FINITE.value
     elif certificate.is_below(_TOLERANCE):
         status, message = Status.CONVERGED, "All forces are in equilibrium to the tolerance asked for."

@@ -1,20 +1,21 @@
-"""The plan of a scene: sizes and counts exactly, memory and time as estimates, what is needed and what is left out."""
+"""The plan of a scene: counts exactly, memory and time as estimates; and the refusal of what does not fit."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.operators.counts import Work
+from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 from bemkit.operators.steklov_poincare.prescribed import GivenData
-from bemkit.plan.items import plan_items
-from bemkit.plan.sizes import Sizes, find_sizes
+from bemkit.plan.items import Sizes, find_sizes, plan_items
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 
@@ -25,6 +26,14 @@ _FLOPS_PER_NUMBER = 30.0
 """A number that is only moved through memory takes as long as so many flops of a factorisation."""
 _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP, _LEAST_SECONDS = 2e-8, 1e-10, 0.1
 """Of a common computer: for a closed-form integral, for a flop of a factorisation, and for a scene of any size."""
+_MANY = 10_000
+"""Elements that are divided and planned in a moment, whether they fit or not."""
+_FEW = 2_000
+"""Elements of the mesh from whose plan larger ones are told."""
+
+
+class TooLargeError(InputError):
+    """A scene that does not fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -120,3 +129,50 @@ def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
     of_step = 2.0 / 3.0 * c**3 + _FLOPS_PER_NUMBER * (60.0 * c * c + u * u) if c else 0.0
     flops = needs.flops + _CONTACT_STEPS * n_steps * of_step
     return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * needs.evaluations + _SECONDS_PER_FLOP * flops
+
+
+def check_memory(plan: Plan) -> None:
+    """Refuse a plan whose matrices cannot fit into this computer.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Raises
+    ------
+    TooLargeError
+        Naming the memory needed, the memory there is, and the number of elements that fits.
+    """
+    _check(plan.sizes.n_elements, plan.memory)
+
+
+def check_elements(scene: Scene) -> None:
+    """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
+
+    Parameters
+    ----------
+    scene : Scene
+        Memory grows with the square of the number of elements: the plan for a small mesh tells what a large one takes.
+
+    Raises
+    ------
+    TooLargeError
+        As `check_memory`.
+    """
+    wished = scene.mesh.elements
+    if wished is None or wished <= _MANY:
+        return
+    small = replace(scene, mesh=replace(scene.mesh, elements=_FEW))
+    plan = make_plan(small, small.build_mesh())
+    growth = wished / _FEW
+    _check(int(growth * plan.sizes.n_elements), int(growth**2 * plan.memory))
+
+
+def _check(n_elements: int, memory: int) -> None:
+    available = physical_memory()
+    if memory > available:
+        n_fitting = int((available / memory) ** 0.5 * n_elements)
+        raise TooLargeError(
+            f"{n_elements} elements need about {memory / 1e9:.3g} GB, this computer has {available / 1e9:.3g} GB: "
+            f"use at most {n_fitting} elements"
+        )

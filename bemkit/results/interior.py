@@ -29,13 +29,13 @@ def interior_fields(solution: Solution) -> InteriorFields:
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
-    n_local = solution.boundary.traction_dofs.shape[1]
     mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.boundary
+    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
     space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
     displacement = unfolded(half_space, space, boundary.displacement)
     tractions, half_tractions = (
-        ElementwiseSpace(discretisation.traction_space(each) if n_local > 1 else ConstantSpace(each))
+        ElementwiseSpace(discretisation.traction_space(each) if has_dofs else ConstantSpace(each))
         for each in (mesh.whole, mesh)
     )
-    traction = unfolded(half_tractions, tractions, boundary.traction_dofs.reshape(-1, 2))
+    traction = unfolded(half_tractions, tractions, boundary.traction_dofs)
     return InteriorFields(mesh.whole, solution.scene.material, space, displacement, tractions, traction)

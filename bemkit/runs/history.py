@@ -14,12 +14,11 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.contact_warnings import contact_warnings
 from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
-from bemkit.model.held_friction import with_held_friction
 from bemkit.model.prepared import Prepared, prepare_steps
-from bemkit.model.untouched_body import UntouchedBody, certified
+from bemkit.model.solved_contact import contact_warnings, with_held_friction
+from bemkit.model.untouched_body import certified
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
@@ -141,8 +140,8 @@ def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
 
 
 def _solved(model: Model, start: ContactState | None, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
-    if isinstance(model.body, UntouchedBody):
-        return certified(model.body, callback)
+    if not model.problem.n_contact:
+        return certified(model.problem.body, callback)
     result = solve(model.problem, model.scene.solver, start=start, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
@@ -158,7 +157,8 @@ def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageC
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
-    fields = BoundaryFields(points, displacement, centres, model.mean_tractions(traction_dofs), traction_dofs)
+    means = model.mean_tractions(traction_dofs)
+    fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2))
     clock = clock.closed(Stage.RECOVER)
     if result.is_converged and not (
         np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction_dofs).all()

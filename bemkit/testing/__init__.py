@@ -1,6 +1,7 @@
 """Checks that implementations, ours and yours, keep the promises of bemkit's protocols."""
 
 from bemkit.testing.curves import check_curve as check_curve
+from bemkit.testing.discretisations import check_discretisation as check_discretisation
 from bemkit.testing.failure import CheckFailed as CheckFailed
 from bemkit.testing.laws import check_law as check_law
 from bemkit.testing.linear import check_linear_solver as check_linear_solver

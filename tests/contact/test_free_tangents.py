@@ -13,9 +13,8 @@ from bemkit.contact.condensation.reduction import condense
 from bemkit.contact.condensation.tangents import open_tangents
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactState, LawError
-from bemkit.model.boundary_data import nodal_forces, supports_on
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.prepared import prepare
+from bemkit.model.prepared import nodal_forces, prepare, supports_on
 from bemkit.runs.run import UnsolvableSceneError
 from bemkit.scene.scene import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve

@@ -11,8 +11,8 @@ import pytest
 import bemkit as bk
 from bemkit.model.contact_data import find_contact
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.contact_warnings import contact_warnings
 from bemkit.model.prepared import prepare
+from bemkit.model.solved_contact import contact_warnings
 from bemkit.solvers.base import solve
 
 FLOOR = bk.HalfPlane()

@@ -9,7 +9,7 @@ import tracemalloc
 import pytest
 
 import bemkit as bk
-import bemkit.plan.memory
+import bemkit.plan.plan
 from bemkit.cli.main import main
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import HalfPlane
@@ -186,7 +186,7 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
 def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plan_of(load_scene("paper-1"))
     check_memory(plan)
-    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 0.25 * plan.memory)
+    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 0.25 * plan.memory)
     message = f"320 elements need about {plan.memory / 1e9:.3g} GB, this computer has .* GB: use at most 160 elements"
     with pytest.raises(TooLargeError, match=message):
         check_memory(plan)
@@ -218,8 +218,8 @@ def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest
     large = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=12_000))
     needed = make_plan(large, large.build_mesh()).memory
     # the parts that grow more slowly than the square are a few thousandths
-    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 1.01 * needed)
+    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 1.01 * needed)
     check_elements(large)
-    monkeypatch.setattr(bemkit.plan.memory, "physical_memory", lambda: 0.99 * needed)
+    monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 0.99 * needed)
     with pytest.raises(TooLargeError, match=r"use at most 119.. elements"):
         check_elements(large)

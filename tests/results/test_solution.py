@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,15 @@ def test_tables_check_their_columns() -> None:
         table([0, 7, 0])
     with pytest.raises(ValueError, match=r"traction has the shape \(2, 2\): give \(3, 2\)"):
         BoundaryFields(np.zeros((3, 2)), np.zeros((3, 2)), np.zeros((3, 2)), np.zeros((2, 2)))
+    with pytest.raises(ValueError, match=r"traction_dofs has the shape \(4, 2\): give a multiple of 3 rows"):
+        BoundaryFields(*np.zeros((4, 3, 2)), traction_dofs=np.zeros((4, 2)))
+
+
+def test_rows_are_those_of_a_part() -> None:
+    two = replace(table([STICK] * 3), part=("left", "right", "left"))
+    assert two.parts == ("left", "right")
+    np.testing.assert_array_equal(two.rows("left"), [True, False, True])
+    assert not two.rows("top").any()
 
 
 def test_tables_cannot_be_written_to() -> None:

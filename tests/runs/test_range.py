@@ -10,8 +10,8 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.validity.magnitude import check_magnitude
-from bemkit.model.boundary_data import OutOfRangeError
 from bemkit.model.contact_model import Model
+from bemkit.model.prepared import OutOfRangeError
 
 ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 

@@ -53,7 +53,7 @@ class CondensedBody:
     -----
     At a node where a support prescribes one direction (a roller meets the contact boundary) only the other one is
     open. Its displacements and its pressure are true; friction there cannot be told from the reaction of the support,
-    so that no friction acts in the contact problem; see `bemkit.contact.held_friction`.
+    so that no friction acts in the contact problem; see `bemkit.model.solved_contact`.
     """
 
     dense: DenseBody

@@ -1,0 +1,243 @@
+"""What a result says of the contact nodes, and where the contact status changes between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.errors import InputError
+from bemkit.solvers.active_sets import NodeStatus
+
+STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
+    {
+        NodeStatus.SEPARATED: "separated",
+        NodeStatus.STICK: "stick",
+        NodeStatus.SLIP_FORWARD: "slip",
+        NodeStatus.SLIP_BACKWARD: "slip",
+    }
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTable:
+    """One row per contact node, in order along each contact part.
+
+    Parameters
+    ----------
+    part : tuple of n_contact str
+        Name of the part each node belongs to.
+    x, y : (n_contact,) arrays [m]
+    s : (n_contact,) array [m]
+        Arc length from the start of the part.
+    u_n, u_t : (n_contact,) arrays [m]
+    sigma_n, sigma_t : (n_contact,) arrays [Pa]
+    gap : (n_contact,) array [m]
+        Initial distance to the obstacle along the normal; infinite where there is none in sight.
+    clearance : (n_contact,) array [m]
+        Distance left, ``gap - u_n``.
+    status : (n_contact,) array of `NodeStatus` values
+    weight : (n_contact,) array [m]
+        Length of boundary that the node stands for.
+
+    Raises
+    ------
+    ValueError
+        If the columns differ in length, or a status is not a `NodeStatus`.
+    """
+
+    part: tuple[str, ...]
+    x: FloatArray
+    y: FloatArray
+    s: FloatArray
+    u_n: FloatArray
+    u_t: FloatArray
+    sigma_n: FloatArray
+    sigma_t: FloatArray
+    gap: FloatArray
+    clearance: FloatArray
+    status: IntArray
+    weight: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, column in self.columns().items():
+            if column.shape != (len(self.part),):
+                raise InputError(f"{name} has the shape {column.shape}: give ({len(self.part)},), one entry per node")
+            read_only(column)
+        wrong = np.flatnonzero(~np.isin(self.status, [int(status) for status in NodeStatus]))
+        if wrong.size:
+            raise InputError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
+
+    @classmethod
+    def empty(cls) -> ContactTable:
+        """Return the table of a scene without contact."""
+        none = np.zeros(0)
+        return cls((), *(none,) * 9, np.zeros(0, np.intp), none)
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return len(self.part)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names of the contact parts, in their order."""
+        return tuple(dict.fromkeys(self.part))
+
+    def rows(self, part: str) -> BoolArray:
+        """Return (n_contact,) bool: the nodes of one part."""
+        return np.array([name == part for name in self.part], bool)
+
+    def columns(self) -> dict[str, FloatArray | IntArray]:
+        """Return the numerical columns by name."""
+        names = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance", "status", "weight")
+        return {name: getattr(self, name) for name in names}
+
+    def status_words(self) -> list[str]:
+        """Return ``"separated"``, ``"slip"`` or ``"stick"`` for each node."""
+        return [STATUS_WORDS[NodeStatus(value)] for value in self.status.tolist()]
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A point of a contact part where the contact status changes.
+
+    Parameters
+    ----------
+    part : str
+    x, y : float [m]
+    s : float [m]
+        Arc length from the start of the part.
+    from_status, to_status : str
+        ``"separated"``, ``"slip"`` or ``"stick"``, in the direction of growing s.
+    """
+
+    part: str
+    x: float
+    y: float
+    s: float
+    from_status: str
+    to_status: str
+
+    def as_dict(self) -> dict[str, str | float]:
+        """Return the entries under the names of the results file."""
+        return {
+            "part": self.part,
+            "x": self.x,
+            "y": self.y,
+            "s": self.s,
+            "from": self.from_status,
+            "to": self.to_status,
+        }
+
+
+_FIT = (2, 4, 6, 12)
+"""Nodes from a transition on that tell its place (the first two) and the power of the distance (the last two). The
+values at the nodes before them are the least accurate."""
+_CLOSE = 0.1
+"""Distance, relative to the size of the zone, up to which that power holds closely."""
+_POWERS = (1.3, 1.7)
+"""The powers that sliding friction may make of 3/2."""
+_LEAST_ZONE = 0.5
+"""Least length of a zone, relative to its length if it ends halfway between its nodes and its neighbours'."""
+
+
+def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> tuple[Transition, ...]:
+    """Find where the status changes along each contact part.
+
+    Parameters
+    ----------
+    contact : ContactTable
+    slip : (n_contact,) array [m], optional
+        Under the incremental law ``u_t`` less its value at the end of the step before; ``u_t`` itself by default.
+
+    Returns
+    -------
+    tuple of Transition
+        In order along each part. A change of the direction of slip alone is not a transition.
+
+    Notes
+    -----
+    Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
+    end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
+    at the transition; on the paper's examples this is within a quarter of the node distance. Sliding friction changes
+    the power somewhat (to 1.56 at the separation point of Example 1): on meshes that are fine there it is fitted too,
+    and the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
+    says nothing, as at the edge of an obstacle, or where two of them would swallow a narrow zone between them, the
+    transition is put halfway between the two nodes that differ.
+    """
+    words = contact.status_words()
+    slip = contact.u_t if slip is None else slip
+    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and are_neighbours(contact, i)]
+    places = np.array([_transition_place(contact, slip, words, i) for i in changes])
+    found = []
+    for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
+        rows = contact.rows(contact.part[i])
+        x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
+        found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
+    return tuple(found)
+
+
+def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:
+    """Put transitions halfway between their nodes where they leave next to nothing of a zone, which has nodes."""
+    kept = places.copy()
+    halfway = np.array([(contact.s[i] + contact.s[i + 1]) / 2.0 for i in changes])
+    for part in dict.fromkeys(contact.part[i] for i in changes):
+        own = [k for k, i in enumerate(changes) if contact.part[i] == part]
+        ends = contact.s[contact.rows(part)][[0, -1]]
+        least = _LEAST_ZONE * np.diff(halfway[own], prepend=ends[0], append=ends[1])
+        for _ in own:  # what moves back may meet the next transition
+            is_lost = np.diff(kept[own], prepend=ends[0], append=ends[1]) < least
+            kept[own] = np.where(is_lost[:-1] | is_lost[1:], halfway[own], kept[own])
+    return kept
+
+
+def are_neighbours(contact: ContactTable, i: int) -> bool:
+    """Tell whether the nodes i and i + 1 follow each other on one piece of one part."""
+    distance = np.hypot(contact.x[i + 1] - contact.x[i], contact.y[i + 1] - contact.y[i])
+    # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
+    reach = (1.0 + 1e-9) * (contact.weight[i] + contact.weight[i + 1])
+    return contact.part[i] == contact.part[i + 1] and bool(distance <= reach)
+
+
+def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str], i: int) -> float:
+    """Return the arc length of the transition between the nodes i and i + 1; see `find_transitions`."""
+    looser = ("separated", "slip", "stick")
+    is_forward = looser.index(words[i]) < looser.index(words[i + 1])
+    last, tighter, step = (i, i + 1, -1) if is_forward else (i + 1, i, 1)
+    middle = float(contact.s[i] + contact.s[i + 1]) / 2.0
+    zone = [last]
+    while 0 <= (k := zone[-1] + step) < contact.n_contact and (words[k], contact.part[k]) == (
+        words[last],
+        contact.part[last],
+    ):
+        zone.append(k)
+    if len(zone) < 2:
+        return middle
+    field = contact.clearance if words[last] == "separated" else np.abs(slip)
+    distance = _distance_to_zero(np.abs(contact.s[zone] - contact.s[last]), field[zone])
+    if distance is None:
+        return middle
+    gap = contact.s[tighter] - contact.s[last]
+    return float(contact.s[last] + np.clip(distance / abs(gap), 0.0, 2.0) * gap)
+
+
+def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
+    """Extrapolate powers of the distance from a zone's nodes at s = 0, s[1], ...; None if they do not fall to zero."""
+    is_fine = len(s) > _FIT[-1] and s[_FIT[-1]] < _CLOSE * s[-1]
+    near, far, *outer = _FIT if is_fine else (0, 1)
+    power, distance = 1.5, 0.0
+    values = field[[near, far, *outer]]
+    if not (np.isfinite(values).all() and np.all(np.diff(values) > 0.0) and values[0] >= 0.0):
+        return None
+    for _ in range(4 if is_fine else 1):
+        share = (field[near] / field[far]) ** (1.0 / power)
+        distance = float((s[far] * share - s[near]) / (1.0 - share))
+        if is_fine:
+            inner, outermost = (max(s[k] + distance, s[1]) for k in outer)
+            ratio = np.log(field[outer[1]] / field[outer[0]]) / np.log(outermost / inner)
+            power = float(np.clip(ratio, *_POWERS))
+    return distance

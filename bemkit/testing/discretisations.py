@@ -1,0 +1,144 @@
+"""Conformance of discretisations."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import is_dataclass, replace
+
+import numpy as np
+
+from bemkit.contact.laws import Coulomb, Frictionless
+from bemkit.contact.obstacle import HalfPlane
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.shapes import PlateWithHole, Rectangle
+from bemkit.operators.linear.solvers import DenseCholesky
+from bemkit.operators.material import Material
+from bemkit.results.interior import interior_fields
+from bemkit.results.solution import Solution
+from bemkit.runs.run import run
+from bemkit.scene.conditions import Clamped, Contact, Part, Roller, Traction
+from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.scene import MeshOptions, Scene
+from bemkit.testing.failure import demand
+from bemkit.testing.spaces import check_space
+
+_MATERIAL = Material(2.0, 0.3)
+_ROUND_OFF = 1e-9
+"""Of a map of a hundred unknowns, relative to its largest entry."""
+_COARSE = 0.05
+"""Error of displacements and stresses of a body under uniform tension on 48 elements that no method exceeds."""
+
+
+def check_discretisation(discretisation: Discretisation) -> None:
+    """Check everything that `Discretisation` promises, by running small scenes; call it on your own discretisation.
+
+    Parameters
+    ----------
+    discretisation : Discretisation
+
+    Raises
+    ------
+    CheckFailed
+        Naming the discretisation, the promise broken, and by how much.
+    """
+    name = type(discretisation).__name__
+    demand(is_dataclass(discretisation), f"{name} is no dataclass: scenes are compared and written by their values")
+    demand(copy(discretisation) == discretisation, f"{name} does not equal its copy")
+    demand(bool(discretisation.method), f"{name}.method is empty: messages name it")
+    for promise in ("is_symmetric", "estimates_error"):
+        answer = getattr(discretisation, promise)
+        demand(isinstance(answer, bool), f"{name}.{promise} is {answer!r}, not a bool")
+    for scene in (_tension(discretisation), replace(_tension(discretisation), shape=PlateWithHole(2.0, 1.0, 0.3))):
+        _check_spaces(discretisation, name, scene.build_mesh())
+    _check_map(discretisation, name)
+    _check_tension(discretisation, name)
+    _check_contact(discretisation, name)
+
+
+def _check_spaces(discretisation: Discretisation, name: str, mesh: BoundaryMesh) -> None:
+    displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+    elastic = discretisation.elastic_map(mesh, _MATERIAL, DenseCholesky())
+    for space, of_map, what in (
+        (displacements, elastic.displacement_space, "displacement_space"),
+        (tractions, elastic.traction_space, "traction_space"),
+    ):
+        check_space(space)
+        is_same = type(of_map) is type(space) and np.array_equal(of_map.element_dofs, space.element_dofs)
+        demand(is_same, f"{name}.{what} is not the {what} of its map")
+    degrees = (displacements.degree, tractions.degree)
+    demand(
+        not discretisation.estimates_error or (displacements.is_continuous and degrees in ((1, 0), (2, 1))),
+        f"{name}.estimates_error is True with displacements and tractions of the degrees {degrees}: the estimate is "
+        "for continuous displacements of degree 1 or 2 and tractions of a degree less",
+    )
+
+
+def _check_map(discretisation: Discretisation, name: str) -> None:
+    """Check the matrix of the map: rigid motions cost no forces, and it is symmetric if it says so."""
+    mesh = _tension(discretisation).build_mesh()
+    elastic = discretisation.elastic_map(mesh, _MATERIAL, DenseCholesky())
+    matrix = elastic.matrix()
+    size = float(np.abs(matrix).max())
+    translations = np.tile(np.eye(2), (len(matrix) // 2, 1))
+    for product, what in ((matrix @ translations, "a translation causes forces"), (translations.T @ matrix, "forces")):
+        miss = float(np.abs(product).max()) / size
+        demand(miss <= _ROUND_OFF, f"{name}.elastic_map: {what} out of equilibrium, by {miss:.1e} of the stiffness")
+    if discretisation.is_symmetric:
+        miss = float(np.abs(matrix - matrix.T).max()) / size
+        demand(miss <= _ROUND_OFF, f"{name}.is_symmetric is True, but the map differs from its transpose by {miss:.1e}")
+
+
+def _check_tension(discretisation: Discretisation, name: str) -> None:
+    """Check a body under uniform tension against its exact displacements and stresses."""
+    solution = _solved(_tension(discretisation), name)
+    x, y = solution.boundary.points.T
+    nu = _MATERIAL.effective_poisson_ratio
+    exact = np.stack([x, -nu / (1.0 - nu) * y], axis=1) / _MATERIAL.plane_modulus
+    miss = float(np.abs(solution.boundary.displacement - exact).max() / np.abs(exact).max())
+    demand(miss <= _COARSE, f"{name}: displacements under uniform tension are wrong by {miss:.1e}")
+    stress = interior_fields(solution).stress(np.array([[0.7, 0.4], [1.2, 0.6]]))
+    miss = float(np.abs(stress - np.diag([1.0, 0.0])).max())
+    demand(miss <= _COARSE, f"{name}: stresses inside under uniform tension are wrong by {miss:.1e}")
+
+
+def _check_contact(discretisation: Discretisation, name: str) -> None:
+    """Check the forces on a block that is pressed down and to the side on a floor with friction."""
+    parts = (
+        Part("floor", Contact(HalfPlane()), ("bottom",)),
+        Part("load", Traction(x=0.1, y=-1.0), ("top",)),
+        Part("wall", Roller(), ("right",)),
+    )
+    solution = _solved(replace(_tension(discretisation), parts=parts, law=Coulomb(0.3)), name)
+    miss = abs(solution.force_normal - 2.0) / 2.0
+    demand(miss <= _ROUND_OFF, f"{name}: the floor carries a pressing force that is wrong by {miss:.1e}")
+    held = (Part("floor", Clamped(), ("bottom",)), parts[1])
+    _solved(replace(_tension(discretisation), parts=held, law=Frictionless()), name)
+
+
+def _solved(scene: Scene, name: str) -> Solution:
+    solution = run(scene)
+    demand(
+        solution.is_converged, f"{name}: a block of {scene.mesh.elements} elements is not solved: {solution.message}"
+    )
+    demand(
+        solution.work == solution.plan.work,
+        f"{name}.needs foresees {solution.plan.work.as_dict()}, but its map counts {solution.work.as_dict()}",
+    )
+    return solution
+
+
+def _tension(discretisation: Discretisation) -> Scene:
+    """Return a block under a uniform tension of 1 along x, in plane strain."""
+    parts = (
+        Part("wall", Roller(), ("left",)),
+        Part("floor", Roller(), ("bottom",)),
+        Part("load", Traction(x=1.0), ("right",)),
+    )
+    return Scene(
+        title="block",
+        shape=Rectangle(2.0, 1.0),
+        material=_MATERIAL,
+        parts=parts,
+        discretisation=discretisation,
+        mesh=MeshOptions(elements=48),
+    )

@@ -1,0 +1,54 @@
+"""What a scene says on a mesh is worked out once for each load step."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+import bemkit.model.prepared
+from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare, prepare_steps
+from bemkit.scene.load_history import load_steps
+
+ONCE = ("find_units", "find_contact", "contact_conditions", "supports_on", "nodal_forces", "check_symmetry")
+
+
+@pytest.mark.parametrize("factors", [(1.0,), (0.5, 1.0)])
+def test_everything_is_found_once_for_each_load_step(
+    factors: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: Counter[str] = Counter()
+    for name in ONCE:
+        original = getattr(bemkit.model.prepared, name)
+
+        def counted(*arguments: object, name: str = name, original: object = original) -> object:
+            calls[name] += 1
+            return original(*arguments)  # type: ignore[operator]
+
+        monkeypatch.setattr(bemkit.model.prepared, name, counted)
+    scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40), load_factors=factors)
+    assert bk.run(scene).is_converged
+    assert calls == dict.fromkeys(ONCE, len(factors))
+
+
+def test_load_steps_share_the_units_of_the_largest_load() -> None:
+    scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40), load_factors=(2.0, 0.5))
+    first, last = prepare_steps(load_steps(scene), scene.build_mesh())
+    assert last.units is first.units
+    np.testing.assert_allclose(0.25 * first.force, last.force, rtol=1e-14)
+    assert first.linear_solver.reason == "the map has a linear solver of its own"
+
+
+def test_a_node_that_loses_its_friction_keeps_the_condensed_body() -> None:
+    scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40))
+    smooth = dataclasses.replace(scene, law=bk.Frictionless())
+    model = build_model(prepare(scene, scene.build_mesh()))
+    without = model.under(model.prepared.under(smooth))
+    again = without.under(without.prepared.under(scene))
+    assert again.body.condensed.work.factorisations == model.body.condensed.work.factorisations
+    assert not again.nodes.is_frictionless.any()
+    assert without.problem.law.is_frictionless

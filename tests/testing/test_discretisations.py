@@ -1,0 +1,199 @@
+"""The check of discretisations accepts ours and one of one's own, and finds what is wrong with others."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.arrays import FloatArray
+from bemkit.cli.main import main
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.scene.discretisation import Discretisation, Galerkin
+from bemkit.scene.registry import DISCRETISATIONS
+from bemkit.testing import CheckFailed, check_discretisation
+
+PLUGIN = """
+from dataclasses import dataclass
+import numpy as np
+import bemkit as bk
+from bemkit.scene.discretisation import Galerkin
+
+@dataclass(frozen=True)
+class Jumping(Galerkin):
+    everywhere: bool = True
+
+    def displacement_space(self, mesh):
+        return bk.QuadraticSpace(mesh)
+
+    def traction_space(self, mesh):
+        return bk.LinearSpace(mesh, np.full(mesh.n_nodes, self.everywhere))
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "bemkit_jumping.py").write_text(PLUGIN, "utf-8")
+    information = tmp_path / "bemkit_jumping-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: bemkit-jumping\nVersion: 1.0\n", "utf-8")
+    (information / "entry_points.txt").write_text("[bemkit.discretisations]\njumping = bemkit_jumping:Jumping\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    yield
+    sys.modules.pop("bemkit_jumping", None)
+
+
+@pytest.mark.parametrize("kind", DISCRETISATIONS.built_in)
+def test_built_in_discretisations_keep_their_promises(kind: str) -> None:
+    check_discretisation(DISCRETISATIONS.find(kind)())
+
+
+def test_the_papers_collocation_keeps_its_promises() -> None:
+    check_discretisation(bk.ConstantCollocation(slopes=False))
+
+
+def test_one_of_ones_own_goes_all_the_way(plugin: None, capsys: pytest.CaptureFixture[str]) -> None:
+    """From a scene file to the plan, the result file, the tables and the pictures."""
+    text = bk.scene_to_toml(replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
+    Path("own.toml").write_text(text.replace('discretisation = "constant"', 'discretisation = "jumping"'), "utf-8")
+    for arguments in ("plan own.toml --json", "run own.toml -o own.h5 --plot pictures", "show own.h5 --csv boundary"):
+        with pytest.raises(SystemExit) as end:
+            main(arguments.split())
+        assert end.value.code == 0
+    shown = capsys.readouterr().out
+    assert "quadratic displacements, linear tractions" in shown
+    assert "24 (jumping)" in shown
+    again = bk.read_result("own.h5")
+    assert type(again.scene.discretisation).__name__ == "Jumping"
+    assert len(again.boundary.traction_dofs) == 2 * 24
+    assert again.work == again.plan.work
+    assert {path.suffix for path in Path("pictures").iterdir()} == {".png"}
+
+
+def test_one_without_a_word_is_shown_by_its_name(capsys: pytest.CaptureFixture[str]) -> None:
+    from bemkit.cli.console import print_summary
+
+    print_summary(bk.run(replace(bk.load_scene("bending"), discretisation=Own(), mesh=bk.MeshOptions(elements=24))))
+    assert "24 (Own)" in capsys.readouterr().out
+
+
+@dataclass(frozen=True)
+class Own(Galerkin):
+    """Quadratic displacements with linear tractions that may jump at every node."""
+
+    def displacement_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
+        """Return quadratic functions."""
+        return bk.QuadraticSpace(mesh)
+
+    def traction_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
+        """Return linear functions without any continuity."""
+        return bk.LinearSpace(mesh, np.ones(mesh.n_nodes, bool))
+
+
+class NoDataclass(Galerkin):
+    displacement_space, traction_space = Own.displacement_space, Own.traction_space
+
+
+@dataclass(frozen=True, eq=False)
+class UnlikeItsCopy(Galerkin):
+    displacement_space, traction_space = Own.displacement_space, Own.traction_space
+
+
+@dataclass(frozen=True)
+class Nameless(Own):
+    method = ""
+
+
+@dataclass(frozen=True)
+class Vague(Own):
+    is_symmetric = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class OtherSpace(Own):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> GalerkinMap:
+        return GalerkinMap(mesh, material)
+
+
+@dataclass(frozen=True)
+class TooHigh(Own):
+    estimates_error = True
+
+    def traction_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
+        return bk.ConstantSpace(mesh)
+
+
+@dataclass(frozen=True)
+class Uncounted(Own):
+    def needs(self, case: BodyCase) -> BodyNeeds:
+        return BodyNeeds()
+
+
+@dataclass(frozen=True)
+class NotSymmetric(bk.ConstantCollocation):
+    is_symmetric = True
+
+
+class Distorted(CollocationMap):
+    """Adds springs to the matrix."""
+
+    def matrix(self) -> FloatArray:
+        """Return the matrix with forces on translations."""
+        return super().matrix() + 1e-3 * np.eye(self.displacement_space.n_dofs)
+
+
+@dataclass(frozen=True)
+class Springs(bk.ConstantCollocation):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> Distorted:
+        return Distorted(mesh, material)
+
+
+@dataclass(frozen=True)
+class Softer(bk.ConstantCollocation):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> CollocationMap:
+        return CollocationMap(mesh, bk.Material(0.8 * material.youngs_modulus, material.poisson_ratio))
+
+
+class Weakened(CollocationMap):
+    """Halves the tractions of supports."""
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return half of the tractions."""
+        return 0.5 * super().element_tractions(displacement, force)
+
+
+@dataclass(frozen=True)
+class HalfTheTractions(bk.ConstantCollocation):
+    def elastic_map(self, mesh: bk.BoundaryMesh, material: bk.Material, linear_solver: LinearSolver) -> Weakened:
+        return Weakened(mesh, material)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (NoDataclass(), "NoDataclass is no dataclass"),
+        (UnlikeItsCopy(), "UnlikeItsCopy does not equal its copy"),
+        (Nameless(), "Nameless.method is empty"),
+        (Vague(), "Vague.is_symmetric is None, not a bool"),
+        (OtherSpace(), "OtherSpace.displacement_space is not the displacement_space of its map"),
+        (TooHigh(), r"TooHigh.estimates_error is True with .* of the degrees \(2, 0\)"),
+        (Uncounted(), "Uncounted.needs foresees .*'element_pairs': 0.*, but its map counts"),
+        (NotSymmetric(), "NotSymmetric.is_symmetric is True, but the map differs from its transpose by"),
+        (Springs(), "Springs.elastic_map: a translation causes forces"),
+        (Softer(), "Softer: displacements under uniform tension are wrong by 2.*e-01"),
+        (HalfTheTractions(), "HalfTheTractions: stresses inside under uniform tension are wrong"),
+    ],
+    ids=lambda value: "" if isinstance(value, str) else type(value).__name__,
+)
+def test_broken_promises_are_found(wrong: Discretisation, message: str) -> None:
+    with pytest.raises(CheckFailed, match=message):
+        check_discretisation(wrong)
