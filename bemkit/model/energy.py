@@ -49,7 +49,7 @@ def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) ->
         displacement, force = model.body.recover(result.state)
         # by Galerkin's method no direction is negative but for round-off, which the work of the solution tells
         is_galerkin = isinstance(model.elastic, GalerkinMap)
-        if not is_galerkin and is_indefinite(model.body.dense.stiffness, condensed.sensitivity):
+        if not is_galerkin and is_indefinite(model.body.stiffness, condensed.sensitivity):
             return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.elastic.displacement_space
     motions = resting_motions(space.mesh, dof_points(space))

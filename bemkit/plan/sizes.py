@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.contact.condensation.nodes import contact_conditions, free_motions
-from bemkit.contact.condensation.retained import find_tangents
+from bemkit.contact.condensation.nodes import contact_conditions, find_tangents, free_motions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.boundary_data import find_units, nodal_forces, supports_on
@@ -99,7 +98,7 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
     space = decisions.displacement_space(mesh.unit)
     supports, candidates = supports_on(scene, mesh, units, space), find_contact(scene, mesh, space).nodes
     conditions, nodes = contact_conditions(space, supports, candidates)
-    tangent_is_free = find_tangents(conditions, nodes)
+    tangent_is_eliminated = find_tangents(conditions, nodes)
     data = _data(steps, mesh, space, conditions) if decisions.formulation is Formulation.COLLOCATION else []
     holds_volume = scene.material.is_incompressible and not mesh.is_exterior
     return Sizes(
@@ -118,7 +117,7 @@ def find_sizes(steps: Sequence[Scene], mesh: BoundaryMesh, decisions: Decisions)
         n_sweeps=len(data),
         n_collocation_pairs=_n_pairs(data, mesh),
         n_contact=nodes.nodes.size,
-        n_contact_unknowns=2 * nodes.nodes.size - int(np.count_nonzero(tangent_is_free)),
+        n_contact_unknowns=2 * nodes.nodes.size - int(np.count_nonzero(tangent_is_eliminated)),
         n_motions=len(possible_motions(mesh)),
         n_free_motions=len(free_motions(conditions, nodes, space)),
         n_pressures=len(mesh.loops) if holds_volume else int(not mesh.is_exterior),

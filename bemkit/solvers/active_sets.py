@@ -159,7 +159,7 @@ class ProjectedConditions:
         direction is; theirs is zero here, so that equal sets give equal steps.
         """
         sets = trial.sets
-        flips = (sets.direction * previous.direction < 0) & sets.is_closed & previous.is_closed
+        flips = sets.direction * previous.direction < 0
         return ActiveSets(sets.is_closed, np.where(flips | trial.is_free, 0, sets.direction))
 
 

@@ -10,6 +10,7 @@ from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
 from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.floating import negligible
 from bemkit.solvers.newton import respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
 from bemkit.solvers.progress import Progress
@@ -194,11 +195,12 @@ def _is_solved(
 ) -> bool:
     """Whether the Newton point solves the equations: no residual, or its own sets and its own linearised bound."""
     stress, _ = certificate_scales(conditions.problem, reached.state)
-    if np.abs(reached.residual).max() <= 1e-12 * stress:
+    nothing = negligible(conditions.problem.body) * stress
+    if np.abs(reached.residual).max() <= nothing:
         return True
     # Displacements times a large rho leave more than that as round-off, so look at what was linearised instead.
     linearised = trial.bound + trial.slope * (reached.predicted_sigma_n - trial.predicted_sigma_n)
-    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= 1e-12 * stress))
+    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= nothing))
     return not is_sprung and reached.sets.key == sets.key and is_exact
 
 

@@ -41,6 +41,10 @@ class Status(Enum):
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
     )
+    TOO_COSTLY = (
+        "This driver asks for several responses for each contact node, and those of this body are costly; use "
+        "SemismoothNewton, AugmentedLagrangian or FixedPoint."
+    )
     NEGATIVE_ENERGY = (
         "The elastic energy is negative or can become so, because the elements are too long for collocation; "
         "use more elements, at least two for the thickness of a thin body, or linear or quadratic Galerkin elements."

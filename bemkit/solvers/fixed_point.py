@@ -35,7 +35,7 @@ class FixedPoint:
     inner : SemismoothNewton
         Driver of the Tresca problems.
     inner_tolerance : float
-        Certificate of the inner solutions.
+        Certificate of the inner solutions; at least a thousand times the accuracy of the body.
     max_steps : int
         Outer steps allowed.
 
@@ -65,7 +65,8 @@ class FixedPoint:
         sigma_n = iterate.state.sigma_n
         bound = problem.friction_bound(sigma_n, is_closed=sigma_n < 0.0)
         tresca = problem.with_law(Tresca(bound))
-        inner = solve(tresca, self.inner, start=iterate.state, tolerance=self.inner_tolerance, throw=False)
+        tolerance = max(self.inner_tolerance, 1e3 * problem.body.accuracy)
+        inner = solve(tresca, self.inner, start=iterate.state, tolerance=tolerance, throw=False)
         linear_solves = iterate.linear_solves + inner.linear_solves
         if not inner.is_converged:
             state = inner.state if np.isfinite(inner.state.displacement).all() else iterate.state

@@ -8,9 +8,14 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.contact.problem import ContactState, LinearBody, SingularResponse
 
-_BALANCED = 1e-12
-"""Imbalance, beyond what round-off may leave, below which nothing is left that could move a body. A certificate asks
-for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+_NEGLIGIBLE = 100.0
+"""Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
+a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+
+
+def negligible(body: LinearBody) -> float:
+    """Return the relative size below which a residual is nothing but the inaccuracy of the body's responses."""
+    return _NEGLIGIBLE * body.accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     """
     free = conditions.free_motions(body.rigid_motions())
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
-    gives_traction[:, 1] &= ~body.tangent_is_free  # whose displacement cannot be held
+    gives_traction[:, 1] &= ~body.tangent_is_eliminated  # whose displacement cannot be held
     if not len(free) or np.count_nonzero(gives_traction) < len(free):
         return None
     pins = _determinate(free, gives_traction)
@@ -84,7 +89,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
-    return FloatingResponse(state, free) if body.imbalance(state).is_below(_BALANCED) else None
+    return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:

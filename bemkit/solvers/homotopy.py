@@ -73,10 +73,17 @@ class _Piece(NamedTuple):
     slack_rate: FloatArray  # (5, n_contact)
 
 
-def path_exists(problem: ContactProblem) -> bool:
-    """Return whether the law is continuous where nodes open, which following the path takes for granted."""
+def why_no_path(problem: ContactProblem) -> str:
+    """Return why the path of solutions is not to be followed, nothing if it is.
+
+    It asks for two responses or more for each contact node, and the law has to be continuous where nodes open.
+    """
+    if problem.body.is_costly:
+        return "the path of solutions is not followed, because responses of this body are costly"
     jumps = problem.friction_bound(np.zeros(problem.n_contact)) > 0.0
-    return not np.any(jumps & ~np.asarray(problem.law.acts_across_gap))
+    if np.any(jumps & ~np.asarray(problem.law.acts_across_gap)):
+        return "there is no path of solutions, because the friction law jumps where nodes open"
+    return ""
 
 
 def follow_path(
@@ -229,7 +236,7 @@ class _Path:
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
-        sticks = ~slips & ~problem.body.tangent_is_free  # where the tangent is free there is nothing to follow
+        sticks = ~slips & ~problem.body.tangent_is_eliminated  # where the tangent is free there is nothing to follow
         conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
         conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)

@@ -44,11 +44,11 @@ class Progress:
 
     def after(self, problem: ContactProblem, state: ContactState) -> "Progress":
         """Return the record after one more step."""
-        residual = _residual(problem, state)
+        residual, accuracy = _residual(problem, state), problem.body.accuracy
         improved = residual < 0.9 * self.best
         since = 0 if improved else self.steps_since_best + 1
-        ended = Status.STALLED if since > _PATIENCE or _is_same(state, self.recent[-1]) else None
-        if any(_is_same(state, earlier) for earlier in self.recent[:-1]) and ended is None:
+        ended = Status.STALLED if since > _PATIENCE or _is_same(state, self.recent[-1], accuracy) else None
+        if any(_is_same(state, earlier, accuracy) for earlier in self.recent[:-1]) and ended is None:
             ended = Status.CYCLING
         recent = (*self.recent, state)[-_MEMORY:]
         return Progress(recent, residual if improved else self.best, since, ended)
@@ -59,9 +59,9 @@ def _residual(problem: ContactProblem, state: ContactState) -> float:
     return merit(problem, ProjectedConditions(problem, rho, rho).evaluate(state))
 
 
-def _is_same(state: ContactState, other: ContactState) -> bool:
-    """Whether two states agree to round-off."""
+def _is_same(state: ContactState, other: ContactState, accuracy: float) -> bool:
+    """Whether two states agree to ten times the accuracy of their body."""
     return all(
-        float(np.abs(a - b).max()) <= 1e-13 * float(np.abs(a).max())
+        float(np.abs(a - b).max()) <= 10.0 * accuracy * float(np.abs(a).max())
         for a, b in ((state.displacement, other.displacement), (state.traction, other.traction))
     )

@@ -6,7 +6,8 @@ from enum import Enum, auto
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
 from bemkit.solvers.base import Iterate, Status
-from bemkit.solvers.homotopy import AffineBound, follow_path, path_exists
+from bemkit.solvers.floating import negligible
+from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
 from bemkit.solvers.newton import merit, respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
 
@@ -23,9 +24,6 @@ _FEW_PIECES = 20
 
 _FEW_STEPS = 12
 """Full steps under weaker friction."""
-
-_SOLVED = 1e-12
-"""Relative residual of (15), (16) below which only round-off is left."""
 
 
 class Phase(Enum):
@@ -181,7 +179,7 @@ class SemismoothNewton:
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
         repeats = not is_new and not response.is_sprung and following.merit >= 0.5 * iterate.merit
-        if repeats and size <= _SOLVED:
+        if repeats and size <= negligible(problem.body):
             reason = "contact and friction are satisfied, the rest of the certificate is beyond this driver"
             return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
@@ -211,13 +209,14 @@ class SemismoothNewton:
 
     def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
-        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and path_exists(problem)
+        hindrance = why_no_path(problem) if self.follows_path else ""
+        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and not hindrance
         for phase in iterate.phase.more_patient:
             if phase is Phase.DAMPED and self.damped_steps > 0:
                 return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
             if phase is not Phase.DAMPED and may_follow:
                 return replace(iterate, phase=phase, n_in_phase=0, message=f"{reason}; the path is followed next")
-        return replace(iterate, ended=status, message=reason)
+        return replace(iterate, ended=status, message="; ".join(filter(None, (reason, hindrance))))
 
     def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         bound = AffineBound.tangent(problem, iterate.state.sigma_n)

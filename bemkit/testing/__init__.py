@@ -1,5 +1,6 @@
 """Checks that implementations, ours and yours, keep the promises of bemkit's protocols."""
 
+from bemkit.testing.bodies import check_body as check_body
 from bemkit.testing.curves import check_curve as check_curve
 from bemkit.testing.failure import CheckFailed as CheckFailed
 from bemkit.testing.laws import check_law as check_law

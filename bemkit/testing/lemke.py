@@ -70,7 +70,9 @@ class LemkePivoting:
         return Iterate(state=start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
-        """Pivot from the origin to a solution."""
+        """Pivot from the origin to a solution; the body is asked for two responses for each contact node."""
+        if problem.body.is_costly:
+            return replace(iterate, ended=Status.TOO_COSTLY)
         stiffness, load, linear_solves = _probed(problem)
         springs, spring_load = _springs(problem, iterate.state)
         try:
@@ -196,7 +198,7 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
         moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
         stiffness[:, column] = weights * (moved - at_rest) / amount
-    idle = 2 * np.flatnonzero(body.tangent_is_free) + 1
+    idle = 2 * np.flatnonzero(body.tangent_is_eliminated) + 1
     stiffness[idle, idle] = weights[idle] * body.stiffness_scale
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
@@ -209,7 +211,7 @@ def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, 
     motions, n_unknowns = problem.body.rigid_motions(), 2 * problem.n_contact
     if not len(motions):
         return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
-    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_free], axis=1)
+    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_eliminated], axis=1)
     motions = (motions * is_held).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
     scale = _WEAKER * spring_stiffness(problem, state) * float(np.median(problem.body.weights))

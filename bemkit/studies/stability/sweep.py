@@ -269,9 +269,9 @@ def condition_number(scene: Scene, case: Case) -> float:
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(scene, mesh).body
-        diagonal = np.abs(np.diagonal(body.dense.stiffness))
+        diagonal = np.abs(np.diagonal(body.stiffness))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-        singular = np.linalg.svd(scale[:, None] * body.dense.stiffness * scale, compute_uv=False)
+        singular = np.linalg.svd(scale[:, None] * body.stiffness * scale, compute_uv=False)
     smallest = float(singular[max(singular.size - 1 - len(body.rigid_motions()), 0)])
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 
