@@ -13,7 +13,7 @@ from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
-from bemkit.solvers.active_sets import NodeStatus, contact_sets
+from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.floating import FloatingResponse, floating_response
 from bemkit.solvers.newton import consistent_state
 
@@ -263,33 +263,34 @@ class _Run:
                 if escape is not None:
                     return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
                 unheld = self._unheld()
-                first = self._first(start)
-                spent = first.linear_solves + (unheld is not None)
-                iterate = self._freed(replace(first, linear_solves=spent), unheld)
+                iterate = self._freed(self._first(start, spent=int(unheld is not None)), unheld)
             except SingularResponse as error:
                 return self._nothing_done(Status.SINGULAR, str(error))
-            history = [self._record(iterate, None)]
+            sets = contact_sets(self.problem, iterate.state)
+            history = [self._record(iterate, sets, 0, float("inf"), 0)]
             while (status := self._verdict(iterate, history)) is None:
                 try:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
                 following = self._freed(following, unheld)
-                history.append(self._record(following, iterate, step=len(history)))
-                iterate = following
+                new_sets = contact_sets(self.problem, following.state)
+                change = _relative_change(following.state, iterate.state)
+                history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
+                iterate, sets = following, new_sets
             # a certificate measures by the travel where that hides the deformation
             if status is not Status.MAX_STEPS and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
-        return self._solution(iterate, status, history)
+        return self._solution(iterate, status, sets, history)
 
-    def _first(self, start: ContactState | None) -> Iterate:
+    def _first(self, start: ContactState | None, spent: int) -> Iterate:
         if start is None:
             state, linear_solves = self.problem.glued_state, 1
         else:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
-        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves)
+        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + spent)
 
     def _unheld(self) -> FloatingResponse | None:
         """Return the response without any contact, if the body floats and its load balances."""
@@ -312,14 +313,9 @@ class _Run:
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")
 
-    def _record(self, iterate: Iterate, previous: Iterate | None, step: int = 0) -> StepRecord:
-        sets = contact_sets(self.problem, iterate.state)
-        n_changed, relative_change = 0, float("inf")
-        if previous is not None:
-            n_changed = sets.n_changed(contact_sets(self.problem, previous.state))
-            size = float(np.abs(iterate.state.displacement).max())
-            change = float(np.abs(iterate.state.displacement - previous.state.displacement).max())
-            relative_change = change / size if size > 0.0 else float(change > 0.0)
+    def _record(
+        self, iterate: Iterate, sets: ActiveSets, step: int, relative_change: float, n_changed: int
+    ) -> StepRecord:
         slips = sets.is_closed & (sets.direction != 0)
         record = StepRecord(
             step=step,
@@ -345,7 +341,9 @@ class _Run:
             return iterate.ended
         return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
 
-    def _solution(self, iterate: Iterate, status: Status, history: list[StepRecord]) -> ContactSolution:
+    def _solution(
+        self, iterate: Iterate, status: Status, sets: ActiveSets, history: list[StepRecord]
+    ) -> ContactSolution:
         last = history[-1]
         worst = f"worst certificate entry {last.certificate.worst:.1e} after {last.step} steps"
         remark = f" ({iterate.message})" if iterate.message else ""
@@ -353,7 +351,7 @@ class _Run:
             state=iterate.state,
             status=status,
             certificate=last.certificate,
-            node_status=contact_sets(self.problem, iterate.state).node_status,
+            node_status=sets.node_status,
             steps=last.step,
             linear_solves=iterate.linear_solves,
             message=f"{status.value} [{worst}]{remark}",
@@ -373,3 +371,10 @@ class _Run:
             message=f"{status.value} {message}",
             history=(),
         )
+
+
+def _relative_change(state: ContactState, previous: ContactState) -> float:
+    """Return how far the displacements have moved, relative to their size."""
+    size = float(np.abs(state.displacement).max())
+    change = float(np.abs(state.displacement - previous.displacement).max())
+    return change / size if size > 0.0 else float(change > 0.0)

@@ -187,7 +187,9 @@ class CondensedBody(DenseBody):
         if not self.balanced or self._only_moves(displacement, total):
             return of_contact
         round_off = round_off_of(displacement, self.condensed.sensitivity)
-        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, round_off))
+        return of_contact.joined(
+            resultant_imbalance(self.points, force, self.balanced, round_off, self.condensed.volume_force)
+        )
 
     def _only_moves(self, displacement: FloatArray, total: float) -> bool:
         """Whether the body has moved rigidly, so that its forces are what is left of terms which cancel."""
@@ -231,9 +233,15 @@ def condense(
     SingularMatrixError
         If even glued contact does not hold the body.
     """
-    space = elastic.displacement_space
-    conditions, contact = contact_conditions(space, supports, candidates)
-    condensed = elastic.condense(conditions, force)
+    conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
+    return condensed_body(elastic, conditions, contact, force)
+
+
+def condensed_body(
+    elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
+) -> CondensedBody:
+    """Reduce a body to its contact boundary, with the conditions and nodes that `contact_conditions` has found."""
+    space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
     if not contact.nodes.size:
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
