@@ -71,7 +71,7 @@ class ContactProblem:
         return np.zeros(self.n_contact) if self.reference_slip is None else self.reference_slip
 
     @cached_property
-    def glued_state(self) -> ContactState:
+    def sticking_state(self) -> ContactState:
         """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
 
         Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
@@ -109,8 +109,8 @@ class ContactProblem:
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law."""
         other = replace(self, law=law)
-        if "glued_state" in self.__dict__:  # it does not depend on the law
-            other.__dict__["glued_state"] = self.glued_state
+        if "sticking_state" in self.__dict__:  # it does not depend on the law
+            other.__dict__["sticking_state"] = self.sticking_state
         return other
 
     def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:

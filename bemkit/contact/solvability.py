@@ -78,7 +78,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         return None
     unit = np.abs(motions).reshape(len(motions), -1).max(axis=1)
     motions, load = motions / unit[:, None, None], problem.body.rigid_load() / unit
-    forces = problem.body.weights[:, None] * problem.glued_state.traction
+    forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
         return None
@@ -112,7 +112,7 @@ def find_long_travel(problem: ContactProblem) -> float | None:
         Smallest gap that must close, in displacements that the load of the glued body causes at one node; None if it
         is small enough for displacements to hold both the travel and the deformation.
     """
-    deformation = float(np.abs(problem.glued_state.traction).max()) / problem.body.stiffness_scale
+    deformation = float(np.abs(problem.sticking_state.traction).max()) / problem.body.stiffness_scale
     is_far = problem.gap > _FARTHEST * deformation
     if not is_far.any() or find_unsolvable_load(replace(problem, gap=np.where(is_far, np.inf, problem.gap))) is None:
         return None
@@ -122,7 +122,7 @@ def find_long_travel(problem: ContactProblem) -> float | None:
 def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
     """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
     none = np.zeros(problem.n_contact)
-    pressure = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    pressure = float(np.abs(problem.sticking_state.traction).max()) or 1.0
     cohesion = problem.friction_bound(none)
     slopes = [-problem.friction_slope(none)]
     for factor in 10.0 ** np.arange(-6, 7):

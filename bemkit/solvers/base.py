@@ -286,7 +286,7 @@ class _Run:
 
     def _first(self, start: ContactState | None, spent: int) -> Iterate:
         if start is None:
-            state, linear_solves = self.problem.glued_state, 1
+            state, linear_solves = self.problem.sticking_state, 1
         else:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
@@ -295,7 +295,7 @@ class _Run:
     def _unheld(self) -> FloatingResponse | None:
         """Return the response without any contact, if the body floats and its load balances."""
         body = self.problem.body
-        most = float(body.weights @ np.abs(self.problem.glued_state.traction).sum(axis=1))
+        most = float(body.weights @ np.abs(self.problem.sticking_state.traction).sum(axis=1))
         if np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2))):
             return None  # far from balanced, which is not worth a linear solve
         return floating_response(body, separated(body.n_contact))

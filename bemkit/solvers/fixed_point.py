@@ -41,8 +41,8 @@ class FixedPoint:
 
     Notes
     -----
-    The classical proof of existence made into a method. It contracts for moderate friction only; beyond, it ends with
-    CYCLING or STALLED. The limit of `AugmentedLagrangian` for large rho.
+    The classical proof of existence [NecasJarusekHaslinger1980] made into a method. It contracts for moderate friction
+    only; beyond, it ends with CYCLING or STALLED. The limit of `AugmentedLagrangian` for large rho.
     """
 
     inner: SemismoothNewton = field(default_factory=SemismoothNewton)

@@ -4,8 +4,8 @@ Pressed hard enough by extra forces at the contact nodes and held by enough extr
 everywhere and sticks everywhere. Between two changes of a node's status the response is linear in the amount of the
 extras, so the path from there to the problem proper consists of straight pieces: at each joint one node changes its
 status, and the amount goes on falling, or rises again for a while where the path folds. Folds are where Newton's method
-and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting, carried out on a body
-instead of a matrix.
+and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting [Lemke1965], carried out
+on a body instead of a matrix.
 
 The path may also start with any other statuses, those at which Newton's method gives up: then only nodes that violate
 an inequality get extras, of pressure, friction, gap or slip, which make it hold. Few are wrong, so this path is short.
@@ -183,7 +183,7 @@ class Extras:
     @classmethod
     def everywhere(cls, problem: ContactProblem) -> "Extras":
         """Return pressure and friction at all nodes: with enough of it every node touches and sticks."""
-        stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+        stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
         extras, none = stress * _uneven(2 * problem.n_contact), np.zeros(problem.n_contact)
         return cls(extras[::2], extras[1::2], none, none)
 

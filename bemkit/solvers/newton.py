@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.errors import InputError
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.floating import floating_response
 
 _SPRING = 1e-3
@@ -22,33 +22,33 @@ soon carries the body to where other sets hold it; by the second at most."""
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Answer of the body to Newton's linear conditions.
+    """Answer of the body to Newton's linear equations.
 
     Parameters
     ----------
     state : ContactState
     linear_solves : int
         Linear systems spent.
-    is_sprung : bool
+    is_regularised : bool
         Whether the conditions left the body free to move, so that springs had to hold it in this step.
     """
 
     state: ContactState
     linear_solves: int
-    is_sprung: bool
+    is_regularised: bool
 
 
-def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, n_sprung: int = 0) -> Response:
-    """Solve the linearised conditions.
+def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets, n_regularised: int = 0) -> Response:
+    """Solve the linearised equations.
 
     Parameters
     ----------
-    conditions : ProjectedConditions
-    trial : Trial
+    equations : ProjectionEquations
+    residual : Residual
         Where to linearise.
     sets : ActiveSets
         Sets of the Newton matrix.
-    n_sprung : int
+    n_regularised : int
         Steps before this one that springs held with the same sets.
 
     Returns
@@ -62,17 +62,17 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, n_s
     SingularResponse
         If even springs at all free nodes do not.
     """
-    body = conditions.problem.body
-    linear = conditions.linearised(trial, sets)
+    body = equations.problem.body
+    linear = equations.linearised(residual, sets)
     try:
-        return Response(body.respond(linear), 1, is_sprung=False)
+        return Response(body.respond(linear), 1, is_regularised=False)
     except SingularResponse:
         floating = floating_response(body, linear)
         if floating is not None:
-            return Response(floating.nearest(trial.state.displacement), 2, is_sprung=False)
-        stiffness = spring_stiffness(conditions.problem, trial.state) * max(_WEAKER**n_sprung, _WEAKEST)
-        springs = linear.held_by_springs(trial.state.displacement, stiffness)
-        return Response(conditions.problem.respond(springs), 2, is_sprung=True)
+            return Response(floating.nearest(residual.state.displacement), 2, is_regularised=False)
+        stiffness = spring_stiffness(equations.problem, residual.state) * max(_WEAKER**n_regularised, _WEAKEST)
+        springs = linear.regularised(residual.state.displacement, stiffness)
+        return Response(equations.problem.respond(springs), 2, is_regularised=True)
 
 
 def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
@@ -85,11 +85,11 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
     return _SPRING * stiffness
 
 
-def merit(problem: ContactProblem, trial: Trial) -> float:
+def merit(problem: ContactProblem, residual: Residual) -> float:
     """Return the size of the residual of (15), (16) in the weighted mean square, relative to the traction scale."""
     weights = problem.body.weights
-    mean_square = float(weights @ (trial.residual**2).sum(axis=1)) / float(weights.sum())
-    stress, _ = certificate_scales(problem, trial.state)
+    mean_square = float(weights @ (residual.value**2).sum(axis=1)) / float(weights.sum())
+    stress, _ = certificate_scales(problem, residual.state)
     return float(np.sqrt(mean_square)) / stress
 
 
@@ -111,7 +111,7 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
     if not guess.is_finite:
         raise InputError("start contains entries that are not finite; give finite displacements and tractions")
     rho = problem.body.stiffness_scale
-    conditions = ProjectedConditions(problem, rho, rho)
-    trial = conditions.evaluate(guess)
-    response = respond(conditions, trial, trial.sets)
+    equations = ProjectionEquations(problem, rho, rho)
+    residual = equations.evaluate(guess)
+    response = respond(equations, residual, residual.sets)
     return response.state, response.linear_solves

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.contact.problem import ContactProblem, ContactState
-from bemkit.solvers.active_sets import ProjectedConditions
+from bemkit.solvers.active_sets import ProjectionEquations
 from bemkit.solvers.base import Status
 from bemkit.solvers.newton import merit
 
@@ -56,7 +56,7 @@ class Progress:
 
 def _residual(problem: ContactProblem, state: ContactState) -> float:
     rho = problem.body.stiffness_scale
-    return merit(problem, ProjectedConditions(problem, rho, rho).evaluate(state))
+    return merit(problem, ProjectionEquations(problem, rho, rho).evaluate(state))
 
 
 def _is_same(state: ContactState, other: ContactState, accuracy: float) -> bool:

@@ -66,7 +66,7 @@ class _Asked:
     @classmethod
     def of(cls, body: LinearBody) -> _Asked:
         problem = ContactProblem(body, np.zeros(body.n_contact), Frictionless())
-        return cls(body, problem, float(np.abs(problem.glued_state.traction).max()) / body.stiffness_scale or 1.0)
+        return cls(body, problem, float(np.abs(problem.sticking_state.traction).max()) / body.stiffness_scale or 1.0)
 
     @property
     def name(self) -> str:
@@ -137,7 +137,7 @@ def _check_rigid_motions(asked: _Asked) -> None:
         return
     rank = np.linalg.matrix_rank(motions.reshape(len(motions), -1))
     demand(rank == len(motions), f"{name}.rigid_motions are linearly dependent")
-    rest = asked.problem.glued_state
+    rest = asked.problem.sticking_state
     forces = body.weights[:, None] * rest.traction
     for motion, load in zip(motions, body.rigid_load(), strict=True):
         moved = rest.displacement + motion * asked.length / np.abs(motion).max()

@@ -49,8 +49,7 @@ class LemkePivoting:
 
     References
     ----------
-    D. E. Stewart, J. C. Trinkle, Int. J. Numer. Meth. Engng 39 (1996) 2673-2691.
-    R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, section 4.4.
+    [StewartTrinkle1996]; [CottlePangStone1992], section 4.4.
     """
 
     max_steps: int = 30
@@ -172,7 +171,7 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
     """Return (c, s) of ``bound = c + s |sigma_n|``."""
     none = np.zeros(problem.n_contact)
     cohesion = problem.friction_bound(none)
-    stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
     coefficient = (problem.friction_bound(none - stress) - cohesion) / stress
     far = problem.friction_bound(none - 1e3 * stress)
     is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
@@ -192,7 +191,7 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     body, n_contact = problem.body, problem.n_contact
     weights = np.repeat(body.weights, 2)
     none = np.zeros(n_contact)
-    amount = (float(np.abs(problem.glued_state.traction).max()) or 1.0) / body.stiffness_scale
+    amount = (float(np.abs(problem.sticking_state.traction).max()) or 1.0) / body.stiffness_scale
     at_rest = problem.respond(stick(none, none)).traction.ravel()
     stiffness = np.empty((2 * n_contact, 2 * n_contact))
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
@@ -229,7 +228,7 @@ def _complementarity(
     """
     cohesion, coefficient = _affine_bound(problem)
     normal, tangential = slice(0, None, 2), slice(1, None, 2)
-    force = float(np.abs(problem.body.weights[:, None] * problem.glued_state.traction).max()) or 1.0
+    force = float(np.abs(problem.body.weights[:, None] * problem.sticking_state.traction).max()) or 1.0
     unit_compliance = float(np.abs(compliance).max())
     length = force * unit_compliance
     relative = compliance / unit_compliance

@@ -134,7 +134,7 @@ def test_the_body_is_assembled_once_and_loads_are_exact(
     fresh = build_model(second, mesh, model.units)
     assert len(calls) == 2
     np.testing.assert_allclose(moved.body.load, fresh.body.load, atol=1e-12 * np.abs(fresh.body.load).max())
-    state = fresh.problem.glued_state
+    state = fresh.problem.sticking_state
     for one, other in zip(moved.boundary_fields(state), fresh.boundary_fields(state), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.max(np.abs(other)))
     calls.clear()

@@ -7,7 +7,7 @@ import pytest
 
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -50,7 +50,7 @@ def test_a_body_that_claims_too_much_is_found_out():
 def test_residuals_and_states_are_compared_by_the_accuracy(accuracy):
     problem = inexact_problem(Coulomb(0.5), accuracy=accuracy, error=0.0)
     assert negligible(problem.body) == pytest.approx(100.0 * accuracy)
-    state = problem.glued_state
+    state = problem.sticking_state
     moved = replace(state, traction=(1.0 + 3.0 * accuracy) * state.traction)
     assert Progress.begun(problem, state).after(problem, moved).ended is Status.STALLED
     moved = replace(state, traction=(1.0 + 30.0 * accuracy) * state.traction)
@@ -79,13 +79,13 @@ def test_lemkes_method_declines_before_it_asks():
 
 def test_an_open_node_with_given_friction_turns_round_by_way_of_stick():
     problem = block_problem(Tresca(0.2))
-    conditions = ProjectedConditions(problem, 1.0, 1.0)
-    state = problem.glued_state
+    conditions = ProjectionEquations(problem, 1.0, 1.0)
+    state = problem.sticking_state
     n_contact = problem.n_contact
     lifted = replace(state, displacement=np.tile([-9.0, 9.0], (n_contact, 1)))
-    trial = conditions.evaluate(lifted)
-    assert not trial.sets.is_closed.any()
-    assert (trial.sets.direction == 1).all()
-    back = ActiveSets(trial.sets.is_closed, np.full(n_contact, -1))
-    assert not conditions.cautious(trial, back).direction.any()
-    assert (conditions.cautious(trial, trial.sets).direction == 1).all()
+    residual = conditions.evaluate(lifted)
+    assert not residual.sets.is_closed.any()
+    assert (residual.sets.direction == 1).all()
+    back = ActiveSets(residual.sets.is_closed, np.full(n_contact, -1))
+    assert not conditions.through_stick(residual, back).direction.any()
+    assert (conditions.through_stick(residual, residual.sets).direction == 1).all()

@@ -246,7 +246,7 @@ def test_starts_are_checked():
 def test_drivers_refuse_each_others_iterates():
     problem = random_problem(0)
     newton, augmented, fixed = SemismoothNewton(), AugmentedLagrangian(), FixedPoint()
-    iterate = LemkePivoting().init(problem, problem.glued_state)
+    iterate = LemkePivoting().init(problem, problem.sticking_state)
     for driver in (newton, augmented, fixed):
         with pytest.raises(TypeError, match="iterate is a Iterate; give what init or step of this driver returned"):
             driver.step(problem, iterate)
