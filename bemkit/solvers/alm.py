@@ -1,6 +1,6 @@
 """Augmented Lagrangian method: Algorithm 1 of the paper, corrected."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -9,11 +9,10 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
-from bemkit.solvers.base import Iterate, Status
-from bemkit.solvers.floating import negligible
-from bemkit.solvers.newton import respond
+from bemkit.solvers.base import Iterate
+from bemkit.solvers.newton import negligible, respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
-from bemkit.solvers.progress import Progress
+from bemkit.solvers.progress import OuterIterate
 
 _AUTOMATIC_RHO = 100.0
 """In units of the body's stiffness scale. Large enough that the multipliers gain two digits a step, so that the rate of
@@ -50,19 +49,6 @@ class BoundUpdate(Enum):
     CURRENT = "current"
     """The present one, differentiated inside the inner Newton iteration: the outer iteration no longer waits for the
     bound and converges at the rate of the augmentation alone."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AugmentedIterate(Iterate):
-    """Iterate of `AugmentedLagrangian`; the multiplier is the traction of the state.
-
-    Parameters
-    ----------
-    progress : Progress
-        What the last outer steps achieved.
-    """
-
-    progress: Progress
 
 
 @dataclass(frozen=True)
@@ -103,30 +89,20 @@ class AugmentedLagrangian:
         check_rho("rho_t", self.rho_t)
         check_max_steps(self.max_steps)
 
-    def init(self, problem: ContactProblem, start: ContactState) -> AugmentedIterate:
+    def init(self, problem: ContactProblem, start: ContactState) -> OuterIterate:
         """Take the tractions of the start as multipliers."""
-        return AugmentedIterate(state=start, progress=Progress.begun(problem, start))
+        return OuterIterate.begun(problem, start)
 
-    def step(self, problem: ContactProblem, iterate: Iterate) -> AugmentedIterate:
+    def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
         """Do one outer step."""
-        if not isinstance(iterate, AugmentedIterate):
+        if not isinstance(iterate, OuterIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
         equations = self._equations(problem, iterate.state.traction)
         inner = solve_projected(equations, iterate.state, self.inner)
-        linear_solves = iterate.linear_solves + inner.linear_solves
-        if not inner.is_solved:
-            message = f"inner Newton iteration unfinished after {inner.linear_solves} linear solves"
-            return replace(
-                iterate, state=inner.state, linear_solves=linear_solves, ended=Status.INNER_FAILED, message=message
-            )
-        progress = iterate.progress.after(problem, inner.state)
-        return AugmentedIterate(
-            state=inner.state,
-            linear_solves=linear_solves,
-            progress=progress,
-            ended=progress.ended,
-            message=f"{inner.linear_solves} inner solves",
-        )
+        if inner.is_solved:
+            return iterate.followed_by(problem, inner.state, inner.linear_solves)
+        message = f"inner Newton iteration unfinished after {inner.linear_solves} linear solves"
+        return iterate.failed_at(inner.state, inner.linear_solves, message)
 
     def _equations(self, problem: ContactProblem, multiplier: FloatArray) -> ProjectionEquations:
         automatic = _AUTOMATIC_RHO * problem.body.stiffness_scale

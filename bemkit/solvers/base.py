@@ -14,8 +14,7 @@ from bemkit.contact.problem import ContactProblem, ContactState, SingularRespons
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
-from bemkit.solvers.floating import FloatingResponse, floating_response
-from bemkit.solvers.newton import consistent_state
+from bemkit.solvers.newton import FloatingResponse, consistent_state, floating_response
 
 
 class Status(Enum):

@@ -1,12 +1,12 @@
 """Progress of outer iterations: repetition and stagnation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ProjectionEquations
-from bemkit.solvers.base import Status
+from bemkit.solvers.base import Iterate, Status
 from bemkit.solvers.newton import merit
 
 _MEMORY = 8
@@ -65,3 +65,37 @@ def _is_same(state: ContactState, other: ContactState, accuracy: float) -> bool:
         float(np.abs(a - b).max()) <= 10.0 * accuracy * float(np.abs(a).max())
         for a, b in ((state.displacement, other.displacement), (state.traction, other.traction))
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OuterIterate(Iterate):
+    """Iterate of a driver whose steps depend on the state alone, and each take several linear solves.
+
+    Parameters
+    ----------
+    progress : Progress
+        What the last outer steps achieved.
+    """
+
+    progress: Progress
+
+    @classmethod
+    def begun(cls, problem: ContactProblem, start: ContactState) -> "OuterIterate":
+        """Return the first iterate."""
+        return cls(state=start, progress=Progress.begun(problem, start))
+
+    def followed_by(self, problem: ContactProblem, state: ContactState, linear_solves: int) -> "OuterIterate":
+        """Return the iterate after one more outer step that has taken the given linear solves."""
+        progress = self.progress.after(problem, state)
+        return OuterIterate(
+            state=state,
+            linear_solves=self.linear_solves + linear_solves,
+            progress=progress,
+            ended=progress.ended,
+            message=f"{linear_solves} inner solves",
+        )
+
+    def failed_at(self, state: ContactState, linear_solves: int, message: str) -> "OuterIterate":
+        """Return the last iterate, after an inner solve that has failed for the reason given."""
+        spent = self.linear_solves + linear_solves
+        return replace(self, state=state, linear_solves=spent, ended=Status.INNER_FAILED, message=message)

@@ -16,7 +16,7 @@ CITED = {key for path in Path(bemkit.__file__).parent.rglob("*.py") for key in K
 
 @pytest.mark.parametrize("key", sorted(CITED))
 def test_what_is_cited_is_listed(key: str) -> None:
-    assert re.search(rf"^[*-] .*{key}", read("references.md"), re.MULTILINE), key
+    assert f"[{key}]" in read("references.md")
 
 
 def test_something_is_cited() -> None:

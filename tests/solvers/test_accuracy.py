@@ -11,8 +11,8 @@ from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.floating import negligible
 from bemkit.solvers.homotopy import why_no_path
+from bemkit.solvers.newton import negligible
 from bemkit.solvers.progress import Progress
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
