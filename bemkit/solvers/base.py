@@ -258,11 +258,11 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                escape = find_unsolvable_load(self.problem)
-                if escape is not None:
-                    return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
-                unheld = self._unheld()
-                iterate = self._freed(self._first(start, spent=int(unheld is not None)), unheld)
+                unsolvable = find_unsolvable_load(self.problem)
+                if unsolvable is not None:
+                    return self._nothing_done(Status.UNSOLVABLE_LOAD, unsolvable.description)
+                untouched = self._untouched_response()
+                iterate = self._without_contact(self._first(start, spent=int(untouched is not None)), untouched)
             except SingularResponse as error:
                 return self._nothing_done(Status.SINGULAR, str(error))
             sets = contact_sets(self.problem, iterate.state)
@@ -272,7 +272,7 @@ class _Run:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
-                following = self._freed(following, unheld)
+                following = self._without_contact(following, untouched)
                 new_sets = contact_sets(self.problem, following.state)
                 change = _relative_change(following.state, iterate.state)
                 history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
@@ -291,7 +291,7 @@ class _Run:
         iterate = self.solver.init(self.problem, state)
         return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + spent)
 
-    def _unheld(self) -> FloatingResponse | None:
+    def _untouched_response(self) -> FloatingResponse | None:
         """Return the response without any contact, if the body floats and its load balances."""
         body = self.problem.body
         most = float(body.weights @ np.abs(self.problem.sticking_state.traction).sum(axis=1))
@@ -299,15 +299,15 @@ class _Run:
             return None  # far from balanced, which is not worth a linear solve
         return floating_response(body, separated(body.n_contact))
 
-    def _freed(self, iterate: Iterate, unheld: FloatingResponse | None) -> Iterate:
+    def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.
 
         Drivers only come ever closer to tractions that vanish. What they leave is no small error, having nothing to be
         small against.
         """
-        if unheld is None or not iterate.state.is_finite:
+        if untouched is None or not iterate.state.is_finite:
             return iterate
-        state = unheld.nearest(iterate.state.displacement)
+        state = untouched.nearest(iterate.state.displacement)
         if not certify(self.problem, state).is_below(self.tolerance):
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")
