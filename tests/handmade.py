@@ -1,9 +1,11 @@
 """Small contact problems without boundary elements, and a checker that shares nothing with the drivers."""
 
+import zlib
+
 import numpy as np
 
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 
 
 def block_stiffness(n, poisson_ratio):
@@ -60,6 +62,32 @@ def block_body(n=12, *, press=1.0, push=1.0, is_held_sideways=True, poisson_rati
         motions += [np.stack([zero, one], axis=1), np.stack([x[contact, 0] - 0.5, zero], axis=1)]
     condensed_load = sign * (load[dofs] - stiffness[np.ix_(dofs, inner)] @ solved[:, -1])
     return DenseBody((condensed + condensed.T) / 2, condensed_load, weights, np.array(motions))
+
+
+class Inexact(LinearBody):
+    """A body whose responses are those of another one but for a relative error, and which counts them."""
+
+    def __init__(self, body, error=0.0, *, accuracy=1e-14, is_costly=False):
+        self.body, self.error, self.accuracy, self.is_costly = body, error, accuracy, is_costly
+        self.weights, self.n_responses = body.weights, 0
+
+    @property
+    def stiffness_scale(self):
+        return self.body.stiffness_scale
+
+    def respond(self, conditions):
+        self.n_responses += 1
+        exact = self.body.respond(conditions)
+        seed = zlib.crc32(exact.displacement.tobytes() + exact.traction.tobytes())
+        noise = self.error * np.random.default_rng(seed).uniform(-1.0, 1.0, (2, *exact.traction.shape))
+        displacement, traction = np.abs(exact.displacement).max(), np.abs(exact.traction).max()
+        return ContactState(exact.displacement + displacement * noise[0], exact.traction + traction * noise[1])
+
+    def rigid_motions(self):
+        return self.body.rigid_motions()
+
+    def rigid_load(self):
+        return self.body.rigid_load()
 
 
 def block_problem(law, n=12, **options):

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.errors import BemkitError, InputError
 from bemkit.operators.equilibrium import Imbalance
 
@@ -91,36 +91,46 @@ class ContactState:
 class LinearBody(Protocol):
     """One or several elastic bodies under their loads, reduced to the contact nodes.
 
-    Everything nonlinear in bemkit sees bodies through this protocol alone. A body never learns of friction; drivers
-    never learn how the body finds its response.
+    Everything nonlinear in bemkit sees bodies through this protocol alone: a body never learns of friction, drivers
+    never learn how it finds its response. Derive from this class and write `weights`, `stiffness_scale` and `respond`;
+    a body that only contact can hold also writes `rigid_motions` and `rigid_load`. `bemkit.testing.check_body` tests
+    everything said here.
+
+    Attributes
+    ----------
+    weights : (n_contact,) array [m]
+        Positive: nodal force = weight times traction.
+    accuracy : float
+        Relative error of the displacements and tractions of a response: 1e-14 (the default) for a direct solver, what
+        it stops at for an iterative one. Drivers take their tolerances from it.
+    is_costly : bool
+        Whether drivers should ask for few responses, tens rather than several for each contact node. False by default.
     """
+
+    weights: FloatArray
+    accuracy: float = 1e-14
+    is_costly: bool = False
 
     @property
     def n_contact(self) -> int:
         """Number of contact nodes."""
-        ...
-
-    @property
-    def weights(self) -> FloatArray:
-        """(n_contact,) array [m], positive: nodal force = weight times traction."""
-        ...
+        return len(self.weights)
 
     @property
     def stiffness_scale(self) -> float:
         """Typical traction per displacement of a single contact node [Pa/m], positive; the unit of automatic rho.
 
-        It comes from what the body is, E' per weight of a node: of a body on as few nodes as it has free motions
-        nothing else is left.
+        For a material of plane modulus E' that is E' by the weight of a node, however the body is held.
         """
         ...
 
     @property
-    def tangent_is_free(self) -> BoolArray:
+    def tangent_is_eliminated(self) -> BoolArray:
         """(n_contact,) bool array: nodes without friction, whose tangential motion the body has eliminated.
 
-        The only tangential condition there is ``sigma_t = 0``; `ContactProblem.respond` sees to it.
+        The only tangential condition there is ``sigma_t = 0``; `ContactProblem.respond` sees to it. None by default.
         """
-        ...
+        return np.zeros(self.n_contact, bool)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return displacement and traction of the loaded body under two conditions per contact node.
@@ -128,7 +138,7 @@ class LinearBody(Protocol):
         Parameters
         ----------
         conditions : LinearConditions
-            At nodes whose tangent is free the second one is ``sigma_t = 0``.
+            At nodes whose tangent is eliminated the second one is ``sigma_t = 0``.
 
         Returns
         -------
@@ -138,20 +148,20 @@ class LinearBody(Protocol):
         ------
         SingularResponse
             If the conditions do not determine the response.
-        ValueError
-            If there is another tangential condition where the tangent is free.
+        InputError
+            If there is another tangential condition where the tangent is eliminated.
         """
         ...
 
     def rigid_motions(self) -> FloatArray:
-        """Return the motions of the body that only contact can hold.
+        """Return the motions of the body that only contact can hold; by default there are none.
 
         Returns
         -------
         (n_motions, n_contact, 2) array
             Normal and tangential components at the contact nodes; linearly independent.
         """
-        ...
+        return np.zeros((0, self.n_contact, 2))
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the given load on each of these motions.
@@ -161,18 +171,36 @@ class LinearBody(Protocol):
         (n_motions,) array [N]
             Per unit of thickness and of motion.
         """
-        ...
+        return np.zeros(len(self.rigid_motions()))
 
     def imbalance(self, state: ContactState) -> Imbalance:
-        """Return how far load and contact tractions are from equilibrium.
+        """Return how far all forces on the body, those inside it included, are from equilibrium.
 
         Parameters
         ----------
         state : ContactState
+            Of any origin: a state that is no response of this body is out of balance.
 
         Returns
         -------
         Imbalance
-            Relative to the largest force (times the size of the body) at hand.
+            Relative to the largest force (times the size of the body) at hand. By default `force` is what has to be
+            added to the tractions to hold the displacements, which takes a response, and `moment` the work of load and
+            tractions on the rigid motions.
         """
-        ...
+        is_eliminated = self.tangent_is_eliminated
+        held = np.stack([np.ones_like(is_eliminated), ~is_eliminated], axis=1)
+        conditions = separated(self.n_contact).replaced(held, stick(state.u_n, state.u_t))
+        response = self.respond(conditions)
+        forces = self.weights[:, None] * np.stack([state.traction, response.traction])
+        largest = float(np.abs(forces).max())
+        if largest == 0.0:
+            return Imbalance(0.0, 0.0)
+        astray = self.stiffness_scale * np.abs(response.displacement - state.displacement).max(axis=1)
+        missing = max(float(np.abs(forces[0] - forces[1]).max()), float((self.weights * astray).max()))
+        motions = self.rigid_motions().reshape(-1, 2 * self.n_contact)
+        size = float(np.abs(motions).max(initial=0.0)) or 1.0
+        work = np.abs(self.rigid_load() + motions @ forces[0].ravel()) / size
+        # what an error of the displacements makes of the tractions
+        most = max(largest, self.stiffness_scale * float((self.weights[:, None] * np.abs(state.displacement)).max()))
+        return Imbalance(missing / largest, float(np.max(work, initial=0.0)) / largest, self.accuracy * most / largest)

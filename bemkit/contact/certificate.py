@@ -80,7 +80,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
 
     Notes
     -----
-    Tractions are measured by the largest traction in the state or in the glued state (all nodes held), whichever is
+    Tractions are measured by the largest traction in the state or in the sticking state (all nodes held), whichever is
     larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
     A node to which that would give more than the largest nodal force is measured by this force, so that tractions of
     tiny elements in a corner excuse nothing. Lengths are measured by the displacement which the largest nodal force
@@ -130,7 +130,7 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     furthest = float(np.abs(state.displacement).max())
     # friction without pressure is a traction to be met as well, however small beside the glued ones
     resisted = problem.friction_bound(np.zeros(problem.n_contact))
-    present, glued = (np.abs(held.traction).max(axis=1) for held in (state, problem.glued_state))
+    present, glued = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
     at_hand = np.maximum(present, resisted)
     if at_hand.max() > _ROUND_OFF * glued.max() and max(present.max(), glued.max()) > 0.0:
         # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must

@@ -94,11 +94,12 @@ class LinearConditions:
         _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
         return np.tensordot(directions[np.count_nonzero(singular > _FREE) :], basis, axes=1)
 
-    def held_by_springs(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
+    def regularised(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
         """Return the conditions with weak springs added wherever only tractions are prescribed.
 
         A body that these conditions leave free to move is then held near `displacement`. The springs carry nothing
-        once the displacement stays where it is, so a sequence of such steps ends without them (proximal steps).
+        once the displacement stays where it is, so a sequence of such proximal steps [Rockafellar1976] ends without
+        them.
 
         Parameters
         ----------

@@ -130,7 +130,21 @@ class HalfPlane:
 
 
 @dataclass(frozen=True)
-class Circle:
+class _Round:
+    centre: tuple[float, float]
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check_pair("centre", self.centre)
+        if not (math.isfinite(self.radius) and self.radius > 0.0):
+            raise InputError(f"radius is {self.radius}: give a positive, finite length")
+
+    def _from_centre(self, points: FloatArray) -> FloatArray:
+        return np.asarray(points - np.array(self.centre))
+
+
+@dataclass(frozen=True)
+class Circle(_Round):
     """The obstacle fills a disc; the body lies outside it (a roll, a shaft in a hole).
 
     Parameters
@@ -140,55 +154,30 @@ class Circle:
 
     Raises
     ------
-    ValueError
+    InputError
         If the centre is not finite or the radius not positive.
     """
 
-    centre: tuple[float, float]
-    radius: float
-
-    def __post_init__(self) -> None:
-        _check_pair("centre", self.centre)
-        _check_radius(self.radius)
-
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the circle; see `Obstacle.gap`."""
-        return np.asarray(np.hypot(*(points - np.array(self.centre)).T) - self.radius)
+        return np.asarray(np.hypot(*self._from_centre(points).T) - self.radius)
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction towards the centre; see `DirectedObstacle.approach`."""
-        return _unit_vectors(np.array(self.centre) - points, normals)
+        return _unit_vectors(-self._from_centre(points), normals)
 
 
 @dataclass(frozen=True)
-class Cavity:
-    """The obstacle fills everything outside a circle; the body lies inside it (a disc in a rigid ring).
-
-    Parameters
-    ----------
-    centre : (x, y) [m]
-    radius : float [m]
-
-    Raises
-    ------
-    ValueError
-        If the centre is not finite or the radius not positive.
-    """
-
-    centre: tuple[float, float]
-    radius: float
-
-    def __post_init__(self) -> None:
-        _check_pair("centre", self.centre)
-        _check_radius(self.radius)
+class Cavity(_Round):
+    """The obstacle fills everything outside a circle, as `Circle`; the body lies inside it (a disc in a rigid ring)."""
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the distance from the circle; see `Obstacle.gap`."""
-        return np.asarray(self.radius - np.hypot(*(points - np.array(self.centre)).T))
+        return np.asarray(self.radius - np.hypot(*self._from_centre(points).T))
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction away from the centre; see `DirectedObstacle.approach`."""
-        return _unit_vectors(points - np.array(self.centre), normals)
+        return _unit_vectors(self._from_centre(points), normals)
 
 
 @dataclass(frozen=True)
@@ -321,8 +310,3 @@ def _unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
 def _check_pair(name: str, pair: tuple[float, float]) -> None:
     if len(pair) != 2 or not all(math.isfinite(component) for component in pair):
         raise InputError(f"{name} is {pair}: give two finite numbers")
-
-
-def _check_radius(radius: float) -> None:
-    if not (math.isfinite(radius) and radius > 0.0):
-        raise InputError(f"radius is {radius}: give a positive, finite length")

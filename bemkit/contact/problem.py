@@ -45,6 +45,7 @@ class ContactProblem:
     reference_slip: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        _check_members(self.body, self.law)
         n_contact = self.body.n_contact
         slip = np.zeros(n_contact) if self.reference_slip is None else self.reference_slip
         for name, given in (("gap", self.gap), ("reference_slip", slip)):
@@ -57,12 +58,6 @@ class ContactProblem:
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             read_only(array)
             object.__setattr__(self, name, array)
-        missing = [member for member in _LAW_MEMBERS if not hasattr(self.law, member)]
-        if missing:
-            raise LawError(
-                f"friction law {law_name(self.law)} has no {', '.join(missing)}; "
-                "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
-            )
         self.friction_bound(np.zeros(n_contact))
 
     @property
@@ -76,7 +71,7 @@ class ContactProblem:
         return np.zeros(self.n_contact) if self.reference_slip is None else self.reference_slip
 
     @cached_property
-    def glued_state(self) -> ContactState:
+    def sticking_state(self) -> ContactState:
         """Response with all nodes sticking and none overlapping: the cold start, and the measure of the load.
 
         Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
@@ -102,17 +97,20 @@ class ContactProblem:
         SingularResponse
             If the conditions do not determine the response.
         """
-        is_free = self.body.tangent_is_free
-        if is_free.any():
-            rows = np.stack([np.zeros_like(is_free), is_free], axis=1)
-            conditions = conditions.replaced(rows, separated(self.n_contact))
-        return self.body.respond(conditions)
+        return self.body.respond(self.without_eliminated(conditions))
+
+    def without_eliminated(self, conditions: LinearConditions) -> LinearConditions:
+        """Return the conditions with ``sigma_t = 0`` wherever the body has eliminated the tangent."""
+        rows = self.body.tangent_is_eliminated
+        if not rows.any():
+            return conditions
+        return conditions.replaced(np.stack([np.zeros_like(rows), rows], axis=1), separated(self.n_contact))
 
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law."""
         other = replace(self, law=law)
-        if "glued_state" in self.__dict__:  # it does not depend on the law
-            other.__dict__["glued_state"] = self.glued_state
+        if "sticking_state" in self.__dict__:  # it does not depend on the law
+            other.__dict__["sticking_state"] = self.sticking_state
         return other
 
     def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
@@ -141,8 +139,8 @@ class ContactProblem:
                 f"friction law {law_name(self.law)}.bound is {bound[node]:g} at contact node {node} "
                 f"(sigma_n = {sigma_n[node]:g}); a bound is zero or positive"
             )
-        if np.any(bound[self.body.tangent_is_free] > 0.0):
-            node = int(np.flatnonzero(self.body.tangent_is_free & (bound > 0.0))[0])
+        if np.any(bound[self.body.tangent_is_eliminated] > 0.0):
+            node = int(np.flatnonzero(self.body.tangent_is_eliminated & (bound > 0.0))[0])
             raise LawError(
                 f"friction law {law_name(self.law)} allows {bound[node]:g} at contact node {node}, where the body was "
                 "condensed without friction: condense it again for this law"
@@ -173,4 +171,24 @@ class ContactProblem:
         return values
 
 
+def _check_members(body: LinearBody, law: FrictionLaw) -> None:
+    """Refuse a body or a law that lacks what drivers ask of it."""
+    absent = [name for name in _BODY_MEMBERS if not hasattr(body, name)]
+    if absent:
+        raise InputError(
+            f"body {type(body).__name__} has no {', '.join(absent)}; "
+            "derive it from bemkit.contact.body.LinearBody and write weights, stiffness_scale and respond"
+        )
+    absent = [name for name in _LAW_MEMBERS if not hasattr(law, name)]
+    if absent:
+        raise LawError(
+            f"friction law {law_name(law)} has no {', '.join(absent)}; "
+            "derive it from bemkit.contact.laws.FrictionLaw and write bound and bound_derivative"
+        )
+
+
+_BODY_MEMBERS = (
+    *("weights", "n_contact", "stiffness_scale", "accuracy", "is_costly", "tangent_is_eliminated"),
+    *("respond", "rigid_motions", "rigid_load", "imbalance"),
+)
 _LAW_MEMBERS = ("bound", "bound_derivative", "is_frictionless", "acts_across_gap", "scaled")

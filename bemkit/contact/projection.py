@@ -1,4 +1,4 @@
-"""The two projections that turn contact and friction into equations, with their generalised derivatives."""
+"""The two projections that turn contact and friction into equations, with their generalised derivatives [QiSun1993]."""
 
 import numpy as np
 

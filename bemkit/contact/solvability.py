@@ -78,7 +78,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         return None
     unit = np.abs(motions).reshape(len(motions), -1).max(axis=1)
     motions, load = motions / unit[:, None, None], problem.body.rigid_load() / unit
-    forces = problem.body.weights[:, None] * problem.glued_state.traction
+    forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
         return None
@@ -112,7 +112,7 @@ def find_long_travel(problem: ContactProblem) -> float | None:
         Smallest gap that must close, in displacements that the load of the glued body causes at one node; None if it
         is small enough for displacements to hold both the travel and the deformation.
     """
-    deformation = float(np.abs(problem.glued_state.traction).max()) / problem.body.stiffness_scale
+    deformation = float(np.abs(problem.sticking_state.traction).max()) / problem.body.stiffness_scale
     is_far = problem.gap > _FARTHEST * deformation
     if not is_far.any() or find_unsolvable_load(replace(problem, gap=np.where(is_far, np.inf, problem.gap))) is None:
         return None
@@ -122,13 +122,15 @@ def find_long_travel(problem: ContactProblem) -> float | None:
 def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
     """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
     none = np.zeros(problem.n_contact)
-    pressure = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    pressure = float(np.abs(problem.sticking_state.traction).max()) or 1.0
     cohesion = problem.friction_bound(none)
     slopes = [-problem.friction_slope(none)]
     for factor in 10.0 ** np.arange(-6, 7):
         slopes.append((problem.friction_bound(none - factor * pressure) - cohesion) / (factor * pressure))
+    slope = np.maximum(np.max(slopes, axis=0), 0.0)
     cap = problem.friction_bound(none - 1e12 * pressure)
-    return [(cohesion, np.maximum(np.max(slopes, axis=0), 0.0)), (cap, none)]
+    is_capped = bool(np.any(cap < 0.5 * (cohesion + 1e12 * pressure * slope)))
+    return [(cohesion, slope), *([(cap, none)] if is_capped else [])]
 
 
 def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
@@ -146,29 +148,36 @@ def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArra
                 return np.array([sign])
         return np.zeros(1)
 
+    from scipy import sparse
     from scipy.optimize import linprog
 
-    n_touching, n_motions = normal.shape
-    # Unknowns: coefficients c, a >= |c| and e >= |v_t|. Maximise load c - resistance e.
-    own, unit = np.eye(n_motions), np.eye(n_touching)
-    no_motion, no_node = np.zeros((n_touching, n_motions)), np.zeros((n_motions, n_touching))
-    conditions = np.block(
+    # Unknowns: coefficients c, a >= |c|, and e >= |v_t| where something resists. Maximise load c - resistance e.
+    n_motions, resists = len(motions), resistance > 0.0
+    n_resisting = int(np.count_nonzero(resists))
+    wedged = slope[~resists, None] * tangential[~resists]
+    own = np.eye(n_motions)
+    on_motions = [normal[resists], tangential[resists], -tangential[resists]]
+    on_motions += [normal[~resists] + wedged, normal[~resists] - wedged, own, -own, np.zeros((1, n_motions))]
+    on_sizes = np.zeros((3 * n_resisting + 2 * len(wedged), n_motions))
+    unit = sparse.eye_array(n_resisting)
+    on_slips = sparse.vstack([sparse.diags_array(slope[resists]), -unit, -unit])
+    n_others = 2 * len(wedged) + 2 * n_motions + 1
+    conditions = sparse.hstack(
         [
-            [normal, no_motion, np.diag(slope)],
-            [tangential, no_motion, -unit],
-            [-tangential, no_motion, -unit],
-            [own, -own, no_node],
-            [-own, -own, no_node],
-            [np.zeros(n_motions), np.ones(n_motions), np.zeros(n_touching)],
-        ]
+            sparse.csr_array(np.concatenate(on_motions)),
+            sparse.csr_array(np.concatenate([on_sizes, -own, -own, np.ones((1, n_motions))])),
+            sparse.vstack([on_slips, sparse.csr_array((n_others, n_resisting))]),
+        ],
+        format="csr",
     )
-    limits = np.zeros(len(conditions))
+    limits = np.zeros(conditions.shape[0])
     limits[-1] = 1.0
     result = linprog(
-        np.concatenate([-load, np.zeros(n_motions), resistance]),
+        np.concatenate([-load, np.zeros(n_motions), resistance[resists]]),
         A_ub=conditions,
         b_ub=limits,
-        bounds=[(None, None)] * n_motions + [(0.0, None)] * (n_motions + n_touching),
+        bounds=[(None, None)] * n_motions + [(0.0, None)] * (n_motions + n_resisting),
+        method="highs-ipm" if n_resisting else "highs",  # the simplex method takes a pivot for each node that resists
     )
     if result.x is None:  # zero is always admissible, so this is the solver's failure: do not condemn the load
         return np.zeros(n_motions)

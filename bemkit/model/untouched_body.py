@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,7 +24,7 @@ _TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class UntouchedBody:
+class UntouchedBody(LinearBody):
     """An elastic body held by its supports alone; fulfils `LinearBody` with no contact node.
 
     Parameters
@@ -44,18 +44,8 @@ class UntouchedBody:
     force: FloatArray
     condensed: CondensedMap
 
-    n_contact = 0
+    weights: FloatArray = field(default_factory=lambda: np.zeros(0), init=False)
     stiffness_scale = 1.0
-
-    @property
-    def weights(self) -> FloatArray:
-        """(0,) array [m]."""
-        return np.zeros(0)
-
-    @property
-    def tangent_is_free(self) -> BoolArray:
-        """(0,) bool array."""
-        return np.zeros(0, bool)
 
     @property
     def is_held(self) -> BoolArray:
@@ -70,14 +60,6 @@ class UntouchedBody:
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the state without nodes."""
         return untouched_state()
-
-    def rigid_motions(self) -> FloatArray:
-        """Return the motions that only contact can hold: none, the supports hold the body."""
-        return np.zeros((0, 0, 2))
-
-    def rigid_load(self) -> FloatArray:
-        """Return the work of the load on each of these motions."""
-        return np.zeros(0)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""

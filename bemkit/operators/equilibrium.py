@@ -69,7 +69,11 @@ def round_off_of(displacement: FloatArray, sensitivity: FloatArray | None) -> fl
 
 
 def resultant_imbalance(
-    points: FloatArray, force: FloatArray, balanced: Collection[int], round_off: float
+    points: FloatArray,
+    force: FloatArray,
+    balanced: Collection[int],
+    round_off: float,
+    volume_force: FloatArray | None = None,
 ) -> Imbalance:
     """Return resultant force and moment of all forces on a body, relative to the sum of their sizes.
 
@@ -80,17 +84,22 @@ def resultant_imbalance(
         Which of the resultants along x and y and the moment (0, 1, 2) have to vanish.
     round_off : float [N/m]
         What may be left of a sum of these forces.
+    volume_force : (3,) array, optional
+        Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
 
     Returns
     -------
     Imbalance
         The moment about the mean point, in units of the size of the body.
     """
-    total = float(np.abs(force).sum())
+    inside = np.zeros(3) if volume_force is None else volume_force
+    total = float(np.abs(force).sum() + np.abs(inside[:2]).sum())
     if not balanced or total == 0.0:
         return Imbalance(0.0, 0.0)
-    arm = points - points.mean(axis=0)
-    moment = abs(float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])))
-    sums = np.append(np.abs(force.sum(axis=0)), moment / float(np.abs(arm).max()))
+    centre = points.mean(axis=0)
+    arm = points - centre
+    moment = float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))
+    moment += float(inside[2] - centre[0] * inside[1] + centre[1] * inside[0])
+    sums = np.append(np.abs(force.sum(axis=0) + inside[:2]), abs(moment) / float(np.abs(arm).max()))
     off = np.where(np.isin(np.arange(3), list(balanced)), sums, 0.0) / total
     return Imbalance(float(off[:2].max()), float(off[2]), round_off / total)

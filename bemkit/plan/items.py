@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.contact.condensation.retained import find_tangents
+from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared
 from bemkit.operators.rigid_modes import possible_motions

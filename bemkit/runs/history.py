@@ -194,7 +194,7 @@ def _contact_table(
     tangents = model.nodes.frame[:, 1]
     # where the tangent is no unknown the body itself says how it moves
     u_t = np.sum(boundary_displacement[model.nodes.nodes] * tangents, axis=1)
-    u_t = np.where(model.body.tangent_is_free, u_t, state.u_t * units.displacement)
+    u_t = np.where(model.body.tangent_is_eliminated, u_t, state.u_t * units.displacement)
     displacement = state.displacement * units.displacement
     return ContactTable(
         part=contact.parts,

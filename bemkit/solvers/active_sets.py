@@ -59,8 +59,8 @@ class ActiveSets:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """The projections (15), (16) evaluated at a state.
+class Residual:
+    """The projection equations (15), (16) evaluated at a state.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Trial:
         Friction bound and its derivative at the predicted normal traction.
     predicted_sigma_n : (n_contact,) array [Pa]
         ``-[rho_n (u_n - g) - multiplier_n]_+``.
-    residual : (n_contact, 2) array [Pa]
+    value : (n_contact, 2) array [Pa]
         Left-hand sides of (15) and (16).
     """
 
@@ -80,7 +80,7 @@ class Trial:
     bound: FloatArray
     slope: FloatArray
     predicted_sigma_n: FloatArray
-    residual: FloatArray
+    value: FloatArray
 
     @property
     def is_free(self) -> BoolArray:
@@ -89,8 +89,8 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectedConditions:
-    """Contact and friction as the projection equations (15), (16), ready for semismooth Newton.
+class ProjectionEquations:
+    """Contact and friction as the projection equations (15), (16), ready for semismooth Newton [AlartCurnier1991].
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class ProjectedConditions:
     given_bound: FloatArray | None = None
     friction_share: float = 1.0
 
-    def evaluate(self, state: ContactState) -> Trial:
+    def evaluate(self, state: ContactState) -> Residual:
         """Return sets and residual at `state`."""
         problem = self.problem
         multiplier = state.traction if self.multiplier is None else self.multiplier
@@ -128,14 +128,14 @@ class ProjectedConditions:
         else:
             bound, slope = self.given_bound, np.zeros_like(self.given_bound)
         _, direction = clip_to_bound_derivative(along_obstacle, bound)
-        residual = state.traction.copy()
-        residual[:, 0] -= predicted_sigma_n
-        residual[:, 1] += clip_to_bound(along_obstacle, bound)
+        value = state.traction.copy()
+        value[:, 0] -= predicted_sigma_n
+        value[:, 1] += clip_to_bound(along_obstacle, bound)
         sets = ActiveSets(is_closed, direction.astype(np.intp))
-        return Trial(state, sets, bound, slope, predicted_sigma_n, residual)
+        return Residual(state, sets, bound, slope, predicted_sigma_n, value)
 
-    def linearised(self, trial: Trial, sets: ActiveSets) -> LinearConditions:
-        """Return the Newton equations at a trial for the given sets (its own, or these made more cautious).
+    def linearised(self, residual: Residual, sets: ActiveSets) -> LinearConditions:
+        """Return the Newton equations at a residual for the given sets (its own, or those of `through_stick`).
 
         Where neither a bound nor its derivative is present the node slides freely, whatever its direction.
         """
@@ -144,23 +144,23 @@ class ProjectedConditions:
             held = stick(problem.gap, problem.slip_origin)
         else:
             held = augmented(problem.gap, problem.slip_origin, self.multiplier, self.rho_n, self.rho_t)
-        intercept = trial.bound - trial.slope * trial.predicted_sigma_n
-        sliding = slip(problem.gap, sets.direction.astype(float), trial.slope, intercept)
-        slides = (sets.direction != 0) | trial.is_free
+        intercept = residual.bound - residual.slope * residual.predicted_sigma_n
+        sliding = slip(problem.gap, sets.direction.astype(float), residual.slope, intercept)
+        slides = (sets.direction != 0) | residual.is_free
         conditions = separated(problem.n_contact)
         conditions = conditions.replaced(np.stack([sets.is_closed, ~slides], axis=1), held)
         return conditions.replaced(np.stack([np.zeros_like(slides), slides], axis=1), sliding)
 
-    def cautious(self, trial: Trial, previous: ActiveSets) -> ActiveSets:
-        """Return the sets of `trial` with every direct change of slip direction replaced by stick.
+    def through_stick(self, residual: Residual, previous: ActiveSets) -> ActiveSets:
+        """Return the sets of `residual` with every direct change of slip direction replaced by stick.
 
-        A node may slip the other way only after it has come to rest. Without this the active sets of stiff bodies
-        alternate between slip to the left and slip to the right for ever. Nodes without any bound slide whatever their
-        direction is; theirs is zero here, so that equal sets give equal steps.
+        A node, open or closed, may slip the other way only after it has come to rest. Without this the active sets of
+        stiff bodies alternate between slip to the left and slip to the right for ever. Nodes without any bound slide
+        whatever their direction is; theirs is zero here, so that equal sets give equal steps.
         """
-        sets = trial.sets
-        flips = (sets.direction * previous.direction < 0) & sets.is_closed & previous.is_closed
-        return ActiveSets(sets.is_closed, np.where(flips | trial.is_free, 0, sets.direction))
+        sets = residual.sets
+        flips = sets.direction * previous.direction < 0
+        return ActiveSets(sets.is_closed, np.where(flips | residual.is_free, 0, sets.direction))
 
 
 def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
@@ -169,6 +169,6 @@ def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
     Nothing makes a node without any friction stick: where it does not move, that is chance, and it counts as slipping.
     """
     rho = problem.body.stiffness_scale
-    trial = ProjectedConditions(problem, rho, rho).evaluate(state)
-    direction = np.where(trial.is_free & (trial.sets.direction == 0), 1, trial.sets.direction)
-    return ActiveSets(trial.sets.is_closed, direction)
+    residual = ProjectionEquations(problem, rho, rho).evaluate(state)
+    direction = np.where(residual.is_free & (residual.sets.direction == 0), 1, residual.sets.direction)
+    return ActiveSets(residual.sets.is_closed, direction)

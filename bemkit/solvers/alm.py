@@ -1,6 +1,6 @@
 """Augmented Lagrangian method: Algorithm 1 of the paper, corrected."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -8,11 +8,11 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
-from bemkit.solvers.base import Iterate, Status
-from bemkit.solvers.newton import respond
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
+from bemkit.solvers.base import Iterate
+from bemkit.solvers.newton import negligible, respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
-from bemkit.solvers.progress import Progress
+from bemkit.solvers.progress import OuterIterate
 
 _AUTOMATIC_RHO = 100.0
 """In units of the body's stiffness scale. Large enough that the multipliers gain two digits a step, so that the rate of
@@ -51,19 +51,6 @@ class BoundUpdate(Enum):
     bound and converges at the rate of the augmentation alone."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AugmentedIterate(Iterate):
-    """Iterate of `AugmentedLagrangian`; the multiplier is the traction of the state.
-
-    Parameters
-    ----------
-    progress : Progress
-        What the last outer steps achieved.
-    """
-
-    progress: Progress
-
-
 @dataclass(frozen=True)
 class AugmentedLagrangian:
     """Algorithm 1: solve with fixed multipliers, take the resulting tractions as the next multipliers.
@@ -88,7 +75,7 @@ class AugmentedLagrangian:
 
     References
     ----------
-    Algorithms 1 and 2 of the paper; `docs/conventions.md` lists the corrections.
+    Algorithms 1 and 2 of the paper; `docs/conventions.md` lists the corrections. [Stadler2004] for Tresca's law.
     """
 
     rho_n: float | None = None
@@ -102,37 +89,27 @@ class AugmentedLagrangian:
         check_rho("rho_t", self.rho_t)
         check_max_steps(self.max_steps)
 
-    def init(self, problem: ContactProblem, start: ContactState) -> AugmentedIterate:
+    def init(self, problem: ContactProblem, start: ContactState) -> OuterIterate:
         """Take the tractions of the start as multipliers."""
-        return AugmentedIterate(state=start, progress=Progress.begun(problem, start))
+        return OuterIterate.begun(problem, start)
 
-    def step(self, problem: ContactProblem, iterate: Iterate) -> AugmentedIterate:
+    def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
         """Do one outer step."""
-        if not isinstance(iterate, AugmentedIterate):
+        if not isinstance(iterate, OuterIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
-        conditions = self._conditions(problem, iterate.state.traction)
-        inner = solve_projected(conditions, iterate.state, self.inner)
-        linear_solves = iterate.linear_solves + inner.linear_solves
-        if not inner.is_solved:
-            message = f"inner Newton iteration unfinished after {inner.linear_solves} linear solves"
-            return replace(
-                iterate, state=inner.state, linear_solves=linear_solves, ended=Status.INNER_FAILED, message=message
-            )
-        progress = iterate.progress.after(problem, inner.state)
-        return AugmentedIterate(
-            state=inner.state,
-            linear_solves=linear_solves,
-            progress=progress,
-            ended=progress.ended,
-            message=f"{inner.linear_solves} inner solves",
-        )
+        equations = self._equations(problem, iterate.state.traction)
+        inner = solve_projected(equations, iterate.state, self.inner)
+        if inner.is_solved:
+            return iterate.followed_by(problem, inner.state, inner.linear_solves)
+        message = f"inner Newton iteration unfinished after {inner.linear_solves} linear solves"
+        return iterate.failed_at(inner.state, inner.linear_solves, message)
 
-    def _conditions(self, problem: ContactProblem, multiplier: FloatArray) -> ProjectedConditions:
+    def _equations(self, problem: ContactProblem, multiplier: FloatArray) -> ProjectionEquations:
         automatic = _AUTOMATIC_RHO * problem.body.stiffness_scale
         given_bound = None
         if self.bound is BoundUpdate.LAGGED:
             given_bound = problem.friction_bound(multiplier[:, 0], is_closed=multiplier[:, 0] < 0.0)
-        return ProjectedConditions(
+        return ProjectionEquations(
             problem,
             rho_n=automatic if self.rho_n is None else self.rho_n,
             rho_t=automatic if self.rho_t is None else self.rho_t,
@@ -150,12 +127,12 @@ class InnerResult:
     is_solved: bool
 
 
-def solve_projected(conditions: ProjectedConditions, start: ContactState, options: InnerNewton) -> InnerResult:
+def solve_projected(equations: ProjectionEquations, start: ContactState, options: InnerNewton) -> InnerResult:
     """Solve projection equations with fixed multipliers by semismooth Newton.
 
     Parameters
     ----------
-    conditions : ProjectedConditions
+    equations : ProjectionEquations
         With a multiplier.
     start : ContactState
         A response of the body.
@@ -171,45 +148,46 @@ def solve_projected(conditions: ProjectedConditions, start: ContactState, option
     convex function if the body is symmetric (the augmented energy), so going to its zero makes the iteration descend
     from any start.
     """
-    trial = conditions.evaluate(start)
-    sets, linear_solves, n_sprung = trial.sets, 0, 0
+    residual = equations.evaluate(start)
+    sets, linear_solves, n_regularised = residual.sets, 0, 0
     for step in range(options.max_steps):
-        response = respond(conditions, trial, sets, n_sprung)
+        response = respond(equations, residual, sets, n_regularised)
         linear_solves += response.linear_solves
-        reached = conditions.evaluate(response.state)
-        if _is_solved(conditions, trial, reached, sets, is_sprung=response.is_sprung):
+        reached = equations.evaluate(response.state)
+        if _is_solved(equations, residual, reached, sets, is_regularised=response.is_regularised):
             return InnerResult(response.state, linear_solves, is_solved=True)
         if step < options.full_steps:
-            following = conditions.cautious(reached, sets)
+            following = equations.through_stick(reached, sets)
         else:
-            reached = conditions.evaluate(_descended(conditions, trial, response.state))
+            reached = equations.evaluate(_descended(equations, residual, response.state))
             following = reached.sets
-        n_sprung = n_sprung + 1 if response.is_sprung and following.key == sets.key else 0
-        trial, sets = reached, following
-    return InnerResult(trial.state, linear_solves, is_solved=False)
+        n_regularised = n_regularised + 1 if response.is_regularised and following.key == sets.key else 0
+        residual, sets = reached, following
+    return InnerResult(residual.state, linear_solves, is_solved=False)
 
 
 def _is_solved(
-    conditions: ProjectedConditions, trial: Trial, reached: Trial, sets: ActiveSets, *, is_sprung: bool
+    equations: ProjectionEquations, residual: Residual, reached: Residual, sets: ActiveSets, *, is_regularised: bool
 ) -> bool:
     """Whether the Newton point solves the equations: no residual, or its own sets and its own linearised bound."""
-    stress, _ = certificate_scales(conditions.problem, reached.state)
-    if np.abs(reached.residual).max() <= 1e-12 * stress:
+    stress, _ = certificate_scales(equations.problem, reached.state)
+    nothing = negligible(equations.problem.body) * stress
+    if np.abs(reached.value).max() <= nothing:
         return True
     # Displacements times a large rho leave more than that as round-off, so look at what was linearised instead.
-    linearised = trial.bound + trial.slope * (reached.predicted_sigma_n - trial.predicted_sigma_n)
-    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= 1e-12 * stress))
-    return not is_sprung and reached.sets.key == sets.key and is_exact
+    linearised = residual.bound + residual.slope * (reached.predicted_sigma_n - residual.predicted_sigma_n)
+    is_exact = bool(np.all(np.abs(reached.bound - linearised)[sets.direction != 0] <= nothing))
+    return not is_regularised and reached.sets.key == sets.key and is_exact
 
 
-def _descended(conditions: ProjectedConditions, trial: Trial, target: ContactState) -> ContactState:
+def _descended(equations: ProjectionEquations, residual: Residual, target: ContactState) -> ContactState:
     """Return the point towards `target` where the augmented energy is least (the target if it falls all the way)."""
-    weights = conditions.problem.body.weights[:, None]
-    direction = target.displacement - trial.state.displacement
+    weights = equations.problem.body.weights[:, None]
+    direction = target.displacement - residual.state.displacement
 
     def slope(fraction: float) -> float:
-        residual = conditions.evaluate(trial.state.blended(target, fraction)).residual
-        return float((weights * residual * direction).sum())
+        value = equations.evaluate(residual.state.blended(target, fraction)).value
+        return float((weights * value * direction).sum())
 
     if slope(1.0) <= 0.0:
         return target
@@ -217,4 +195,4 @@ def _descended(conditions: ProjectedConditions, trial: Trial, target: ContactSta
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slope(middle) < 0.0 else (low, middle)
-    return trial.state.blended(target, low)
+    return residual.state.blended(target, low)

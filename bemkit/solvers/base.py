@@ -13,9 +13,8 @@ from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
-from bemkit.solvers.active_sets import NodeStatus, contact_sets
-from bemkit.solvers.floating import FloatingResponse, floating_response
-from bemkit.solvers.newton import consistent_state
+from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
+from bemkit.solvers.newton import FloatingResponse, consistent_state, floating_response
 
 
 class Status(Enum):
@@ -40,6 +39,10 @@ class Status(Enum):
     ACCURACY_NOT_REACHED = (
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
+    )
+    TOO_COSTLY = (
+        "This driver asks for several responses for each contact node, and those of this body are costly; use "
+        "SemismoothNewton, AugmentedLagrangian or FixedPoint."
     )
     NEGATIVE_ENERGY = (
         "The elastic energy is negative or can become so, because the elements are too long for collocation; "
@@ -255,67 +258,63 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                escape = find_unsolvable_load(self.problem)
-                if escape is not None:
-                    return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
-                unheld = self._unheld()
-                first = self._first(start)
-                spent = first.linear_solves + (unheld is not None)
-                iterate = self._freed(replace(first, linear_solves=spent), unheld)
+                unsolvable = find_unsolvable_load(self.problem)
+                if unsolvable is not None:
+                    return self._nothing_done(Status.UNSOLVABLE_LOAD, unsolvable.description)
+                untouched = self._untouched_response()
+                iterate = self._without_contact(self._first(start, spent=int(untouched is not None)), untouched)
             except SingularResponse as error:
                 return self._nothing_done(Status.SINGULAR, str(error))
-            history = [self._record(iterate, None)]
+            sets = contact_sets(self.problem, iterate.state)
+            history = [self._record(iterate, sets, 0, float("inf"), 0)]
             while (status := self._verdict(iterate, history)) is None:
                 try:
                     following = self.solver.step(self.problem, iterate)
                 except SingularResponse as error:
                     following = replace(iterate, ended=Status.SINGULAR, message=str(error))
-                following = self._freed(following, unheld)
-                history.append(self._record(following, iterate, step=len(history)))
-                iterate = following
+                following = self._without_contact(following, untouched)
+                new_sets = contact_sets(self.problem, following.state)
+                change = _relative_change(following.state, iterate.state)
+                history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
+                iterate, sets = following, new_sets
             # a certificate measures by the travel where that hides the deformation
             if status is not Status.MAX_STEPS and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
-        return self._solution(iterate, status, history)
+        return self._solution(iterate, status, sets, history)
 
-    def _first(self, start: ContactState | None) -> Iterate:
+    def _first(self, start: ContactState | None, spent: int) -> Iterate:
         if start is None:
-            state, linear_solves = self.problem.glued_state, 1
+            state, linear_solves = self.problem.sticking_state, 1
         else:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
-        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves)
+        return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + spent)
 
-    def _unheld(self) -> FloatingResponse | None:
+    def _untouched_response(self) -> FloatingResponse | None:
         """Return the response without any contact, if the body floats and its load balances."""
         body = self.problem.body
-        most = float(body.weights @ np.abs(self.problem.glued_state.traction).sum(axis=1))
+        most = float(body.weights @ np.abs(self.problem.sticking_state.traction).sum(axis=1))
         if np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2))):
             return None  # far from balanced, which is not worth a linear solve
         return floating_response(body, separated(body.n_contact))
 
-    def _freed(self, iterate: Iterate, unheld: FloatingResponse | None) -> Iterate:
+    def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.
 
         Drivers only come ever closer to tractions that vanish. What they leave is no small error, having nothing to be
         small against.
         """
-        if unheld is None or not iterate.state.is_finite:
+        if untouched is None or not iterate.state.is_finite:
             return iterate
-        state = unheld.nearest(iterate.state.displacement)
+        state = untouched.nearest(iterate.state.displacement)
         if not certify(self.problem, state).is_below(self.tolerance):
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")
 
-    def _record(self, iterate: Iterate, previous: Iterate | None, step: int = 0) -> StepRecord:
-        sets = contact_sets(self.problem, iterate.state)
-        n_changed, relative_change = 0, float("inf")
-        if previous is not None:
-            n_changed = sets.n_changed(contact_sets(self.problem, previous.state))
-            size = float(np.abs(iterate.state.displacement).max())
-            change = float(np.abs(iterate.state.displacement - previous.state.displacement).max())
-            relative_change = change / size if size > 0.0 else float(change > 0.0)
+    def _record(
+        self, iterate: Iterate, sets: ActiveSets, step: int, relative_change: float, n_changed: int
+    ) -> StepRecord:
         slips = sets.is_closed & (sets.direction != 0)
         record = StepRecord(
             step=step,
@@ -341,7 +340,9 @@ class _Run:
             return iterate.ended
         return Status.MAX_STEPS if history[-1].step >= self.max_steps else None
 
-    def _solution(self, iterate: Iterate, status: Status, history: list[StepRecord]) -> ContactSolution:
+    def _solution(
+        self, iterate: Iterate, status: Status, sets: ActiveSets, history: list[StepRecord]
+    ) -> ContactSolution:
         last = history[-1]
         worst = f"worst certificate entry {last.certificate.worst:.1e} after {last.step} steps"
         remark = f" ({iterate.message})" if iterate.message else ""
@@ -349,7 +350,7 @@ class _Run:
             state=iterate.state,
             status=status,
             certificate=last.certificate,
-            node_status=contact_sets(self.problem, iterate.state).node_status,
+            node_status=sets.node_status,
             steps=last.step,
             linear_solves=iterate.linear_solves,
             message=f"{status.value} [{worst}]{remark}",
@@ -369,3 +370,10 @@ class _Run:
             message=f"{status.value} {message}",
             history=(),
         )
+
+
+def _relative_change(state: ContactState, previous: ContactState) -> float:
+    """Return how far the displacements have moved, relative to their size."""
+    size = float(np.abs(state.displacement).max())
+    change = float(np.abs(state.displacement - previous.displacement).max())
+    return change / size if size > 0.0 else float(change > 0.0)

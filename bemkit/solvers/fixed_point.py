@@ -1,29 +1,14 @@
 """Fixed point iteration on the friction bound."""
 
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from bemkit.contact.laws import Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import InputError
-from bemkit.solvers.base import Iterate, Status, solve
+from bemkit.solvers.base import Iterate, solve
 from bemkit.solvers.options import check_max_steps
-from bemkit.solvers.progress import Progress
+from bemkit.solvers.progress import OuterIterate
 from bemkit.solvers.ssn import SemismoothNewton
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class FixedPointIterate(Iterate):
-    """Iterate of `FixedPoint`.
-
-    Parameters
-    ----------
-    progress : Progress
-        What the last outer steps achieved.
-    """
-
-    progress: Progress
 
 
 @dataclass(frozen=True)
@@ -35,14 +20,14 @@ class FixedPoint:
     inner : SemismoothNewton
         Driver of the Tresca problems.
     inner_tolerance : float
-        Certificate of the inner solutions.
+        Certificate of the inner solutions; at least a thousand times the accuracy of the body.
     max_steps : int
         Outer steps allowed.
 
     Notes
     -----
-    The classical proof of existence made into a method. It contracts for moderate friction only; beyond, it ends with
-    CYCLING or STALLED. The limit of `AugmentedLagrangian` for large rho.
+    The classical proof of existence [NecasJarusekHaslinger1980] made into a method. It contracts for moderate friction
+    only; beyond, it ends with CYCLING or STALLED. The limit of `AugmentedLagrangian` for large rho.
     """
 
     inner: SemismoothNewton = field(default_factory=SemismoothNewton)
@@ -54,33 +39,21 @@ class FixedPoint:
         if not 0.0 < self.inner_tolerance < 1.0:
             raise InputError(f"inner_tolerance = {self.inner_tolerance}; give a number between 0 and 1")
 
-    def init(self, problem: ContactProblem, start: ContactState) -> FixedPointIterate:
+    def init(self, problem: ContactProblem, start: ContactState) -> OuterIterate:
         """Take the bound from the normal tractions of the start."""
-        return FixedPointIterate(state=start, progress=Progress.begun(problem, start))
+        return OuterIterate.begun(problem, start)
 
-    def step(self, problem: ContactProblem, iterate: Iterate) -> FixedPointIterate:
+    def step(self, problem: ContactProblem, iterate: Iterate) -> OuterIterate:
         """Solve one Tresca problem."""
-        if not isinstance(iterate, FixedPointIterate):
+        if not isinstance(iterate, OuterIterate):
             raise TypeError(f"iterate is a {type(iterate).__name__}; give what init or step of this driver returned")
         sigma_n = iterate.state.sigma_n
         bound = problem.friction_bound(sigma_n, is_closed=sigma_n < 0.0)
         tresca = problem.with_law(Tresca(bound))
-        inner = solve(tresca, self.inner, start=iterate.state, tolerance=self.inner_tolerance, throw=False)
-        linear_solves = iterate.linear_solves + inner.linear_solves
-        if not inner.is_converged:
-            state = inner.state if np.isfinite(inner.state.displacement).all() else iterate.state
-            return replace(
-                iterate,
-                state=state,
-                linear_solves=linear_solves,
-                ended=Status.INNER_FAILED,
-                message=f"Tresca problem of this step: {inner.status.name}: {inner.message}",
-            )
-        progress = iterate.progress.after(problem, inner.state)
-        return FixedPointIterate(
-            state=inner.state,
-            linear_solves=linear_solves,
-            progress=progress,
-            ended=progress.ended,
-            message=f"{inner.linear_solves} inner solves",
-        )
+        tolerance = max(self.inner_tolerance, 1e3 * problem.body.accuracy)
+        inner = solve(tresca, self.inner, start=iterate.state, tolerance=tolerance, throw=False)
+        if inner.is_converged:
+            return iterate.followed_by(problem, inner.state, inner.linear_solves)
+        state = inner.state if inner.state.is_finite else iterate.state
+        message = f"Tresca problem of this step: {inner.status.name}: {inner.message}"
+        return iterate.failed_at(state, inner.linear_solves, message)

@@ -4,8 +4,8 @@ Pressed hard enough by extra forces at the contact nodes and held by enough extr
 everywhere and sticks everywhere. Between two changes of a node's status the response is linear in the amount of the
 extras, so the path from there to the problem proper consists of straight pieces: at each joint one node changes its
 status, and the amount goes on falling, or rises again for a while where the path folds. Folds are where Newton's method
-and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting, carried out on a body
-instead of a matrix.
+and plain continuation fail; here they cost nothing. This is Lemke's complementary pivoting [Lemke1965], carried out
+on a body instead of a matrix.
 
 The path may also start with any other statuses, those at which Newton's method gives up: then only nodes that violate
 an inequality get extras, of pressure, friction, gap or slip, which make it hold. Few are wrong, so this path is short.
@@ -73,10 +73,17 @@ class _Piece(NamedTuple):
     slack_rate: FloatArray  # (5, n_contact)
 
 
-def path_exists(problem: ContactProblem) -> bool:
-    """Return whether the law is continuous where nodes open, which following the path takes for granted."""
+def why_no_path(problem: ContactProblem) -> str:
+    """Return why the path of solutions is not to be followed, nothing if it is.
+
+    It asks for two responses or more for each contact node, and the law has to be continuous where nodes open.
+    """
+    if problem.body.is_costly:
+        return "the path of solutions is not followed, because responses of this body are costly"
     jumps = problem.friction_bound(np.zeros(problem.n_contact)) > 0.0
-    return not np.any(jumps & ~np.asarray(problem.law.acts_across_gap))
+    if np.any(jumps & ~np.asarray(problem.law.acts_across_gap)):
+        return "there is no path of solutions, because the friction law jumps where nodes open"
+    return ""
 
 
 def follow_path(
@@ -176,7 +183,7 @@ class Extras:
     @classmethod
     def everywhere(cls, problem: ContactProblem) -> "Extras":
         """Return pressure and friction at all nodes: with enough of it every node touches and sticks."""
-        stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+        stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
         extras, none = stress * _uneven(2 * problem.n_contact), np.zeros(problem.n_contact)
         return cls(extras[::2], extras[1::2], none, none)
 
@@ -229,7 +236,7 @@ class _Path:
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
-        sticks = ~slips & ~problem.body.tangent_is_free  # where the tangent is free there is nothing to follow
+        sticks = ~slips & ~problem.body.tangent_is_eliminated  # where the tangent is free there is nothing to follow
         conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
         conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)

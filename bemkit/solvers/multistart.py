@@ -75,7 +75,7 @@ def start_with(problem: ContactProblem, node_status: Sequence[int] | IntArray) -
         Not in equilibrium; `solve` takes its statuses only.
     """
     status = np.asarray(node_status)
-    stress, length = certificate_scales(problem, problem.glued_state)
+    stress, length = certificate_scales(problem, problem.sticking_state)
     is_closed = (status != 0) & np.isfinite(problem.gap)
     direction = np.where(status == 2, 1.0, 0.0) - np.where(status == 3, 1.0, 0.0)
     sigma_n = np.where(is_closed, -stress, 0.0)

@@ -1,14 +1,15 @@
-"""Newton steps on the projection equations, shared by all drivers."""
+"""Newton steps on the projection equations, shared by all drivers, also where they leave the body free to move."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.certificate import certificate_scales
-from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
+from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
 from bemkit.errors import InputError
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
-from bemkit.solvers.floating import floating_response
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 
 _SPRING = 1e-3
 """Springs that hold an unheld body, in units of its stiffness scale. Small: each further step reduces what the
@@ -19,36 +20,40 @@ _WEAKEST = 1e-8
 """Springs become weaker by the first factor with every step that ends in the sets it began with, so that a small force
 soon carries the body to where other sets hold it; by the second at most."""
 
+_NEGLIGIBLE = 100.0
+"""Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
+a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Answer of the body to Newton's linear conditions.
+    """Answer of the body to Newton's linear equations.
 
     Parameters
     ----------
     state : ContactState
     linear_solves : int
         Linear systems spent.
-    is_sprung : bool
+    is_regularised : bool
         Whether the conditions left the body free to move, so that springs had to hold it in this step.
     """
 
     state: ContactState
     linear_solves: int
-    is_sprung: bool
+    is_regularised: bool
 
 
-def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, n_sprung: int = 0) -> Response:
-    """Solve the linearised conditions.
+def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets, n_regularised: int = 0) -> Response:
+    """Solve the linearised equations.
 
     Parameters
     ----------
-    conditions : ProjectedConditions
-    trial : Trial
+    equations : ProjectionEquations
+    residual : Residual
         Where to linearise.
     sets : ActiveSets
         Sets of the Newton matrix.
-    n_sprung : int
+    n_regularised : int
         Steps before this one that springs held with the same sets.
 
     Returns
@@ -62,17 +67,17 @@ def respond(conditions: ProjectedConditions, trial: Trial, sets: ActiveSets, n_s
     SingularResponse
         If even springs at all free nodes do not.
     """
-    body = conditions.problem.body
-    linear = conditions.linearised(trial, sets)
+    body = equations.problem.body
+    linear = equations.linearised(residual, sets)
     try:
-        return Response(body.respond(linear), 1, is_sprung=False)
+        return Response(body.respond(linear), 1, is_regularised=False)
     except SingularResponse:
         floating = floating_response(body, linear)
         if floating is not None:
-            return Response(floating.nearest(trial.state.displacement), 2, is_sprung=False)
-        stiffness = spring_stiffness(conditions.problem, trial.state) * max(_WEAKER**n_sprung, _WEAKEST)
-        springs = linear.held_by_springs(trial.state.displacement, stiffness)
-        return Response(conditions.problem.respond(springs), 2, is_sprung=True)
+            return Response(floating.nearest(residual.state.displacement), 2, is_regularised=False)
+        stiffness = spring_stiffness(equations.problem, residual.state) * max(_WEAKER**n_regularised, _WEAKEST)
+        springs = linear.regularised(residual.state.displacement, stiffness)
+        return Response(equations.problem.respond(springs), 2, is_regularised=True)
 
 
 def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
@@ -85,11 +90,11 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
     return _SPRING * stiffness
 
 
-def merit(problem: ContactProblem, trial: Trial) -> float:
+def merit(problem: ContactProblem, residual: Residual) -> float:
     """Return the size of the residual of (15), (16) in the weighted mean square, relative to the traction scale."""
     weights = problem.body.weights
-    mean_square = float(weights @ (trial.residual**2).sum(axis=1)) / float(weights.sum())
-    stress, _ = certificate_scales(problem, trial.state)
+    mean_square = float(weights @ (residual.value**2).sum(axis=1)) / float(weights.sum())
+    stress, _ = certificate_scales(problem, residual.state)
     return float(np.sqrt(mean_square)) / stress
 
 
@@ -111,7 +116,97 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
     if not guess.is_finite:
         raise InputError("start contains entries that are not finite; give finite displacements and tractions")
     rho = problem.body.stiffness_scale
-    conditions = ProjectedConditions(problem, rho, rho)
-    trial = conditions.evaluate(guess)
-    response = respond(conditions, trial, trial.sets)
+    equations = ProjectionEquations(problem, rho, rho)
+    residual = equations.evaluate(guess)
+    response = respond(equations, residual, residual.sets)
     return response.state, response.linear_solves
+
+
+def negligible(body: LinearBody) -> float:
+    """Return the relative size below which a residual is nothing but the inaccuracy of the body's responses."""
+    return _NEGLIGIBLE * body.accuracy
+
+
+@dataclass(frozen=True, eq=False)
+class FloatingResponse:
+    """Forces in balance without help from the obstacle, and a body that may be anywhere along its free motions.
+
+    Parameters
+    ----------
+    state : ContactState
+        One of its positions.
+    free_motions : (n_free, n_contact, 2) array
+        Rigid motions that change no condition.
+    """
+
+    state: ContactState
+    free_motions: FloatArray
+
+    def nearest(self, displacement: FloatArray) -> ContactState:
+        """Return the position nearest to some displacements, by least squares over all contact nodes.
+
+        Parameters
+        ----------
+        displacement : (n_contact, 2) array [m]
+
+        Returns
+        -------
+        ContactState
+        """
+        motions = self.free_motions.reshape(len(self.free_motions), -1)
+        way = (displacement - self.state.displacement).ravel()
+        shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
+        return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
+
+
+def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:
+    """Return the response under conditions that leave rigid motions free, if the forces along these balance.
+
+    Parameters
+    ----------
+    body : LinearBody
+    conditions : LinearConditions
+
+    Returns
+    -------
+    FloatingResponse or None
+        None also if the conditions leave no motion free.
+
+    Notes
+    -----
+    Where only tractions are prescribed, as many displacements are held as there are free motions: just enough to
+    determine the response, so that their reactions are what is out of balance. If that is round-off, the prescribed
+    tractions take their place. The result carries them to the last digit; weak springs would leave a little
+    everywhere, which a condition such as "friction only where something presses" cannot tell from contact.
+    """
+    free = conditions.free_motions(body.rigid_motions())
+    gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
+    gives_traction[:, 1] &= ~body.tangent_is_eliminated  # whose displacement cannot be held
+    if not len(free) or np.count_nonzero(gives_traction) < len(free):
+        return None
+    pins = _determinate(free, gives_traction)
+    held = conditions.replaced(pins, stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
+    try:
+        response = body.respond(held)
+    except SingularResponse:
+        return None
+    traction = response.traction.copy()
+    own = np.einsum("nii->ni", conditions.on_traction)
+    other = np.stack([conditions.on_traction[:, 0, 1], conditions.on_traction[:, 1, 0]], axis=1)
+    for row in (0, 1):  # the friction of a slipping node follows its pressure
+        node = np.flatnonzero(pins[:, row])
+        rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
+        traction[node, row] = rest / own[node, row]
+    state = ContactState(response.displacement, traction)
+    return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
+
+
+def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:
+    """Return (n_contact, 2) bool: as many of the allowed displacements as there are free motions, and independent."""
+    from scipy.linalg import qr
+
+    candidates = np.flatnonzero(allowed)
+    _, order = qr(free.reshape(len(free), -1)[:, candidates], mode="r", pivoting=True)
+    pins = np.zeros(allowed.shape, dtype=bool)
+    pins.flat[candidates[order[: len(free)]]] = True
+    return pins

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 from bemkit.contact.problem import ContactProblem, ContactState
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.base import Iterate, Status
-from bemkit.solvers.homotopy import AffineBound, follow_path, path_exists
-from bemkit.solvers.newton import merit, respond
+from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
+from bemkit.solvers.newton import merit, negligible, respond
 from bemkit.solvers.options import check_count, check_max_steps, check_rho
 
 _MOST_PATHS = 5
@@ -23,9 +23,6 @@ _FEW_PIECES = 20
 
 _FEW_STEPS = 12
 """Full steps under weaker friction."""
-
-_SOLVED = 1e-12
-"""Relative residual of (15), (16) below which only round-off is left."""
 
 
 class Phase(Enum):
@@ -55,33 +52,33 @@ class NewtonIterate(Iterate):
 
     Parameters
     ----------
-    trial : Trial
+    residual : Residual
         The projections at the state.
     sets : ActiveSets
         Sets of the next Newton matrix.
     merit : float
         Size of the residual at the state.
-    best : tuple of float and Trial
+    best : tuple of float and Residual
         The smallest residual met since the phase FULL began, and where.
     visited : frozenset of bytes
         Keys of all sets tried since then.
     phase : Phase
     n_in_phase : int
         Steps taken in this phase.
-    n_sprung : int
+    n_regularised : int
         The last of these that springs held and that kept the sets.
     n_paths : int
         Paths followed to their ends so far.
     """
 
-    trial: Trial
+    residual: Residual
     sets: ActiveSets
     merit: float
-    best: tuple[float, Trial]
+    best: tuple[float, Residual]
     visited: frozenset[bytes]
     phase: Phase = Phase.FULL
     n_in_phase: int = 0
-    n_sprung: int = 0
+    n_regularised: int = 0
     n_paths: int = 0
 
 
@@ -113,6 +110,10 @@ class SemismoothNewton:
     best state so far; if that stalls, the whole path of solutions is followed, which takes a few linear solves per
     contact node.
     Sets that do not hold the body are helped by weak springs for that step.
+
+    References
+    ----------
+    [HintermuellerItoKunisch2002], [HueeberStadlerWohlmuth2008]; the linearised bound after [ChristensenEtAl1998].
     """
 
     rho: float | None = None
@@ -143,45 +144,45 @@ class SemismoothNewton:
             return self._weaker_step(problem, iterate)
         return self._path_step(problem, iterate)
 
-    def _conditions(self, problem: ContactProblem) -> ProjectedConditions:
+    def _equations(self, problem: ContactProblem) -> ProjectionEquations:
         rho = problem.body.stiffness_scale if self.rho is None else self.rho
-        return ProjectedConditions(problem, rho, rho)
+        return ProjectionEquations(problem, rho, rho)
 
     def _begun(self, problem: ContactProblem, state: ContactState) -> NewtonIterate:
-        trial = self._conditions(problem).evaluate(state)
-        size = merit(problem, trial)
+        residual = self._equations(problem).evaluate(state)
+        size = merit(problem, residual)
         return NewtonIterate(
             state=state,
-            trial=trial,
-            sets=trial.sets,
+            residual=residual,
+            sets=residual.sets,
             merit=size,
-            best=(size, trial),
-            visited=frozenset([trial.sets.key]),
+            best=(size, residual),
+            visited=frozenset([residual.sets.key]),
         )
 
     def _full_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
-        conditions = self._conditions(problem)
-        response = respond(conditions, iterate.trial, iterate.sets, iterate.n_sprung)
-        trial = conditions.evaluate(response.state)
-        sets = conditions.cautious(trial, iterate.sets)
-        size = merit(problem, trial)
+        equations = self._equations(problem)
+        response = respond(equations, iterate.residual, iterate.sets, iterate.n_regularised)
+        residual = equations.evaluate(response.state)
+        sets = equations.through_stick(residual, iterate.sets)
+        size = merit(problem, residual)
         following = replace(
             iterate,
-            state=trial.state,
+            state=residual.state,
             linear_solves=iterate.linear_solves + response.linear_solves,
-            message="held by springs" if response.is_sprung else "",
-            trial=trial,
+            message="held by springs" if response.is_regularised else "",
+            residual=residual,
             sets=sets,
             merit=size,
-            best=(size, trial) if size < iterate.best[0] else iterate.best,
+            best=(size, residual) if size < iterate.best[0] else iterate.best,
             visited=iterate.visited | {sets.key},
             n_in_phase=iterate.n_in_phase + 1,
-            n_sprung=iterate.n_sprung + 1 if response.is_sprung and sets.key == iterate.sets.key else 0,
+            n_regularised=iterate.n_regularised + 1 if response.is_regularised and sets.key == iterate.sets.key else 0,
         )
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
         is_new = sets.key not in iterate.visited
-        repeats = not is_new and not response.is_sprung and following.merit >= 0.5 * iterate.merit
-        if repeats and size <= _SOLVED:
+        repeats = not is_new and not response.is_regularised and following.merit >= 0.5 * iterate.merit
+        if repeats and size <= negligible(problem.body):
             reason = "contact and friction are satisfied, the rest of the certificate is beyond this driver"
             return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
@@ -192,10 +193,10 @@ class SemismoothNewton:
         return following
 
     def _damped_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
-        conditions = self._conditions(problem)
-        response = respond(conditions, iterate.trial, iterate.trial.sets)
-        trials = [conditions.evaluate(iterate.state.blended(response.state, 0.5**halvings)) for halvings in range(9)]
-        size, trial = min(((merit(problem, trial), trial) for trial in trials), key=lambda pair: pair[0])
+        equations = self._equations(problem)
+        response = respond(equations, iterate.residual, iterate.residual.sets)
+        residuals = [equations.evaluate(iterate.state.blended(response.state, 0.5**halvings)) for halvings in range(9)]
+        size, residual = min(((merit(problem, residual), residual) for residual in residuals), key=lambda pair: pair[0])
         following = replace(
             iterate,
             linear_solves=iterate.linear_solves + response.linear_solves,
@@ -204,20 +205,21 @@ class SemismoothNewton:
         )
         if size > (1.0 - 1e-3) * iterate.merit:
             return self._rescued(problem, following, Status.STALLED, "no Newton step reduces the residual")
-        following = replace(following, state=trial.state, trial=trial, sets=trial.sets, merit=size)
+        following = replace(following, state=residual.state, residual=residual, sets=residual.sets, merit=size)
         if following.n_in_phase >= self.damped_steps:
             return self._rescued(problem, following, Status.STALLED, "the line search takes too many steps")
         return following
 
     def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
-        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and path_exists(problem)
+        hindrance = why_no_path(problem) if self.follows_path else ""
+        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and not hindrance
         for phase in iterate.phase.more_patient:
             if phase is Phase.DAMPED and self.damped_steps > 0:
                 return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
             if phase is not Phase.DAMPED and may_follow:
                 return replace(iterate, phase=phase, n_in_phase=0, message=f"{reason}; the path is followed next")
-        return replace(iterate, ended=status, message=reason)
+        return replace(iterate, ended=status, message="; ".join(filter(None, (reason, hindrance))))
 
     def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         bound = AffineBound.tangent(problem, iterate.state.sigma_n)
@@ -232,9 +234,9 @@ class SemismoothNewton:
 
     def _weaker_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         share = _WEAKER ** (iterate.n_in_phase + 1)
-        weaker = replace(self._conditions(problem), friction_share=share)
-        trial, sets, linear_solves = _with_full_steps(weaker, problem.glued_state)
-        bound = AffineBound.tangent(problem, trial.state.sigma_n)
+        weaker = replace(self._equations(problem), friction_share=share)
+        residual, sets, linear_solves = _with_full_steps(weaker, problem.sticking_state)
+        bound = AffineBound.tangent(problem, residual.state.sigma_n)
         end = follow_path(problem, bound, sets, max_pieces=_few_pieces(problem))
         following = replace(
             iterate,
@@ -261,21 +263,27 @@ def _few_pieces(problem: ContactProblem) -> int:
     return _FEW_PIECES + problem.n_contact // 8
 
 
-def _with_full_steps(conditions: ProjectedConditions, start: ContactState) -> tuple[Trial, ActiveSets, int]:
+def _with_full_steps(equations: ProjectionEquations, start: ContactState) -> tuple[Residual, ActiveSets, int]:
     """Return where full Newton steps lead, as soon as active sets come back, and the linear solves they took."""
-    trial = conditions.evaluate(start)
-    sets, linear_solves, visited = trial.sets, 0, set[bytes]()
+    residual = equations.evaluate(start)
+    sets, linear_solves, visited = residual.sets, 0, set[bytes]()
     while sets.key not in visited and len(visited) < _FEW_STEPS:
         visited.add(sets.key)
-        response = respond(conditions, trial, sets)
-        trial, linear_solves = conditions.evaluate(response.state), linear_solves + response.linear_solves
-        sets = conditions.cautious(trial, sets)
-    return trial, sets, linear_solves
+        response = respond(equations, residual, sets)
+        residual, linear_solves = equations.evaluate(response.state), linear_solves + response.linear_solves
+        sets = equations.through_stick(residual, sets)
+    return residual, sets, linear_solves
 
 
 def _back_at_best(iterate: NewtonIterate) -> NewtonIterate:
     """Return the beginning of the line search, where the residual was smallest."""
-    size, trial = iterate.best
+    size, residual = iterate.best
     return replace(
-        iterate, state=trial.state, trial=trial, sets=trial.sets, merit=size, phase=Phase.DAMPED, n_in_phase=0
+        iterate,
+        state=residual.state,
+        residual=residual,
+        sets=residual.sets,
+        merit=size,
+        phase=Phase.DAMPED,
+        n_in_phase=0,
     )

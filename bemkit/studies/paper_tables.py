@@ -218,6 +218,6 @@ def _zero_multipliers(problem: ContactProblem) -> ContactState:
 
     Without the overlap the first active set would be empty and the floating body of Example 1 would not be held.
     """
-    _, length = certificate_scales(problem, problem.glued_state)
+    _, length = certificate_scales(problem, problem.sticking_state)
     overlap = np.stack([np.maximum(problem.gap, 0.0) + length, problem.slip_origin], axis=1)
     return ContactState(overlap, np.zeros_like(overlap))

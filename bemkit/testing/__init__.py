@@ -1,5 +1,6 @@
 """Checks that implementations, ours and yours, keep the promises of bemkit's protocols."""
 
+from bemkit.testing.bodies import check_body as check_body
 from bemkit.testing.curves import check_curve as check_curve
 from bemkit.testing.discretisations import check_discretisation as check_discretisation
 from bemkit.testing.failure import CheckFailed as CheckFailed

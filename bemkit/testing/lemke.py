@@ -49,8 +49,7 @@ class LemkePivoting:
 
     References
     ----------
-    D. E. Stewart, J. C. Trinkle, Int. J. Numer. Meth. Engng 39 (1996) 2673-2691.
-    R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, section 4.4.
+    [StewartTrinkle1996]; [CottlePangStone1992], section 4.4.
     """
 
     max_steps: int = 30
@@ -70,7 +69,9 @@ class LemkePivoting:
         return Iterate(state=start)
 
     def step(self, problem: ContactProblem, iterate: Iterate) -> Iterate:
-        """Pivot from the origin to a solution."""
+        """Pivot from the origin to a solution; the body is asked for two responses for each contact node."""
+        if problem.body.is_costly:
+            return replace(iterate, ended=Status.TOO_COSTLY)
         stiffness, load, linear_solves = _probed(problem)
         springs, spring_load = _springs(problem, iterate.state)
         try:
@@ -170,7 +171,7 @@ def _affine_bound(problem: ContactProblem) -> tuple[FloatArray, FloatArray]:
     """Return (c, s) of ``bound = c + s |sigma_n|``."""
     none = np.zeros(problem.n_contact)
     cohesion = problem.friction_bound(none)
-    stress = float(np.abs(problem.glued_state.traction).max()) or 1.0
+    stress = float(np.abs(problem.sticking_state.traction).max()) or 1.0
     coefficient = (problem.friction_bound(none - stress) - cohesion) / stress
     far = problem.friction_bound(none - 1e3 * stress)
     is_affine = np.allclose(far, cohesion + 1e3 * stress * coefficient, rtol=1e-9, atol=0.0)
@@ -190,13 +191,13 @@ def _probed(problem: ContactProblem) -> tuple[FloatArray, FloatArray, int]:
     body, n_contact = problem.body, problem.n_contact
     weights = np.repeat(body.weights, 2)
     none = np.zeros(n_contact)
-    amount = (float(np.abs(problem.glued_state.traction).max()) or 1.0) / body.stiffness_scale
+    amount = (float(np.abs(problem.sticking_state.traction).max()) or 1.0) / body.stiffness_scale
     at_rest = problem.respond(stick(none, none)).traction.ravel()
     stiffness = np.empty((2 * n_contact, 2 * n_contact))
     for column, unit in enumerate(amount * np.eye(2 * n_contact)):
         moved = problem.respond(stick(unit[0::2], unit[1::2])).traction.ravel()
         stiffness[:, column] = weights * (moved - at_rest) / amount
-    idle = 2 * np.flatnonzero(body.tangent_is_free) + 1
+    idle = 2 * np.flatnonzero(body.tangent_is_eliminated) + 1
     stiffness[idle, idle] = weights[idle] * body.stiffness_scale
     return stiffness, -weights * at_rest, 2 * n_contact + 1
 
@@ -209,7 +210,7 @@ def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, 
     motions, n_unknowns = problem.body.rigid_motions(), 2 * problem.n_contact
     if not len(motions):
         return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
-    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_free], axis=1)
+    is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_eliminated], axis=1)
     motions = (motions * is_held).reshape(len(motions), -1)
     orthonormal = np.linalg.qr(motions.T)[0]
     scale = _WEAKER * spring_stiffness(problem, state) * float(np.median(problem.body.weights))
@@ -227,7 +228,7 @@ def _complementarity(
     """
     cohesion, coefficient = _affine_bound(problem)
     normal, tangential = slice(0, None, 2), slice(1, None, 2)
-    force = float(np.abs(problem.body.weights[:, None] * problem.glued_state.traction).max()) or 1.0
+    force = float(np.abs(problem.body.weights[:, None] * problem.sticking_state.traction).max()) or 1.0
     unit_compliance = float(np.abs(compliance).max())
     length = force * unit_compliance
     relative = compliance / unit_compliance

@@ -110,7 +110,7 @@ def _check_restart(
 
 def _check_purity(known: KnownProblem, solver: ContactSolver, label: str) -> None:
     """Step twice from one iterate; the iterate must not change, and its successors must be equal."""
-    first = solver.init(known.problem, known.problem.glued_state)
+    first = solver.init(known.problem, known.problem.sticking_state)
     demand(isinstance(first, Iterate), f"{label}: init returns a {type(first).__name__}, not an Iterate")
     before = _as_array(first.state).copy()
     after, again = (solver.step(known.problem, first) for _ in range(2))

@@ -74,7 +74,7 @@ def test_springs_hold_a_floating_body_where_it_is():
     body = block_body()
     place = np.stack([np.full(body.n_contact, 0.3), np.zeros(body.n_contact)], axis=1)
     # With stiff springs the body is lifted by load / (spring * length) only; the load is 0.5 on a length of about 1.
-    state = body.respond(separated(body.n_contact).held_by_springs(place, 1e6))
+    state = body.respond(separated(body.n_contact).regularised(place, 1e6))
     assert np.allclose(state.displacement, place, atol=1e-4)
     assert body.weights @ state.sigma_n == pytest.approx(-0.5)
 

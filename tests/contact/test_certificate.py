@@ -137,7 +137,7 @@ def test_what_is_left_of_tractions_is_measured_by_itself_not_by_those_that_would
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Coulomb(0.5))
     lifted = -body.motions[0]
-    glued = np.abs(problem.glued_state.traction).max()
+    glued = np.abs(problem.sticking_state.traction).max()
     clean = ContactState(lifted, np.zeros_like(lifted))
     assert certify(problem, clean).worst < 1e-12
     left = clean.traction.copy()
@@ -159,7 +159,7 @@ def test_lengths_without_tractions_are_measured_by_the_displacement():
 def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_hold_the_body():
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Tresca(0.0))
-    glued = np.abs(problem.glued_state.traction).max()
+    glued = np.abs(problem.sticking_state.traction).max()
     slid = -2.0 * body.motions[0] + body.motions[1]
     state = ContactState(slid, np.zeros_like(slid))
     assert certify(problem, state).worst < 1e-12

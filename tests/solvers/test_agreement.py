@@ -26,7 +26,7 @@ DRIVERS = {
 
 def assert_same(problem, state, other, tolerance=1e-7):
     """Compare relative to the largest entries, or to what the load makes of a clamped body if little is left of it."""
-    stress = max(np.abs(other.traction).max(), np.abs(problem.glued_state.traction).max())
+    stress = max(np.abs(other.traction).max(), np.abs(problem.sticking_state.traction).max())
     length = max(np.abs(other.displacement).max(), stress / problem.body.stiffness_scale)
     assert np.abs(state.displacement - other.displacement).max() <= tolerance * length
     assert np.abs(state.traction - other.traction).max() <= tolerance * stress

@@ -11,7 +11,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.floating import floating_response
+from bemkit.solvers.newton import floating_response
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import block_body

@@ -114,7 +114,7 @@ def test_theorem_1_decrease_in_every_step(seed, rho_n, rho_t):
         squares = body.weights @ (state.traction - exact.traction) ** 2
         return squares[0] / (2 * rho_n) + squares[1] / (2 * rho_t)
 
-    iterate = driver.init(problem, problem.glued_state)
+    iterate = driver.init(problem, problem.sticking_state)
     for _ in range(8):
         before = distance(iterate.state)
         iterate = driver.step(problem, iterate)

@@ -6,25 +6,23 @@ import numpy as np
 import pytest
 
 from bemkit.contact.laws import Coulomb, FrictionLaw
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, SingularResponse
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LawError, LinearBody, SingularResponse
 from bemkit.operators.equilibrium import Imbalance
 from bemkit.solvers.alm import AugmentedLagrangian, InnerNewton
 from bemkit.solvers.base import ContactFailure, Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
-from tests.handmade import assert_solves, block_problem, hard_problem, random_problem
+from tests.handmade import Inexact, assert_solves, block_body, block_problem, hard_problem, random_problem
 
 BARE_NEWTON = SemismoothNewton(damped_steps=0, follows_path=False)
 
 
-class OnlyClamped:
+class OnlyClamped(LinearBody):
     """A body that responds to prescribed displacements and to nothing else."""
 
-    n_contact = 2
     weights = np.ones(2)
     stiffness_scale = 1.0
-    tangent_is_free = np.zeros(2, bool)
 
     def __init__(self, *, never=False):
         self.never = never
@@ -33,12 +31,6 @@ class OnlyClamped:
         if self.never or conditions.on_traction.any():
             raise SingularResponse("the sockets are empty")
         return ContactState(conditions.value[:, ::1].copy(), np.array([[1.0, 0.0], [-1.0, 0.0]]))
-
-    def rigid_motions(self):
-        return np.zeros((0, 2, 2))
-
-    def rigid_load(self):
-        return np.zeros(0)
 
     def imbalance(self, state):
         return Imbalance(0.0, 0.0)
@@ -122,6 +114,12 @@ CASES = {
     "singular stiffness, lemke": (
         Status.SINGULAR,
         ContactProblem(DenseBody(np.diag([1.0, 0.0]), np.array([1.0, 1.0]), np.ones(1)), np.zeros(1), Coulomb(0.1)),
+        LemkePivoting(),
+        {},
+    ),
+    "too costly": (
+        Status.TOO_COSTLY,
+        ContactProblem(Inexact(block_body(n=3), is_costly=True), np.zeros(3), Coulomb(0.5)),
         LemkePivoting(),
         {},
     ),
@@ -248,7 +246,7 @@ def test_starts_are_checked():
 def test_drivers_refuse_each_others_iterates():
     problem = random_problem(0)
     newton, augmented, fixed = SemismoothNewton(), AugmentedLagrangian(), FixedPoint()
-    iterate = LemkePivoting().init(problem, problem.glued_state)
+    iterate = LemkePivoting().init(problem, problem.sticking_state)
     for driver in (newton, augmented, fixed):
         with pytest.raises(TypeError, match="iterate is a Iterate; give what init or step of this driver returned"):
             driver.step(problem, iterate)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
-from bemkit.contact.body import ContactState, SingularResponse
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
 from bemkit.operators.equilibrium import Imbalance
@@ -21,14 +21,14 @@ _LEFT_OVER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class FreeTangents:
+class EliminatedTangents:
     """Tangential displacements that follow the unknowns of a body, because no traction ever acts along them.
 
     Parameters
     ----------
-    nodes : (n_free,) array
+    nodes : (n_eliminated,) array
         Numbers of the contact nodes, ascending.
-    response, at_rest : (n_free, n_unknowns) array [-], (n_free,) array [m]
+    response, at_rest : (n_eliminated, n_unknowns) array [-], (n_eliminated,) array [m]
         Their tangential displacements are ``at_rest + response @ unknowns``.
     """
 
@@ -38,21 +38,21 @@ class FreeTangents:
 
 
 @dataclass(frozen=True, eq=False)
-class DenseBody:
+class DenseBody(LinearBody):
     """Body with ``weights * t = stiffness @ u - load`` at its contact nodes; see `LinearBody`.
 
     Parameters
     ----------
     stiffness : (n_unknowns, n_unknowns) array [Pa]
-        Condensed stiffness, index ``2 node + component`` with component 0 = normal, 1 = tangential; free tangents are
-        left out. It need not be symmetric.
+        Condensed stiffness, index ``2 node + component`` with component 0 = normal, 1 = tangential; eliminated
+        tangents are left out. It need not be symmetric.
     load : (n_unknowns,) array [N/m]
         Condensed load: the nodal forces that would act on the contact nodes of the clamped body, reversed.
     weights : (n_contact,) array [m]
         Length that belongs to each node.
     motions : (n_motions, n_contact, 2) array, optional
         Rigid motions that only contact holds; none by default.
-    free_tangents : FreeTangents, optional
+    eliminated_tangents : EliminatedTangents, optional
         Nodes without friction whose tangential displacement is no unknown; none by default.
     modulus : float, optional [Pa]
         E' of the material: force per displacement of one node. By default the median of the diagonal normal
@@ -60,7 +60,7 @@ class DenseBody:
 
     Raises
     ------
-    ValueError
+    InputError
         If shapes do not fit or entries are not finite, if a weight or the modulus is not positive, or if the modulus is
         left out where the motions leave nothing of the stiffness to tell it from.
     """
@@ -69,7 +69,7 @@ class DenseBody:
     load: FloatArray
     weights: FloatArray
     motions: FloatArray | None = None
-    free_tangents: FreeTangents | None = None
+    eliminated_tangents: EliminatedTangents | None = None
     modulus: float | None = None
 
     def __post_init__(self) -> None:
@@ -102,32 +102,35 @@ class DenseBody:
             raise InputError(f"modulus = {self.modulus:g}; give the E' of the material, a positive number")
 
     @property
-    def n_contact(self) -> int:
-        """Number of contact nodes."""
-        return len(self.weights)
-
-    @property
     def n_unknowns(self) -> int:
-        """Order of the systems that `respond` solves: two for each contact node, one where the tangent is free."""
-        return 2 * self.n_contact - (0 if self.free_tangents is None else len(self.free_tangents.nodes))
+        """Order of the systems that `respond` solves: two for each contact node, less the eliminated tangents."""
+        return 2 * self.n_contact - (0 if self.eliminated_tangents is None else len(self.eliminated_tangents.nodes))
 
     @cached_property
-    def tangent_is_free(self) -> BoolArray:
+    def tangent_is_eliminated(self) -> BoolArray:
         """(n_contact,) bool array: where the tangential displacement is no unknown."""
-        is_free = np.zeros(self.n_contact, bool)
-        if self.free_tangents is not None:
-            is_free[self.free_tangents.nodes] = True
-        return is_free
+        is_eliminated = super().tangent_is_eliminated
+        if self.eliminated_tangents is not None:
+            is_eliminated[self.eliminated_tangents.nodes] = True
+        return is_eliminated
 
     @cached_property
     def stiffness_scale(self) -> float:
         """Modulus per median weight [Pa/m], or the median of the diagonal normal stiffnesses per weight."""
         if self.modulus is not None:
             return self.modulus / float(np.median(self.weights))
-        diagonal = np.diagonal(self.stiffness) / self.weights[self._unknowns // 2]
-        largest = float(np.abs(self._traction_of_displacement).max())
-        stiff = diagonal[(diagonal > _LEFT_OVER * largest) & (self._unknowns % 2 == 0)]
+        weights = self.weights[self.unknown_dofs // 2]
+        diagonal = np.diagonal(self.stiffness) / weights
+        largest = float((np.abs(self.stiffness).max(axis=1) / weights).max())
+        stiff = diagonal[(diagonal > _LEFT_OVER * largest) & (self.unknown_dofs % 2 == 0)]
         return float(np.median(stiff)) if stiff.size else largest or 1.0
+
+    @cached_property
+    def unknown_dofs(self) -> IntArray:
+        """(n_unknowns,) array: the numbers ``2 node + component`` of the unknown displacements, ascending."""
+        is_unknown = np.ones((self.n_contact, 2), bool)
+        is_unknown[self.tangent_is_eliminated, 1] = False
+        return np.flatnonzero(is_unknown)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response; one LU factorisation of `n_unknowns`, none if all displacements are given.
@@ -137,7 +140,7 @@ class DenseBody:
         Prescribed displacements, zero tractions and slip tractions are met exactly, not just to round-off, so that
         ties such as ``|sigma_t| = s |sigma_n|`` are decided alike in all units.
         """
-        self._check_free_tangents(conditions)
+        self._check_eliminated_tangents(conditions)
         own = [0, 1]
         acts_on_displacement = np.any(conditions.on_displacement != 0.0, axis=2)
         acts_on_traction = np.any(conditions.on_traction != 0.0, axis=2)
@@ -146,14 +149,15 @@ class DenseBody:
         gives_traction = acts_on_traction & ~acts_on_displacement
 
         displacement = np.zeros_like(conditions.value)
-        if not gives_displacement.ravel()[self._unknowns].all():
-            displacement.flat[self._unknowns] = self._solved(conditions)
-        given = conditions.on_displacement[:, own, own]
-        np.divide(conditions.value, given, out=displacement, where=gives_displacement)
-        unknowns = displacement.ravel()[self._unknowns]
-        displacement[self.tangent_is_free, 1] = self._followed(unknowns)
+        if not gives_displacement.ravel()[self.unknown_dofs].all():
+            displacement.flat[self.unknown_dofs] = self._solved(conditions)
+        np.divide(conditions.value, conditions.on_displacement[:, own, own], out=displacement, where=gives_displacement)
+        unknowns = displacement.ravel()[self.unknown_dofs]
+        displacement[self.tangent_is_eliminated, 1] = self._followed(unknowns)
 
-        traction = (self._traction_of_displacement @ unknowns) - self._free_traction
+        traction = np.zeros_like(displacement)
+        traction.flat[self.unknown_dofs] = self.stiffness @ unknowns - self.load
+        traction /= self.weights[:, None]
         for row in own:
             rest = conditions.value[:, row] - conditions.on_traction[:, row, 1 - row] * traction[:, 1 - row]
             factor = conditions.on_traction[:, row, row]
@@ -162,7 +166,7 @@ class DenseBody:
 
     def rigid_motions(self) -> FloatArray:
         """Return the motions given to the constructor."""
-        return np.zeros((0, self.n_contact, 2)) if self.motions is None else self.motions
+        return super().rigid_motions() if self.motions is None else self.motions
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the load on these motions."""
@@ -173,115 +177,92 @@ class DenseBody:
 
         Notes
         -----
-        The first number is the residual of ``weights * t = stiffness @ u - load`` (and of free tangents that do not
-        follow), so it also detects states that are no response of this body. It is relative to the largest nodal force
-        (term of the sums), the second one to the largest load or contact force. Round-off is what the stiffness makes
-        of the rigid part of the displacements, and that of the sums.
+        The first number is the residual of ``weights * t = stiffness @ u - load`` (and of eliminated tangents that do
+        not follow), so it also detects states that are no response of this body. It is relative to the largest nodal
+        force (term of the sums), the second one to the largest load or contact force. Round-off is what the stiffness
+        makes of the rigid part of the displacements, and that of the sums.
         """
-        forces = (self.weights[:, None] * state.traction).ravel()[self._unknowns]
-        unknowns = state.displacement.ravel()[self._unknowns]
-        terms = self.stiffness * unknowns
+        forces = (self.weights[:, None] * state.traction).ravel()[self.unknown_dofs]
+        unknowns = state.displacement.ravel()[self.unknown_dofs]
         stray = self._stray_forces(state, unknowns)
-        largest = max(np.abs(forces).max(), np.abs(self.load).max(), np.abs(terms).max(), stray)
+        largest_term, all_terms = self._column_sizes * np.abs(unknowns)
+        largest = max(np.abs(forces).max(), np.abs(self.load).max(), largest_term.max(), stray)
         if largest == 0.0:
             return Imbalance(0.0, 0.0)
-        missing = np.abs(terms.sum(axis=1) - self.load - forces).max()
-        left = float(np.max(self._left_by_motions(unknowns), initial=0.0))
-        residual = Imbalance(float(np.maximum(missing, stray) / largest), 0.0, left / float(largest))
-        motions = self._motions
+        missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
+        motions, basis = self._motions, self._orthonormal_motions
+        left_by_motions = np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0)
+        residual = Imbalance(float(np.maximum(missing, stray) / largest), 0.0, float(left_by_motions / largest))
         if not len(motions):
             return residual
         # Not relative to the stiffness terms: a body on its way to infinity would balance any load by comparison.
         given = max(np.abs(forces).max(), np.abs(self.load).max()) or largest
-        defect = self._motion_defect @ np.abs(unknowns)
-        round_off = defect + np.finfo(float).eps * np.abs(terms).sum()
+        round_off = self._motion_defect @ np.abs(unknowns) + np.finfo(float).eps * all_terms.sum()
         work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
         return residual.joined(Imbalance(0.0, float(work / given), float(round_off / given)))
 
-    def _left_by_motions(self, unknowns: FloatArray) -> FloatArray:
-        """Return the forces (n_unknowns,) that round-off of the stiffness makes of the rigid part of displacements."""
-        motions = self._orthonormal_motions
-        return np.abs(self.stiffness @ (motions @ (motions.T @ unknowns)))
-
     @cached_property
-    def _unknowns(self) -> IntArray:
-        """(n_unknowns,) array: the numbers ``2 node + component`` of the unknown displacements."""
-        is_unknown = np.ones((self.n_contact, 2), bool)
-        is_unknown[self.tangent_is_free, 1] = False
-        return np.flatnonzero(is_unknown)
-
-    @cached_property
-    def _columns(self) -> IntArray:
-        """(n_contact, 2) array: where each displacement stands among the unknowns, -1 if it is none."""
-        columns = np.full(2 * self.n_contact, -1)
-        columns[self._unknowns] = np.arange(self.n_unknowns)
-        return columns.reshape(-1, 2)
+    def _column_sizes(self) -> FloatArray:
+        """(2, n_unknowns) array [Pa]: the largest entry of each column of the stiffness, and the sum of all."""
+        sizes = np.abs(self.stiffness)
+        return np.stack([sizes.max(axis=0), sizes.sum(axis=0)])
 
     @cached_property
     def _motions(self) -> FloatArray:
         """(n_motions, n_unknowns) array."""
-        return self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self._unknowns]
-
-    @cached_property
-    def _motion_defect(self) -> FloatArray:
-        """(n_unknowns,) array [Pa]: what round-off of the stiffness adds to the balance of forces."""
-        return np.asarray(np.abs(self._motions @ self.stiffness).max(axis=0) / np.abs(self._motions).max())
-
-    @cached_property
-    def _traction_of_displacement(self) -> FloatArray:
-        """(n_contact, 2, n_unknowns) array [Pa/m], zero along free tangents."""
-        rows = np.zeros((self.n_contact, 2, self.n_unknowns))
-        rows.reshape(-1, self.n_unknowns)[self._unknowns] = self.stiffness
-        return rows / self.weights[:, None, None]
-
-    @cached_property
-    def _free_traction(self) -> FloatArray:
-        """(n_contact, 2) array [Pa], load per weight."""
-        traction = np.zeros((self.n_contact, 2))
-        traction.flat[self._unknowns] = self.load
-        return traction / self.weights[:, None]
+        return self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self.unknown_dofs]
 
     @cached_property
     def _orthonormal_motions(self) -> FloatArray:
         """(n_unknowns, n_motions) array."""
         return np.asarray(np.linalg.qr(self._motions.T)[0])
 
-    def _check_free_tangents(self, conditions: LinearConditions) -> None:
+    @cached_property
+    def _motion_defect(self) -> FloatArray:
+        """(n_unknowns,) array [Pa]: what round-off of the stiffness adds to the balance of forces."""
+        return np.asarray(np.abs(self._motions @ self.stiffness).max(axis=0) / np.abs(self._motions).max())
+
+    def _check_eliminated_tangents(self, conditions: LinearConditions) -> None:
         on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
         asks_more = np.any(on_displacement[:, 1] != 0.0, axis=1) | (on_displacement[:, 0, 1] != 0.0)
         asks_more |= (on_traction[:, 1, 0] != 0.0) | (on_traction[:, 1, 1] == 0.0) | (conditions.value[:, 1] != 0.0)
-        if np.any(asks_more & self.tangent_is_free):
-            node = int(np.argmax(asks_more & self.tangent_is_free))
+        if np.any(asks_more & self.tangent_is_eliminated):
+            node = int(np.argmax(asks_more & self.tangent_is_eliminated))
             raise InputError(
                 f"contact node {node} is without friction, and its tangential displacement is eliminated: give "
                 "sigma_t = 0 as the second condition there, or ask ContactProblem.respond, which does"
             )
 
     def _followed(self, unknowns: FloatArray) -> FloatArray:
-        """Return the displacements of the free tangents."""
-        free = self.free_tangents
-        return np.zeros(0) if free is None else free.at_rest + free.response @ unknowns
+        """Return the displacements of the eliminated tangents."""
+        tangents = self.eliminated_tangents
+        return np.zeros(0) if tangents is None else tangents.at_rest + tangents.response @ unknowns
 
     def _stray_forces(self, state: ContactState, unknowns: FloatArray) -> float:
-        """Return the largest force on a free tangent, or that a displacement which does not follow would take."""
-        is_free = self.tangent_is_free
-        force = np.abs(state.sigma_t[is_free])
-        force += self.stiffness_scale * np.abs(state.u_t[is_free] - self._followed(unknowns))
-        return float(np.max(self.weights[is_free] * force, initial=0.0))
+        """Return the largest force on an eliminated tangent, or what a displacement that does not follow would take."""
+        rows = self.tangent_is_eliminated
+        force = np.abs(state.sigma_t[rows])
+        force += self.stiffness_scale * np.abs(state.u_t[rows] - self._followed(unknowns))
+        return float(np.max(self.weights[rows] * force, initial=0.0))
 
     def _solved(self, conditions: LinearConditions) -> FloatArray:
         """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the unknowns with every row scaled to one."""
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        matrix = np.matmul(conditions.on_traction, self._traction_of_displacement).reshape(-1, self.n_unknowns)
-        right_side = conditions.value + np.matmul(conditions.on_traction, self._free_traction[:, :, None])[:, :, 0]
-        matrix, right_side = matrix[self._unknowns], right_side.ravel()[self._unknowns]
-        node, component = np.divmod(self._unknowns, 2)
+        node, component = np.divmod(self.unknown_dofs, 2)
+        position = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
+        position.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
+        matrix = np.zeros_like(self.stiffness)
+        right_side = conditions.value[node, component]
         for of in (0, 1):
-            column = self._columns[node, of]
-            row = np.flatnonzero(column >= 0)
-            matrix[row, column[row]] += conditions.on_displacement[node[row], component[row], of]
+            row = np.flatnonzero(position[node, of] >= 0)
+            column, own = position[node[row], of], (node[row], component[row], of)
+            factor = conditions.on_traction[own] / self.weights[node[row]]
+            acts = factor != 0.0
+            matrix[row[acts]] += factor[acts, None] * self.stiffness[column[acts]]
+            matrix[row, column] += conditions.on_displacement[own]
+            right_side[row] += factor * self.load[column]
 
         row_size = np.abs(matrix).max(axis=1)
         if not row_size.all():

@@ -1,4 +1,9 @@
-"""The displacement nodes on a contact boundary, and what is known at each of them."""
+"""The displacement nodes on a contact boundary, what is known at each of them, and which of them keep two unknowns.
+
+Where a law is frictionless no traction acts along the tangent, so that this displacement is eliminated with the rest of
+the body and follows the unknowns. A few of these tangents are retained if normals, friction and supports alone would
+leave the body free to move, or nearly so: what is eliminated has to be held.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +13,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.tangents import open_tangents
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported, unsupported_motions
 
 CAN_TOUCH = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
 which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
+WEAK = 0.03
+"""A rigid motion whose share in the retained directions is less than this is held too weakly by them: eliminating the
+rest then loses the square of it in digits."""
+SMALLEST = 1e-9
+"""A combination of motions that moves the contact nodes by less than this share of the others moves none of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +143,7 @@ def contact_conditions(
     contact = candidates.take(can_touch)
     is_supported = held_nodes(conditions, contact)
     motions = free_motions(conditions, contact, space)
-    has_tangent = open_tangents(motions, contact.is_frictionless, is_supported)
+    has_tangent = retained_tangents(motions, contact.is_frictionless, is_supported)
     return _opened(conditions, contact, has_tangent), contact
 
 
@@ -162,3 +171,61 @@ def free_motions(conditions: NodalConditions, contact: ContactNodes, space: Boun
     at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
     at_contact[:, held_nodes(conditions, contact), 1] = 0.0
     return at_contact
+
+
+def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+    """Return (n_contact,) bool: where the tangential displacement is eliminated, and follows the unknowns.
+
+    That is at nodes without friction, but for the few that are retained, and wherever a support holds the node: what
+    acts there along the tangent cannot be told from the reaction of the support.
+    """
+    return np.asarray(~np.all(conditions.is_open[contact.nodes], axis=1))
+
+
+def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_supported: BoolArray) -> BoolArray:
+    """Return the contact nodes whose tangential displacement is an unknown.
+
+    Parameters
+    ----------
+    motions : (n_motions, n_contact, 2) array
+        Normal and tangential components of the rigid motions that no support holds, of any sizes.
+    is_frictionless : (n_contact,) bool array
+    is_supported : (n_contact,) bool array
+        Nodes that a support holds in one direction; they have no tangent of their own.
+
+    Returns
+    -------
+    (n_contact,) bool array
+        All nodes with friction, and at most as many others as there are motions.
+    """
+    is_retained = ~is_frictionless
+    if not motions.size:
+        return is_retained
+    motions = _of_unit_size(motions)
+    normal, tangential = motions[:, :, 0].T, motions[:, :, 1].T  # (n_contact, n_motions)
+    held = np.concatenate([normal, tangential[is_retained & ~is_supported]])
+    _, singular, directions = np.linalg.svd(np.linalg.qr(held, mode="r"), full_matrices=True)
+    sizes = np.zeros(len(motions))
+    sizes[: singular.size] = singular
+    weak = directions[sizes < WEAK * np.sqrt(len(held))]
+    along = np.where((is_frictionless & ~is_supported)[:, None], tangential @ weak.T, 0.0)
+    for _ in weak:  # the tangents that feel most of what is still free
+        sizes = np.linalg.norm(along, axis=1)
+        if sizes.max(initial=0.0) < WEAK:
+            break
+        node = int(np.argmax(sizes))
+        is_retained[node] = True
+        unit = along[node] / sizes[node]
+        along = along - np.outer(along @ unit, unit)
+    return is_retained
+
+
+def _of_unit_size(motions: FloatArray) -> FloatArray:
+    """Return motions that span the same, orthogonal and of mean size one at the contact nodes.
+
+    Of a body that touches along a small part of its boundary all rotations are nearly translations there.
+    """
+    columns = motions.reshape(len(motions), -1).T
+    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    basis = basis[:, sizes > SMALLEST * sizes[0]]
+    return np.asarray(np.sqrt(motions.shape[1]) * basis.T.reshape(-1, *motions.shape[1:]))

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.dense_body import DenseBody
+from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
 from bemkit.contact.condensation.nodes import ContactNodes as ContactNodes
-from bemkit.contact.condensation.nodes import contact_conditions as contact_conditions
-from bemkit.contact.condensation.nodes import free_motions, held_nodes
-from bemkit.contact.condensation.retained import Unknowns, find_free_tangents, find_tangents, find_unknowns
-from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.condensation.nodes import contact_conditions, find_tangents, free_motions, held_nodes
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import Work
@@ -29,21 +26,90 @@ class NoContactNodesError(InputError):
 
 
 @dataclass(frozen=True, eq=False)
-class CondensedBody:
-    """An elastic body seen from its contact nodes; fulfils `LinearBody`.
+class Unknowns:
+    """The displacements of the contact nodes that the contact system solves for, among the directions of a map.
+
+    Each retained direction of the map is one unknown: ``displacement[order] = factor * unknowns + offset``.
 
     Parameters
     ----------
-    dense : DenseBody
-        The condensed stiffness in (n, t) components.
+    order : (n_unknowns,) array
+        Where each unknown stands among the retained directions.
+    factor, offset : (n_unknowns,) arrays [-], [m]
+        One and zero, but where a support holds the node: there the unknown is the normal displacement.
+    """
+
+    order: IntArray
+    factor: FloatArray
+    offset: FloatArray
+
+    @classmethod
+    def of(cls, conditions: NodalConditions, contact: ContactNodes) -> Unknowns:
+        """Return the unknowns under the conditions of all displacement nodes, ascending by contact node."""
+        row, component = np.nonzero(conditions.is_open[contact.nodes])
+        node, is_held = contact.nodes[row], held_nodes(conditions, contact)[row]
+        position = np.cumsum(conditions.is_open).reshape(-1, 2) - 1
+        along = np.einsum("nkc,nc->nk", conditions.frame[node], contact.directions[row])
+        each = np.arange(row.size)
+        factor = 1.0 / np.where(is_held, along[each, component], 1.0)
+        held_part = along[each, 1 - component] * conditions.displacement[node, 1 - component]
+        return cls(position[node, component], factor, np.where(is_held, -held_part * factor, 0.0))
+
+    def directions(self, unknowns: FloatArray) -> FloatArray:
+        """Return the displacements of the retained directions (n_retained,)."""
+        displacement = np.empty(self.order.size)
+        displacement[self.order] = self.factor * unknowns + self.offset
+        return displacement
+
+    def stiffness(self, condensed: CondensedMap) -> FloatArray:
+        """Return the stiffness of a map in the unknowns."""
+        return self.factor[:, None] * condensed.stiffness[np.ix_(self.order, self.order)] * self.factor
+
+    def load(self, condensed: CondensedMap) -> FloatArray:
+        """Return the load of a map on the unknowns."""
+        at_zero = self.directions(np.zeros(self.order.size))
+        return self.factor * (condensed.load - condensed.stiffness @ at_zero)[self.order]
+
+    def tangents(
+        self, condensed: CondensedMap, conditions: NodalConditions, contact: ContactNodes
+    ) -> EliminatedTangents | None:
+        """Return how the tangential displacements that are no unknowns follow these, None if there are none."""
+        chosen = np.flatnonzero(find_tangents(conditions, contact))
+        if not chosen.size:
+            return None
+        nodes, is_held = contact.nodes[chosen], held_nodes(conditions, contact)[chosen]
+        response, at_rest = np.zeros((chosen.size, self.order.size)), np.zeros(chosen.size)
+        followed, rest = condensed.follow(2 * nodes[~is_held] + 1)
+        response[~is_held] = followed[:, self.order] * self.factor
+        at_rest[~is_held] = rest + followed @ self.directions(np.zeros(self.order.size))
+        # where a support holds the node, its frame leads from the one component that moves to the other
+        held = np.flatnonzero(is_held)
+        node = nodes[held]
+        along = np.einsum("nkc,njc->nkj", conditions.frame[node], contact.frame[chosen[held]])
+        free = np.argmax(conditions.is_open[node], axis=1)
+        moving, fixed = along[np.arange(held.size), free], along[np.arange(held.size), 1 - free]
+        slope = moving[:, 1] / moving[:, 0]
+        n_before = np.cumsum(np.count_nonzero(conditions.is_open[contact.nodes], axis=1)) - 1
+        response[held, n_before[chosen[held]]] = slope
+        given = conditions.displacement[node, 1 - free]
+        at_rest[held] = (fixed[:, 1] - slope * fixed[:, 0]) * given
+        return EliminatedTangents(chosen, response, at_rest)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CondensedBody(DenseBody):
+    """An elastic body seen from its contact nodes: the condensed stiffness, and the way back to the whole boundary.
+
+    Parameters
+    ----------
     condensed : CondensedMap
-        The same in open directions, with the way back to the whole boundary.
+        The stiffness in retained directions.
     unknowns : Unknowns
-        The displacements of the contact nodes that `dense` solves for.
+        The displacements of the contact nodes among these.
     points : (n_nodes, 2) array [m]
         Where the nodal forces act.
     conditions : NodalConditions
-        Of the displacement nodes, the contact nodes open.
+        Of the displacement nodes; the contact nodes are retained.
     nodes : ContactNodes
     balanced : tuple of int
         Which of the resultants along x and y and the moment (0, 1, 2) vanish: not those of an exterior, which is at
@@ -52,37 +118,16 @@ class CondensedBody:
     Notes
     -----
     At a node where a support prescribes one direction (a roller meets the contact boundary) only the other one is
-    open. Its displacements and its pressure are true; friction there cannot be told from the reaction of the support,
-    so that no friction acts in the contact problem; see `bemkit.model.solved_contact`.
+    retained. Its displacements and its pressure are true; friction there cannot be told from the reaction of the
+    support, so that no friction acts in the contact problem; see `bemkit.model.solved_contact`.
     """
 
-    dense: DenseBody
     condensed: CondensedMap
     unknowns: Unknowns
     points: FloatArray
     conditions: NodalConditions
     nodes: ContactNodes
     balanced: tuple[int, ...] = (0, 1, 2)
-
-    @property
-    def n_contact(self) -> int:
-        """Number of contact nodes."""
-        return self.dense.n_contact
-
-    @property
-    def weights(self) -> FloatArray:
-        """(n_contact,) array [m]."""
-        return self.dense.weights
-
-    @property
-    def stiffness_scale(self) -> float:
-        """Typical traction per displacement of one contact node [Pa/m]."""
-        return self.dense.stiffness_scale
-
-    @property
-    def tangent_is_free(self) -> BoolArray:
-        """(n_contact,) bool array: nodes without friction, whose tangential displacement is no unknown."""
-        return self.dense.tangent_is_free
 
     @property
     def moves(self) -> BoolArray:
@@ -94,22 +139,10 @@ class CondensedBody:
         """(n_contact,) bool array: nodes that a support holds in one direction, which have no friction of their own."""
         return held_nodes(self.conditions, self.nodes)
 
-    def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return displacement and traction under two conditions per contact node."""
-        return self.dense.respond(conditions)
-
-    def rigid_motions(self) -> FloatArray:
-        """Return the motions that only contact can hold."""
-        return self.dense.rigid_motions()
-
-    def rigid_load(self) -> FloatArray:
-        """Return the work of the load on each of these motions."""
-        return self.dense.rigid_load()
-
     @property
     def work(self) -> Work:
         """What it took to come here, from the operators on."""
-        return self.condensed.work + Work(contact_unknowns=self.dense.n_unknowns)
+        return self.condensed.work + Work(contact_unknowns=self.n_unknowns)
 
     def under(self, displacement: FloatArray, force: FloatArray) -> CondensedBody:
         """Return the same body under another load, without another factorisation.
@@ -128,14 +161,19 @@ class CondensedBody:
         conditions = replace(self.conditions, displacement=displacement)
         condensed = self.condensed.under(force, displacement)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)
-        unknowns = find_unknowns(conditions, self.nodes, self.tangent_is_free)
-        free = find_free_tangents(conditions, self.nodes, self.tangent_is_free, unknowns, condensed)
-        dense = replace(self.dense, load=unknowns.load(condensed), free_tangents=free)
-        return replace(self, dense=dense, condensed=condensed, unknowns=unknowns, conditions=conditions)
+        unknowns = Unknowns.of(conditions, self.nodes)
+        return replace(
+            self,
+            load=unknowns.load(condensed),
+            eliminated_tangents=unknowns.tangents(condensed, conditions, self.nodes),
+            condensed=condensed,
+            unknowns=unknowns,
+            conditions=conditions,
+        )
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
-        return self.condensed.recover(self.unknowns.opened(state.displacement.ravel()[self.unknowns.numbers]))
+        return self.condensed.recover(self.unknowns.directions(state.displacement.ravel()[self.unknown_dofs]))
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body (loads, contact, reactions) are from equilibrium of forces and moments.
@@ -144,17 +182,19 @@ class CondensedBody:
         round-off is that of the forces, which in thin bodies are small differences of large terms.
         """
         displacement, force = self.recover(state)
-        of_contact = self.dense.imbalance(state)
+        of_contact = super().imbalance(state)
         total = float(np.abs(force).sum())
         if not self.balanced or self._only_moves(displacement, total):
             return of_contact
         round_off = round_off_of(displacement, self.condensed.sensitivity)
-        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, round_off))
+        return of_contact.joined(
+            resultant_imbalance(self.points, force, self.balanced, round_off, self.condensed.volume_force)
+        )
 
     def _only_moves(self, displacement: FloatArray, total: float) -> bool:
         """Whether the body has moved rigidly, so that its forces are what is left of terms which cancel."""
         reach = float(np.abs(displacement).max())
-        terms = np.finfo(float).eps * reach * float(np.abs(self.dense.stiffness).sum())
+        terms = np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum())
         # sums of hundreds of terms leave some eps of their sizes; loads that strain a body by less are lost in them
         if total > 64.0 * max(terms, round_off_of(displacement, self.condensed.sensitivity)):
             return False
@@ -206,12 +246,18 @@ def condensed_body(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
     space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
-    is_free = find_tangents(conditions, contact)
-    unknowns = find_unknowns(conditions, contact, is_free)
-    stiffness = unknowns.to_open.T @ condensed.stiffness @ unknowns.to_open
-    free = find_free_tangents(conditions, contact, is_free, unknowns, condensed)
-    motions = free_motions(conditions, contact, space)
-    modulus = elastic.material.plane_modulus
-    dense = DenseBody(stiffness, unknowns.load(condensed), contact.weights, motions, free, modulus)
-    points = dof_points(space)
-    return CondensedBody(dense, condensed, unknowns, points, conditions, contact, possible_motions(space.mesh))
+    unknowns = Unknowns.of(conditions, contact)
+    return CondensedBody(
+        stiffness=unknowns.stiffness(condensed),
+        load=unknowns.load(condensed),
+        weights=contact.weights,
+        motions=free_motions(conditions, contact, space),
+        eliminated_tangents=unknowns.tangents(condensed, conditions, contact),
+        modulus=elastic.material.plane_modulus,
+        condensed=condensed,
+        unknowns=unknowns,
+        points=dof_points(space),
+        conditions=conditions,
+        nodes=contact,
+        balanced=possible_motions(space.mesh),
+    )

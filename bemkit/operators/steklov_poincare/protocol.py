@@ -44,6 +44,8 @@ class CondensedMap:
         `bemkit.operators.linear.solvers.Krylov`.
     work : Work
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
+    volume_force : (3,) array, optional
+        Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
     """
 
     stiffness: FloatArray
@@ -54,6 +56,7 @@ class CondensedMap:
     sensitivity: FloatArray | None = None
     iterations: tuple[Iterations, ...] = ()
     work: Work = field(default_factory=Work)
+    volume_force: FloatArray | None = None
 
 
 class SteklovPoincare(Protocol):

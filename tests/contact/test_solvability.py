@@ -1,10 +1,11 @@
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
-from bemkit.contact.problem import ContactProblem, DenseBody
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.contact.solvability import find_unsolvable_load
 from tests.handmade import block_problem
 
@@ -66,3 +67,45 @@ def test_an_obstacle_that_is_nowhere():
 def test_no_load_is_no_trouble():
     problem = block_problem(Coulomb(0.5), press=0.0, push=0.0)
     assert find_unsolvable_load(problem) is None
+
+
+def memory_of_the_programme(n_contact):
+    """Return what the search for an unsolvable load allocates at most, in bytes, for a body on many nodes."""
+    x = np.linspace(-1.0, 1.0, n_contact)
+    zero, one = np.zeros(n_contact), np.ones(n_contact)
+    motions = np.stack([np.stack(pair, axis=1) for pair in ((one, zero), (zero, one), (x, zero))])
+    body = Sliding(np.full(n_contact, 1.0 / n_contact), motions, np.array([1.0, 0.1, 0.0]))
+    problem = ContactProblem(body, zero, Coulomb(0.2))
+    assert find_unsolvable_load(problem) is None  # loads the modules, and the friction is enough
+    slippery = ContactProblem(body, zero, Coulomb(0.05))
+    tracemalloc.start()
+    escape = find_unsolvable_load(slippery)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert escape.is_sliding
+    return peak
+
+
+class Sliding(LinearBody):
+    """A loaded rigid body."""
+
+    stiffness_scale = 1.0
+
+    def __init__(self, weights, motions, load):
+        self.weights, self.motions, self.load = weights, motions, load
+
+    def respond(self, conditions):
+        traction = np.broadcast_to([-1.0, -0.1], (self.n_contact, 2))
+        return ContactState(np.zeros((self.n_contact, 2)), traction)
+
+    def rigid_motions(self):
+        return self.motions
+
+    def rigid_load(self):
+        return self.load
+
+
+def test_the_linear_programme_takes_memory_in_proportion_to_the_nodes():
+    few, many = memory_of_the_programme(800), memory_of_the_programme(3200)
+    assert many < 6.0 * few  # four times the nodes; dense blocks would take sixteen times
+    assert many < 3200 * 4096  # bytes a node: about a hundred numbers for each of thirty arrays

@@ -1,0 +1,91 @@
+"""Drivers take their tolerances from what a body says its responses are exact to, and ask costly bodies little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bemkit.contact.laws import Coulomb, Tresca
+from bemkit.contact.problem import ContactProblem
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
+from bemkit.solvers.alm import AugmentedLagrangian
+from bemkit.solvers.base import Status, solve
+from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.homotopy import why_no_path
+from bemkit.solvers.newton import negligible
+from bemkit.solvers.progress import Progress
+from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.testing.lemke import LemkePivoting
+from tests.handmade import Inexact, block_body, block_problem, hard_problem
+
+DRIVERS = [SemismoothNewton(), AugmentedLagrangian(), FixedPoint()]
+
+
+def inexact_problem(law, accuracy=1e-10, error=1e-11, **options):
+    """Return the paper's first example on a body whose responses carry the given relative error."""
+    body = Inexact(block_body(), error, accuracy=accuracy, **options)
+    return ContactProblem(body, np.zeros(body.n_contact), law)
+
+
+@pytest.mark.parametrize("law", [Coulomb(0.5), Tresca(0.2)], ids=["coulomb", "tresca"])
+@pytest.mark.parametrize("driver", DRIVERS, ids=lambda driver: type(driver).__name__)
+def test_every_driver_ends_on_a_body_that_states_its_accuracy(driver, law):
+    problem = inexact_problem(law, is_costly=True)
+    exact = solve(block_problem(law), driver)
+    found = solve(problem, driver, tolerance=1e-8)
+    np.testing.assert_array_equal(found.node_status, exact.node_status)
+    assert found.steps <= exact.steps + 2
+    # errors of 1e-11 in displacements that are up to a hundred times those of single nodes
+    assert np.abs(found.state.traction - exact.state.traction).max() <= 1e-8 * np.abs(exact.state.traction).max()
+
+
+def test_a_body_that_claims_too_much_is_found_out():
+    """Without the accuracy that belongs to its errors the inner tolerance of 1e-11 is never reached."""
+    claimed = solve(inexact_problem(Coulomb(0.5), accuracy=1e-14), FixedPoint(), tolerance=1e-8, throw=False)
+    assert claimed.status is Status.INNER_FAILED
+    assert solve(inexact_problem(Coulomb(0.5)), FixedPoint(), tolerance=1e-8).is_converged
+
+
+@pytest.mark.parametrize("accuracy", [1e-14, 1e-10])
+def test_residuals_and_states_are_compared_by_the_accuracy(accuracy):
+    problem = inexact_problem(Coulomb(0.5), accuracy=accuracy, error=0.0)
+    assert negligible(problem.body) == pytest.approx(100.0 * accuracy)
+    state = problem.sticking_state
+    moved = replace(state, traction=(1.0 + 3.0 * accuracy) * state.traction)
+    assert Progress.begun(problem, state).after(problem, moved).ended is Status.STALLED
+    moved = replace(state, traction=(1.0 + 30.0 * accuracy) * state.traction)
+    assert Progress.begun(problem, state).after(problem, moved).ended is None
+
+
+def test_the_path_of_solutions_is_left_out_where_responses_are_costly():
+    problem = hard_problem(16)
+    assert any("path of" in record.message for record in solve(problem, SemismoothNewton()).history)
+    costly = replace(problem, body=Inexact(problem.body, is_costly=True))
+    found = solve(costly, SemismoothNewton(), throw=False)
+    assert found.status is Status.STALLED
+    assert "because responses of this body are costly" in found.message
+    assert why_no_path(costly) == "the path of solutions is not followed, because responses of this body are costly"
+    silent = solve(costly, SemismoothNewton(follows_path=False), throw=False)
+    assert "costly" not in silent.message  # nobody asked for it
+
+
+def test_lemkes_method_declines_before_it_asks():
+    problem = inexact_problem(Coulomb(0.5), is_costly=True)
+    found = solve(problem, LemkePivoting(), throw=False)
+    assert found.status is Status.TOO_COSTLY
+    assert found.message.startswith("This driver asks for several responses for each contact node")
+    assert problem.body.n_responses < problem.n_contact  # the loop's own and the certificates', but no 2 n probes
+
+
+def test_an_open_node_with_given_friction_turns_round_by_way_of_stick():
+    problem = block_problem(Tresca(0.2))
+    conditions = ProjectionEquations(problem, 1.0, 1.0)
+    state = problem.sticking_state
+    n_contact = problem.n_contact
+    lifted = replace(state, displacement=np.tile([-9.0, 9.0], (n_contact, 1)))
+    residual = conditions.evaluate(lifted)
+    assert not residual.sets.is_closed.any()
+    assert (residual.sets.direction == 1).all()
+    back = ActiveSets(residual.sets.is_closed, np.full(n_contact, -1))
+    assert not conditions.through_stick(residual, back).direction.any()
+    assert (conditions.through_stick(residual, residual.sets).direction == 1).all()
