@@ -18,8 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.validity.magnitude import LARGEST, SMALLEST
 from bemkit.operators.steklov_poincare import TractionField
-from bemkit.operators.steklov_poincare.nodal_conditions import Support
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
+from bemkit.operators.steklov_poincare.nodal_conditions import Support, integrate_traction
 from bemkit.scene.scene import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Scene, Traction
 
 

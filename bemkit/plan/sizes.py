@@ -15,8 +15,7 @@ from bemkit.model.boundary_data import find_units, nodal_forces, supports_on
 from bemkit.model.contact_data import find_contact
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.rigid_modes import possible_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, supported
-from bemkit.operators.steklov_poincare.prescribed import GivenData
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.plan.decisions import Decisions, Formulation
 from bemkit.scene.scene import Scene
 

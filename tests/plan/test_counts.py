@@ -117,7 +117,7 @@ LEFT_OUT = {
         "operators.integrals.curved_panels.fit",
     ),
     "linear": (
-        "operators.collocation.assembly.fill_columns",
+        "operators.collocation.assembly.sweep_rows",
         "operators.linear.dense.DenseLU.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_panels.fit",

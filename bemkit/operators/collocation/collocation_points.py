@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -124,7 +125,7 @@ class _Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Midpoints:
+class CollocationPoints:
     """Evaluates all pairs of midpoints and elements: far formulas first, then the close pairs exactly.
 
     Parameters
@@ -168,6 +169,13 @@ class Midpoints:
                 exact = _listed(self.panels, *close, has_single, has_slopes)
                 exact.combine(result, (row, close[1]), self.panels, self.material, self.r0)
         return result
+
+
+def constant_runs(*labels: BoolArray) -> list[slice]:
+    """Cut all elements into the longest ranges on which no label (n_elements,) changes."""
+    changes = 1 + np.flatnonzero(np.any([label[1:] != label[:-1] for label in labels], axis=0))
+    edges = [0, *changes.tolist(), labels[0].size]
+    return [slice(first, last) for first, last in itertools.pairwise(edges)]
 
 
 def _straight_far(

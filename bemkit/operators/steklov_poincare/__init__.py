@@ -12,6 +12,6 @@ diameter of the mesh, fixes its constant; without a resultant it vanishes at inf
 from bemkit.operators.steklov_poincare.collocation import CollocationMap as CollocationMap
 from bemkit.operators.steklov_poincare.galerkin import GalerkinFactors as GalerkinFactors
 from bemkit.operators.steklov_poincare.galerkin import GalerkinMap as GalerkinMap
+from bemkit.operators.steklov_poincare.nodal_conditions import TractionField as TractionField
 from bemkit.operators.steklov_poincare.protocol import CondensedMap as CondensedMap
 from bemkit.operators.steklov_poincare.protocol import SteklovPoincare as SteklovPoincare
-from bemkit.operators.steklov_poincare.protocol import TractionField as TractionField

@@ -10,10 +10,9 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.mixed_system import ColumnExchange
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
+from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, TractionField, integrate_traction
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
 class CollocationMap:
@@ -49,7 +48,7 @@ class CollocationMap:
         frame = np.broadcast_to(np.eye(2), (n, 2, 2))
         everything_open = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
         name = "the single layer operator"
-        exchange = ColumnExchange(self.mesh, self.material, everything_open, name, np.zeros((n, 2)), slopes=self.slopes)
+        exchange = MixedSystem(self.mesh, self.material, everything_open, name, np.zeros((n, 2)), slopes=self.slopes)
         matrix = exchange.condensed().stiffness
         read_only(matrix)
         return matrix
@@ -68,7 +67,7 @@ class CollocationMap:
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """
         name = "the body held by its supports and its contact boundary"
-        return ColumnExchange(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
+        return MixedSystem(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 2) tractions."""

@@ -12,8 +12,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.layer_operators import Layers
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

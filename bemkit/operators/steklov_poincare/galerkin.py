@@ -24,9 +24,8 @@ from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, TractionField, integrate_traction
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
