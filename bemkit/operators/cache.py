@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.atomic_files import check_room, check_target, replacing
@@ -28,7 +29,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.hdf5 import USER_BLOCK, Reader, ResultFileError, opened, seal, write_attributes
-from bemkit.operators.boundary import DoubleLayer, Hypersingular, Mass, SingleLayer
+from bemkit.operators.boundary import Mass, PairOperator
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
@@ -43,7 +44,7 @@ _OVERHEAD = 65536
 """More than what a file holds besides its arrays."""
 _CURVE_SAMPLES = 17
 
-CachedOperator: TypeAlias = SingleLayer | DoubleLayer | Hypersingular | Mass | GalerkinMap
+CachedOperator: TypeAlias = PairOperator | Mass | GalerkinMap
 
 _logger = logging.getLogger(__name__)
 
@@ -247,8 +248,9 @@ def _computed(operator: CachedOperator) -> dict[str, FloatArray]:
     if isinstance(operator, GalerkinMap):
         factors = operator.factors
         lower = factors.single_layer.lower
-        return {"matrix": factors.matrix, "single_layer_lower": lower, "strained": factors.strained}
-    return {"matrix": operator.matrix()}
+        return {"matrix": factors.matrix, "single_layer_lower": lower, "strained": factors.whitened_trace}
+    matrix = operator.matrix()
+    return {"matrix": matrix.toarray() if isinstance(operator, Mass) else matrix}
 
 
 def _restore(operator: CachedOperator, arrays: Mapping[str, FloatArray]) -> None:
@@ -258,4 +260,4 @@ def _restore(operator: CachedOperator, arrays: Mapping[str, FloatArray]) -> None
         factor = Cholesky.from_lower(arrays["single_layer_lower"])
         operator.keep(GalerkinFactors(matrix, factor, arrays["strained"]))
     else:
-        operator.keep(matrix)
+        operator.keep(csr_array(matrix) if isinstance(operator, Mass) else matrix)

@@ -137,14 +137,15 @@ class MixedSystem:
         known = np.zeros((2, n))
 
         def store(rows: slice, block: Coefficients) -> None:
-            on, on_conjugate = (x[:, loaded_elements] for x in (block.on_traction, block.on_conjugate_traction))
-            single = np.empty((2, len(on), 2 * loaded_elements.size))
+            n_chunk = rows.stop - rows.start
+            single = np.empty((2, n_chunk, 2 * loaded_elements.size))
+            on, on_conjugate = block.on_traction[:, loaded_elements], block.on_conjugate_traction[:, loaded_elements]
             _write(on, on_conjugate, frame[loaded_elements], single)
             known[:, rows] += _product(single[:, :, number[loaded]], traction)
             if not needs_double:
                 return
-            block.on_displacement[np.arange(len(on)), np.arange(rows.start, rows.stop)] += 0.5
-            double = np.empty((2, len(on), n_rows)) if matrix is None else matrix[:, rows]
+            block.on_displacement[np.arange(n_chunk), np.arange(rows.start, rows.stop)] += 0.5
+            double = np.empty((2, n_chunk, n_rows)) if matrix is None else matrix[:, rows]
             _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
             known[:, rows] -= _product(double[:, :, moved], displacement)
             if right is not None:
@@ -153,8 +154,14 @@ class MixedSystem:
 
         needs_double, needs_single = matrix is not None or moved.size > 0, np.zeros(n, bool)
         needs_single[loaded_elements] = True
-        needs = {"needs_single": needs_single, "needs_double": needs_double}
-        n_pairs = sweep_rows(self._mesh, self._material, store, **needs, takes_slopes=self._slopes)
+        n_pairs = sweep_rows(
+            self._mesh,
+            self._material,
+            store,
+            needs_single=needs_single,
+            needs_double=needs_double,
+            takes_slopes=self._slopes,
+        )
         of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
         return known.ravel(), Work(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
