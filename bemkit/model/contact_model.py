@@ -26,7 +26,7 @@ from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.operators.counts import Work
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import without_motion
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import supported
 from bemkit.plan import Decisions, Formulation, Plan, make_plan
 from bemkit.scene.scene import Part, PrescribedDisplacement, Pressure, Scene, Traction
@@ -240,9 +240,9 @@ def physical_fields(
 def elastic_map(decisions: Decisions, mesh: BoundaryMesh, material: Material) -> SteklovPoincare:
     """Return the map from displacements to forces that was chosen for a scene."""
     if decisions.formulation is Formulation.COLLOCATION:
-        return CollocationMap(mesh, material, slopes=decisions.takes_slopes)
+        return CollocationElasticity(mesh, material, slopes=decisions.takes_slopes)
     displacements, tractions = decisions.displacement_space(mesh), decisions.traction_space(mesh)
-    return GalerkinMap(mesh, material, displacements, tractions, decisions.linear_solver)
+    return GalerkinElasticity(mesh, material, displacements, tractions, decisions.linear_solver)
 
 
 def check_same_body(scene: Scene, other: Scene) -> None:

@@ -16,7 +16,7 @@ from bemkit.model.contact_model import Model
 from bemkit.model.elastic_model import ElasticModel
 from bemkit.operators.equilibrium import round_off_of
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare import GalerkinMap
+from bemkit.operators.steklov_poincare import GalerkinElasticity
 from bemkit.solvers.base import ContactSolution, Status
 
 _ROUND_OFF = 1e-10
@@ -48,7 +48,7 @@ def with_energy_checked(model: Model | ElasticModel, result: ContactSolution) ->
         condensed = model.body.condensed
         displacement, force = model.body.recover(result.state)
         # by Galerkin's method no direction is negative but for round-off, which the work of the solution tells
-        is_galerkin = isinstance(model.elastic, GalerkinMap)
+        is_galerkin = isinstance(model.elastic, GalerkinElasticity)
         if not is_galerkin and is_indefinite(model.body.dense.stiffness, condensed.sensitivity):
             return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.elastic.displacement_space

@@ -32,7 +32,8 @@ from bemkit.hdf5 import USER_BLOCK, Reader, ResultFileError, opened, seal, write
 from bemkit.operators.boundary import Mass, PairOperator
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
+from bemkit.operators.steklov_poincare import GalerkinFactors
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
 
 FORMAT = "bemkit-operator"
 SCHEMA_VERSION = 1

@@ -13,7 +13,8 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 
 MAPS = [GalerkinMap, CollocationMap]

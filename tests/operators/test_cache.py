@@ -20,7 +20,7 @@ from bemkit.operators import cache
 from bemkit.operators.boundary import Mass, double_layer, hypersingular, mass, single_layer
 from bemkit.operators.cache import CachedOperator, DamagedCacheError, MissingCacheError, StaleCacheError
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.steklov_poincare import GalerkinMap
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
 
 MATERIAL = Material(2.0, 0.3)
 

@@ -15,7 +15,7 @@ from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare import CollocationMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from tests.operators.test_curved import composite
 

@@ -23,7 +23,7 @@ from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, TractionField, integrate_traction
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
@@ -54,8 +54,8 @@ class GalerkinFactors:
     work: Work = field(default_factory=Work)
 
 
-class GalerkinMap:
-    """Symmetric Galerkin: S = W + (1/2 M + K)^T V^-1 (1/2 M + K), with tractions in exact equilibrium.
+class GalerkinElasticity:
+    """Elasticity of a body by symmetric Galerkin, S = W + B^T V^-1 B with B = 1/2 M + K.
 
     Parameters
     ----------
@@ -73,12 +73,12 @@ class GalerkinMap:
 
     Notes
     -----
-    Paper, eq. (28). V is inverted on the tractions that exert no resultant force and moment, which makes S
-    independent of the constant in the logarithm; S is symmetric, and positive definite on displacements without rigid
-    motions.
+    [Paper], eq. (28); [Steinbach2008]. V is inverted on the tractions that exert no resultant force and moment, so that
+    all tractions are in exact equilibrium and S is independent of the constant in the logarithm; S is symmetric, and
+    positive definite on displacements without rigid motions.
 
     At nu = 1/2 a uniform pressure on a loop causes no displacement, and only displacements that keep the volume are
-    possible: V is then inverted on tractions without such pressures, `matrix` is S without the pressure that keeps
+    possible: V is then inverted on tractions without such pressures, the matrix is S without the pressure that keeps
     the volume, and `condense` finds that pressure as one more unknown, as it does for compressible bodies.
     """
 
@@ -147,7 +147,10 @@ class GalerkinMap:
 
         Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
         """
-        fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
+        fluxes = [
+            integrate_traction(self.displacement_space, elements, lambda _, normals: normals).ravel()
+            for elements in self._pressed
+        ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, vanishing_dofs(self.displacement_space)] = 0.0
         # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
@@ -179,19 +182,6 @@ class GalerkinMap:
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
         self.__dict__["factors"] = factors  # where cached_property keeps its value
-
-    def matrix(self) -> FloatArray:
-        """Return the weak, symmetric matrix [Pa]; rigid motions are its kernel, and an exterior has none."""
-        if not self._volume.yields:
-            return self.factors.matrix
-        change = self._volume.change
-        matrix: FloatArray = self.factors.matrix + change @ change.T / self._volume.yields
-        read_only(matrix)
-        return matrix
-
-    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
-        """Return the consistent nodal forces of a traction field on some elements."""
-        return integrate_traction(self.displacement_space, elements, traction)
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not open by a Schur complement, with the linear solver of the map."""
