@@ -195,7 +195,7 @@ class Mass(BoundaryOperator):
 
 
 def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> SingleLayer:
-    """Return V, the single layer operator (paper, eq. 27).
+    """Return V, the single layer operator ([Paper], eq. 27).
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> DoubleLayer:
-    """Return K, the double layer operator (paper, eq. 27); the trial space must be continuous.
+    """Return K, the double layer operator ([Paper], eq. 27); the trial space must be continuous.
 
     On the boundary of a body (1/2 M + K) r = 0 for its rigid motions r, on that of an exterior (1/2 M + K) r = M r.
     """
@@ -225,12 +225,12 @@ def double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
 
 
 def adjoint_double_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) -> AdjointDoubleLayer:
-    """Return K' (paper, eq. 27), the transpose of `double_layer(test, trial, material)`."""
+    """Return K' ([Paper], eq. 27), the transpose of `double_layer(test, trial, material)`."""
     return AdjointDoubleLayer(double_layer(test, trial, material))
 
 
 def hypersingular(trial: BoundarySpace, test: BoundarySpace, material: Material) -> Hypersingular:
-    """Return W, the hypersingular operator (paper, eq. 27), integrated by parts; both spaces must be continuous."""
+    """Return W, the hypersingular operator ([Paper], eq. 27), integrated by parts; both spaces must be continuous."""
     return Hypersingular(HypersingularForm(trial, test, material))
 
 

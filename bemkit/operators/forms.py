@@ -7,8 +7,8 @@ the tangential derivative and k the Laplace double layer kernel, for continuous 
     <K u, q> = int int k q^T u + 1 / (4 pi (1 - nu)) int int q^T ((1 - 2 nu) J log|r| + J Q) du/ds
     <W u, v> = mu / (2 pi (1 - nu)) int int dv/ds^T (-log|r| I + Q) du/ds
 
-so that all of them are combinations of the scalar integrals of `integrals` [Steinbach2008]; K is that of Somigliana's
-identity after integration by parts [HanZou2005].
+so that all of them are combinations of the scalar integrals of `integrals`. The forms are those of [Steinbach2008] and
+[SauterSchwab2011], K and W integrated by parts after [Han1994].
 """
 
 from __future__ import annotations

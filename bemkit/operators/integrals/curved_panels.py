@@ -6,7 +6,8 @@ complex unless x lies on the curve) the distance factors,
 
     zeta - p(t) = (t0 - t) g(t),    g the divided difference of p, without zeros near [-1, 1],
 
-so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder.
+so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder: singularity swap
+quadrature [AfKlintebergBarnett2021], with remainders instead of swapped densities.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element."""
+"""Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element.
+
+Close and touching pairs are split towards their common points [SauterSchwab2011], with closed forms inside.
+"""
 
 from __future__ import annotations
 
