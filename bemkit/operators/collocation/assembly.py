@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.collocation_points import Coefficients, CollocationPoints, constant_runs
-from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
@@ -103,7 +103,7 @@ def sweep_rows(
     images = [(1.0, 1.0)] if mesh.symmetry is None else mesh.symmetry.images.tolist()
     panels = Panels(whole)
     points = CollocationPoints(panels, material, mesh.diameter)
-    slopes = Slopes.of(whole, panels) if takes_slopes and needs_double else None
+    slopes = GradientReconstruction.of(whole, panels) if takes_slopes and needs_double else None
     has_single = np.tile(needs_single, len(images))
     runs = [(run, bool(has_single[run.start])) for run in constant_runs(has_single, whole.is_straight)]
     runs = [(run, single) for run, single in runs if single or needs_double]

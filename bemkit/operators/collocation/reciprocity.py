@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -60,7 +60,7 @@ class Reciprocity:
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
         """
         panels = Panels(mesh.whole)
-        slopes = Slopes.of(mesh.whole, panels) if takes_slopes else None
+        slopes = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
