@@ -62,8 +62,8 @@ if TYPE_CHECKING:
     from bemkit.operators.somigliana.fields import InteriorFields as InteriorFields
     from bemkit.operators.somigliana.stress import principal_stresses as principal_stresses
     from bemkit.operators.somigliana.stress import von_mises as von_mises
-    from bemkit.operators.steklov_poincare import CollocationMap as CollocationMap
-    from bemkit.operators.steklov_poincare import GalerkinMap as GalerkinMap
+    from bemkit.operators.steklov_poincare.maps import CollocationMap as CollocationMap
+    from bemkit.operators.steklov_poincare.maps import GalerkinMap as GalerkinMap
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
     from bemkit.results.interior import interior_fields as interior_fields
@@ -167,7 +167,7 @@ _HOME = {
         "principal_stresses",
         "von_mises",
     ),
-    "operators.steklov_poincare": (
+    "operators.steklov_poincare.maps": (
         "CollocationMap",
         "GalerkinMap",
     ),

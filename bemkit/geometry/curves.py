@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -73,6 +73,8 @@ class Segment:
         Its two different end points.
     """
 
+    is_straight: ClassVar[bool] = True
+
     start: tuple[float, float]
     end: tuple[float, float]
 
@@ -83,11 +85,6 @@ class Segment:
             raise GeometryError(f"Segment: start and end are the same point {start}: give two different points")
         object.__setattr__(self, "start", start)
         object.__setattr__(self, "end", end)
-
-    @property
-    def is_straight(self) -> bool:
-        """True."""
-        return True
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve; both ends are met to the last digit."""
@@ -115,6 +112,8 @@ class Arc:
         Polar angles of the two ends; the arc is traversed anticlockwise if `end_angle` is the larger.
     """
 
+    is_straight: ClassVar[bool] = False
+
     centre: tuple[float, float]
     radius: float
     start_angle: float
@@ -129,11 +128,6 @@ class Arc:
                 f"Arc: from start_angle={self.start_angle} to end_angle={self.end_angle} is not an arc: "
                 "give angles in radians that differ by more than 0 and at most 2 pi"
             )
-
-    @property
-    def is_straight(self) -> bool:
-        """False."""
-        return False
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve; s is proportional to the angle."""
@@ -173,6 +167,8 @@ class ParametricCurve:
     The curve itself takes the arc length, as a fraction of its total, for its parameter s: p(s) is found to round-off.
     """
 
+    is_straight: ClassVar[bool] = False  # whatever it is
+
     function: Callable[[FloatArray], FloatArray]
     derivative_function: Callable[[FloatArray], FloatArray]
 
@@ -199,11 +195,6 @@ class ParametricCurve:
                 "give the derivative of function with respect to s"
             )
 
-    @property
-    def is_straight(self) -> bool:
-        """False: a parametric curve is always treated as curved."""
-        return False
-
     @cached_property
     def _arc_length(self) -> ArcLength:
         return ArcLength(self._velocity)
@@ -227,11 +218,14 @@ class ParametricCurve:
 
 @dataclass(frozen=True, eq=False)
 class MovedCurve:
-    """The curve (x - shift) * factor, from start to end or, if reversed, from end to start."""
+    """The curve (x - shift) * factor, from start to end or, if reversed, from end to start.
+
+    Components may have factors of their own as long as these differ by a sign alone, which reflects the curve.
+    """
 
     curve: Curve
     shift: tuple[float, float] = (0.0, 0.0)
-    factor: float = 1.0
+    factor: float | tuple[float, float] = 1.0
     is_reversed: bool = False
 
     @property
@@ -241,12 +235,13 @@ class MovedCurve:
 
     def point(self, s: FloatArray) -> FloatArray:
         """Evaluate the curve."""
-        points: FloatArray = (self.curve.point(self._parameter(s)) - np.array(self.shift)) * self.factor
+        points: FloatArray = (self.curve.point(self._parameter(s)) - np.array(self.shift)) * np.array(self.factor)
         return points
 
     def derivative(self, s: FloatArray) -> FloatArray:
         """Differentiate the curve with respect to s."""
-        return (-self.factor if self.is_reversed else self.factor) * self.curve.derivative(self._parameter(s))
+        derivative: FloatArray = self.curve.derivative(self._parameter(s)) * np.array(self.factor)
+        return -derivative if self.is_reversed else derivative
 
     def _parameter(self, s: FloatArray) -> FloatArray:
         return 1.0 - s if self.is_reversed else s

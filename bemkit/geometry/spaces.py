@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
 
 
 class BoundarySpace(Protocol):
@@ -95,8 +96,6 @@ def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
     -------
     (n_scalar,) array [m]
     """
-    from bemkit.geometry.quadrature import gauss_legendre
-
     xi, weights = gauss_legendre(space.degree + 2 if bool(space.mesh.is_straight[elements].all()) else 16)
     local = (space.mesh.jacobian(elements, xi) * weights) @ space.basis(xi).T
     result = np.zeros(space.n_dofs // 2)
@@ -104,21 +103,21 @@ def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
     return result
 
 
+def _fixed(*nodes: float) -> FloatArray:
+    array = np.array(nodes)
+    read_only(array)
+    return array
+
+
 @dataclass(frozen=True, eq=False)
 class ConstantSpace:
     """Piecewise constant functions: one scalar dof per element, at its midpoint."""
 
+    degree: ClassVar[int] = 0
+    is_continuous: ClassVar[bool] = False
+    local_nodes: ClassVar[FloatArray] = _fixed(0.0)
+
     mesh: BoundaryMesh
-
-    @property
-    def degree(self) -> int:
-        """Polynomial degree 0."""
-        return 0
-
-    @property
-    def is_continuous(self) -> bool:
-        """Constants jump from element to element."""
-        return False
 
     @property
     def n_dofs(self) -> int:
@@ -129,11 +128,6 @@ class ConstantSpace:
     def element_dofs(self) -> IntArray:
         """(n_elements, 1) array of scalar dofs."""
         return np.arange(self.mesh.n_elements)[:, None]
-
-    @cached_property
-    def local_nodes(self) -> FloatArray:
-        """The midpoint."""
-        return np.zeros(1)
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the constant 1."""
@@ -244,15 +238,8 @@ class LinearSpace(_NodalSpace):
         If `broken` does not have one flag for each node.
     """
 
-    @property
-    def degree(self) -> int:
-        """Polynomial degree 1."""
-        return 1
-
-    @cached_property
-    def local_nodes(self) -> FloatArray:
-        """The two end points."""
-        return np.array([-1.0, 1.0])
+    degree: ClassVar[int] = 1
+    local_nodes: ClassVar[FloatArray] = _fixed(-1.0, 1.0)
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the two hat functions."""
@@ -275,10 +262,8 @@ class QuadraticSpace(_NodalSpace):
         If `broken` does not have one flag for each node.
     """
 
-    @property
-    def degree(self) -> int:
-        """Polynomial degree 2."""
-        return 2
+    degree: ClassVar[int] = 2
+    local_nodes: ClassVar[FloatArray] = _fixed(-1.0, 0.0, 1.0)
 
     @cached_property
     def element_dofs(self) -> IntArray:
@@ -286,11 +271,6 @@ class QuadraticSpace(_NodalSpace):
         ends = self._end_dofs
         middle = int(ends.max()) + 1 + np.arange(self.mesh.n_elements)
         return np.column_stack([ends[:, 0], middle, ends[:, 1]])
-
-    @cached_property
-    def local_nodes(self) -> FloatArray:
-        """The end points and the midpoint."""
-        return np.array([-1.0, 0.0, 1.0])
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the three Lagrange polynomials."""

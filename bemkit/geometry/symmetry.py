@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.curves import Curve
+from bemkit.geometry.curves import Curve, MovedCurve
 from bemkit.geometry.elements import Elements
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.validity.chords import RESOLUTION
@@ -115,9 +115,8 @@ class Symmetry:
         return Symmetry(*moved)
 
 
-@dataclass(frozen=True, eq=False)
-class ReflectedCurve:
-    """The image of a curve; a single reflection is traversed from the end of the curve to its start.
+def reflected_curve(curve: Curve, symmetry: Symmetry, image: FloatArray) -> MovedCurve:
+    """Return the image of a curve; a single reflection is traversed from the end of the curve to its start.
 
     Parameters
     ----------
@@ -126,26 +125,11 @@ class ReflectedCurve:
     image : (2,) array
         A row of `Symmetry.images`.
     """
-
-    curve: Curve
-    symmetry: Symmetry
-    image: FloatArray
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether the original is straight."""
-        return self.curve.is_straight
-
-    def point(self, s: FloatArray) -> FloatArray:
-        """Evaluate the curve."""
-        return self.symmetry.reflected(self.curve.point(self._parameter(s)), self.image)
-
-    def derivative(self, s: FloatArray) -> FloatArray:
-        """Differentiate the curve with respect to s."""
-        return self.image * np.prod(self.image) * self.curve.derivative(self._parameter(s))
-
-    def _parameter(self, s: FloatArray) -> FloatArray:
-        return 1.0 - s if is_reversing(self.image) else s
+    x, y = (
+        2.0 * place if sign < 0.0 and place is not None else 0.0
+        for place, sign in zip((symmetry.x, symmetry.y), image, strict=True)
+    )
+    return MovedCurve(curve, (x, y), (float(image[0]), float(image[1])), is_reversed=is_reversing(image))
 
 
 def is_reversing(image: FloatArray) -> bool:
@@ -192,7 +176,7 @@ def unfold(symmetry: Symmetry, half: Elements) -> Elements:
     curve, span = half.element_curve, half.element_span
     if curve is None or span is None:
         return Elements(nodes, np.concatenate(elements), parts, (), None, None)
-    curves = [ReflectedCurve(curve, symmetry, image) for image in images[1:] for curve in half.curves]
+    curves = [reflected_curve(curve, symmetry, image) for image in images[1:] for curve in half.curves]
     spans = [1.0 - span[:, ::-1] if is_reversing(image) else span for image in images]
     indices = [np.where(curve < 0, -1, curve + g * n_curves) for g in range(len(images))]
     return Elements(

@@ -26,8 +26,7 @@ from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import Automatic, Choice, DenseCholesky, Krylov
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
 from bemkit.scene.symmetry import check_symmetry

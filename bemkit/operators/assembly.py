@@ -1,6 +1,6 @@
-"""Assembly of dense operators: one sweep over the element pairs serves all matrices that are wanted.
+"""Assembly of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
 
-An operator is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local
+A form is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local
 coordinates, weighted by the monomial coefficients of the local test and trial functions. Its columns are gathered
 first, in a buffer of a few rows of elements, so that the large matrix is written once.
 
@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, consecutive_runs
+from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.reflection import element_images, vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace
@@ -25,6 +25,7 @@ from bemkit.operators import kernels
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
+from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
@@ -64,8 +65,8 @@ class TrialTerm:
     tensor: Callable[[Block, int, int], Tensor]
 
 
-class Assemblable(Protocol):
-    """What assembly needs to know of an operator."""
+class PairForm(Protocol):
+    """A bilinear form on two boundary spaces, made of integrals over pairs of elements."""
 
     @property
     def trial(self) -> BoundarySpace:
@@ -74,6 +75,14 @@ class Assemblable(Protocol):
     @property
     def test(self) -> BoundarySpace:
         """The space the result is tested with."""
+
+    @property
+    def material(self) -> Material:
+        """The material of the body."""
+
+    @property
+    def tags(self) -> frozenset[Any]:
+        """What is promised of its matrix; see `bemkit.operators.forms.Tag`."""
 
     @property
     def degrees(self) -> Degrees:
@@ -88,8 +97,8 @@ class Assemblable(Protocol):
 
 
 @assembling()
-def assemble_together(operators: Sequence[Assemblable]) -> tuple[list[FloatArray], int]:
-    """Sweep over all element pairs once for all operators.
+def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]:
+    """Sweep over all element pairs once for all forms.
 
     Returns
     -------
@@ -100,23 +109,52 @@ def assemble_together(operators: Sequence[Assemblable]) -> tuple[list[FloatArray
     Raises
     ------
     GeometryError
-        If the operators live on different meshes.
+        If the forms live on different meshes.
     """
-    mesh = operators[0].test.mesh
-    if any(operator.test.mesh is not mesh for operator in operators):
+    mesh = forms[0].test.mesh
+    if any(form.test.mesh is not mesh for form in forms):
         msg = "the operators live on different meshes: assemble those of one mesh at a time"
         raise GeometryError(msg)
+    everything = np.arange(mesh.n_elements)
+    targets, n_pairs = _filled(forms, everything, everything)
+    return [target.dofs_matrix() for target in targets], n_pairs
+
+
+@assembling()
+def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatArray:
+    """Return some rows and columns (vector dofs) of the matrix of a form, from the elements that they belong to."""
+    if not (rows.size and columns.size):
+        return np.zeros((rows.size, columns.size))
+    elements = [
+        np.flatnonzero(np.isin(space.element_dofs, dofs // 2).any(axis=1))
+        for space, dofs in ((form.test, rows), (form.trial, columns))
+    ]
+    ((target,), _) = _filled([form], elements[0], elements[1])
+    places = (
+        2 * np.searchsorted(nodes, dofs // 2) + dofs % 2
+        for nodes, dofs in ((target.test_nodes, rows), (target.trial_nodes, columns))
+    )
+    block: FloatArray = target.dofs_matrix()[np.ix_(*places)]
+    return block
+
+
+def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: IntArray) -> tuple[list[_Target], int]:
+    """Sweep over the pairs of some elements; return the matrices of their dofs and the number of pairs."""
+    mesh = forms[0].test.mesh
     degrees = Degrees()
-    for operator in operators:
-        degrees |= operator.degrees
-    targets = [_Target(operator) for operator in operators]
-    sweep = PairSweep(mesh.whole, degrees, test_elements=np.arange(mesh.n_elements))
+    for form in forms:
+        degrees |= form.degrees
+    targets = [_Target(form, test_elements, trial_elements) for form in forms]
+    n_images = mesh.whole.n_elements // mesh.n_elements
+    trial = np.concatenate([image * mesh.n_elements + trial_elements for image in range(n_images)])
+    sweep = PairSweep(mesh.whole, degrees, test_elements, trial)
     half = 0.5 * mesh.whole.lengths
+    test_half, trial_half = half[test_elements], half[trial]
     log_scale = float(np.log(mesh.diameter))
     lock = Lock()
 
     def fill(rows: slice) -> int:
-        block = Block(sweep.chunk(rows), half[rows], half, log_scale)
+        block = Block(sweep.chunk(rows), test_half[rows], trial_half, log_scale)
         for target in targets:
             for a, gathered in target.gather(block):
                 with lock:  # two chunks share the rows of the node between them
@@ -124,40 +162,45 @@ def assemble_together(operators: Sequence[Assemblable]) -> tuple[list[FloatArray
         return block.test_half.size * block.trial_half.size
 
     n_pairs = for_each_chunk(fill, sweep.row_slices(), n_pairs=sweep.test.size * sweep.trial.size)
-    matrices = [target.matrix.reshape(target.test_dofs_total, -1) for target in targets]
-    for operator, matrix in zip(operators, matrices, strict=True):
-        clear_vanishing(matrix, operator.test, operator.trial)
-    return matrices, sum(n_pairs)
-
-
-def clear_vanishing(matrix: FloatArray, test: BoundarySpace, trial: BoundarySpace) -> None:
-    """Set the rows and columns to zero of dofs that are zero by symmetry."""
-    if test.mesh.symmetry is not None:
-        matrix[vanishing_dofs(test)] = 0.0
-        matrix[:, vanishing_dofs(trial)] = 0.0
+    return targets, sum(n_pairs)
 
 
 class _Target:
-    """A matrix being filled, indexed (test dof, component, trial dof, component)."""
+    """A matrix being filled, indexed (test node, component, trial node, component); nodes are scalar dofs.
 
-    def __init__(self, operator: Assemblable) -> None:
-        self.test_dofs = operator.test.element_dofs
-        self.test_dofs_total = operator.test.n_dofs
-        self.n_trial = operator.trial.n_dofs // 2
-        self.test_coefficients = operator.test_coefficients
-        self.terms = operator.trial_terms()
+    Only the nodes of some elements have a place in it: `test_nodes` and `trial_nodes`, in increasing order.
+    """
+
+    def __init__(self, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> None:
+        self._form = form
+        self.test_nodes, test_dofs = np.unique(form.test.element_dofs[test_elements], return_inverse=True)
+        self.trial_nodes = np.unique(form.trial.element_dofs[trial_elements])
+        self.test_dofs = test_dofs.reshape(test_elements.size, -1)
+        self.test_coefficients = form.test_coefficients
+        self.terms = form.trial_terms()
         self.images = [
-            (elements, signs.tolist(), [consecutive_runs(own) for own in dofs.T])
-            for elements, signs, dofs in element_images(operator.trial)
+            (
+                slice(image * trial_elements.size, (image + 1) * trial_elements.size),
+                signs.tolist(),
+                [consecutive_runs(own) for own in np.searchsorted(self.trial_nodes, dofs[trial_elements]).T],
+            )
+            for image, (_, signs, dofs) in enumerate(element_images(form.trial))
         ]
-        self.matrix = np.zeros((self.test_dofs_total // 2, 2, self.n_trial, 2))
+        self.matrix = np.zeros((self.test_nodes.size, 2, self.trial_nodes.size, 2))
+
+    def dofs_matrix(self) -> FloatArray:
+        """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
+        if self._form.test.mesh.symmetry is not None:
+            self.matrix[vanishing_dofs(self._form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
+            self.matrix[:, :, vanishing_dofs(self._form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
+        return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
     def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:
         """Return, for each power a on the test elements, the four components by element row and trial dof."""
         n_rows = block.test_half.shape[0]
         result = []
         for a in range(self.test_coefficients.shape[1]):
-            buffers = [np.zeros((n_rows, self.n_trial)) for _ in range(4)]
+            buffers = [np.zeros((n_rows, self.trial_nodes.size)) for _ in range(4)]
             for term in self.terms:
                 for b in np.flatnonzero(np.any(term.coefficients != 0.0, axis=0)).tolist():
                     for index, values in enumerate(term.tensor(block, a, b)):

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.atomic_files import check_target
@@ -28,10 +29,11 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table
-from bemkit.operators.boundary import DoubleLayer, Hypersingular, Mass, SingleLayer
+from bemkit.operators.boundary import Mass, PairOperator
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import GalerkinFactors, GalerkinMap
+from bemkit.operators.steklov_poincare import GalerkinFactors
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
 from bemkit.version import __version__
 
 FORMAT = "bemkit-operator"
@@ -42,7 +44,7 @@ FINGERPRINTS = ("operator", "geometry", "material", "spaces", "formulas")
 MARKER = b"bemkit operator cache\n"
 _CURVE_SAMPLES = 17
 
-CachedOperator: TypeAlias = SingleLayer | DoubleLayer | Hypersingular | Mass | GalerkinMap
+CachedOperator: TypeAlias = PairOperator | Mass | GalerkinMap
 
 _logger = logging.getLogger(__name__)
 
@@ -238,8 +240,9 @@ def _computed(operator: CachedOperator) -> dict[str, FloatArray]:
     if isinstance(operator, GalerkinMap):
         factors = operator.factors
         lower = factors.single_layer.lower
-        return {"matrix": factors.matrix, "single_layer_lower": lower, "strained": factors.strained}
-    return {"matrix": operator.matrix()}
+        return {"matrix": factors.matrix, "single_layer_lower": lower, "strained": factors.whitened_trace}
+    matrix = operator.matrix()
+    return {"matrix": matrix.toarray() if isinstance(operator, Mass) else matrix}
 
 
 def _restore(operator: CachedOperator, arrays: Mapping[str, FloatArray]) -> None:
@@ -249,4 +252,4 @@ def _restore(operator: CachedOperator, arrays: Mapping[str, FloatArray]) -> None
         factor = Cholesky.from_lower(arrays["single_layer_lower"])
         operator.keep(GalerkinFactors(matrix, factor, arrays["strained"]))
     else:
-        operator.keep(matrix)
+        operator.keep(csr_array(matrix) if isinstance(operator, Mass) else matrix)

@@ -14,7 +14,7 @@ from bemkit.operators.counts import Work
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
-from bemkit.operators.steklov_poincare.prescribed import GivenData
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData
 from bemkit.plan.items import Sizes, find_sizes, plan_items
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene

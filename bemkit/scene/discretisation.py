@@ -13,7 +13,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 
 _LONGEST = 0.75
@@ -94,7 +94,7 @@ class Galerkin(Discretisation, Protocol):
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the Galerkin map of the two spaces."""
         displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
-        return GalerkinMap(mesh, material, displacements, tractions, linear_solver)
+        return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what the Galerkin map takes."""
@@ -171,7 +171,7 @@ class ConstantCollocation(Discretisation):
 
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the collocation map, which has a linear solver of its own."""
-        return CollocationMap(mesh, material, slopes=self.slopes)
+        return CollocationElasticity(mesh, material, slopes=self.slopes)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what collocation takes, and warn of bodies that are thin for their elements."""

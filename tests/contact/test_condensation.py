@@ -17,7 +17,8 @@ from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, 
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationMap, CondensedMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton

@@ -11,7 +11,8 @@ from bemkit.geometry import BoundaryMesh
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 
 
 def quadratic_map(mesh: BoundaryMesh, material: Material) -> GalerkinMap:

@@ -11,7 +11,8 @@ from bemkit.geometry import BoundaryMesh, Disk, discretise
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.boundary import assemble, double_layer, hypersingular, single_layer
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 
 RADIUS = 1.3
 MATERIAL = Material(2.0, 0.3)

@@ -36,7 +36,7 @@ def residuals(mesh: BoundaryMesh, make_space: Callable[[BoundaryMesh], BoundaryS
         hypersingular(space, space, material),
     ]
     assemble(*operators)
-    identity = mass(space, space).matrix()
+    identity = mass(space, space).matrix().toarray()
     single, double, hyper = (np.linalg.solve(identity, operator.matrix()) for operator in operators)
     adjoint = np.linalg.solve(identity, operators[1].matrix().T)
     x, y = dof_points(space).T

@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, discretise
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from tests.convergence.fields import distance, forces, neumann, observed_order, quadratic_map
 
 RADIUS = 0.7

@@ -12,7 +12,7 @@ from bemkit.contact.obstacle import Circle
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry import Disk, ExteriorOf, discretise
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
 

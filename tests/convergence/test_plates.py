@@ -9,7 +9,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import PlateWithHole, Rectangle, discretise
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from tests.convergence.fields import distance, forces, neumann, observed_order, quadratic_map
 
 GRADIENT = np.array([[0.3, 0.7], [-0.2, 0.5]])

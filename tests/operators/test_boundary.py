@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse.linalg import gmres
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, GeometryError
 from bemkit.operators.boundary import PairOperator
+from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.linear.dense import Cholesky, DenseLU, SingularMatrixError, multiply
 
 MATERIAL = bk.Material(2.0, 0.25)
@@ -81,17 +83,68 @@ def test_results_do_not_depend_on_numbering(seed: int) -> None:
         np.testing.assert_allclose(two.matrix(), matrix[np.ix_(r, c)], rtol=0.0, atol=1e-14 * np.abs(matrix).max())
 
 
-def test_linear_operator_applies_the_matrix() -> None:
+def test_operators_are_combined_and_solved_with_as_linear_operators_of_scipy() -> None:
+    mesh = l_shape()
+    v, k, _ = operators(mesh)
+    m = bk.mass(k.trial, k.test)
+    u = np.random.default_rng(3).normal(size=k.trial.n_dofs)
+    right = (0.5 * m + k) @ u
+    np.testing.assert_allclose(right, 0.5 * (m.matrix() @ u) + k.matrix() @ u, rtol=1e-14, atol=1e-14)
+    tractions, flag = gmres(v, right, rtol=1e-12)
+    assert flag == 0
+    np.testing.assert_allclose(v.matrix() @ tractions, right, rtol=0.0, atol=1e-11 * np.abs(right).max())
+
+
+@pytest.mark.parametrize("symmetry", [None, bk.Symmetry(x=0.0)], ids=["whole", "half"])
+@pytest.mark.parametrize("make", [bk.LinearSpace, bk.QuadraticSpace])
+def test_blocks_are_computed_alone_and_equal_those_of_the_matrix(make: type, symmetry: bk.Symmetry | None) -> None:
+    outline = bk.PlateWithHole(4.0, 2.0, 0.5, (-2.0, -1.0)).outline()
+    mesh = bk.discretise(outline, n_elements=64, symmetry=symmetry)
+    u, t = make(mesh), bk.LinearSpace(mesh, bk.corner_nodes(mesh))
+    rng = np.random.default_rng(1)
+    for operator in (
+        bk.single_layer(t, t, MATERIAL),
+        bk.double_layer(u, t, MATERIAL),
+        bk.double_layer(u, t, MATERIAL).T,
+        bk.hypersingular(u, u, MATERIAL),
+        bk.mass(u, t),
+    ):
+        rows, columns = (rng.choice(n, 7, replace=False) for n in operator.shape)
+        block = operator.block(rows, columns)
+        matrix = operator.block(*(np.arange(n) for n in operator.shape))
+        # sums of the same few terms, with another number of Gauss points for far pairs
+        np.testing.assert_allclose(block, matrix[np.ix_(rows, columns)], rtol=0.0, atol=2e-15 * np.abs(matrix).max())
+        assert operator.block(rows, columns[:0]).shape == (7, 0)
+
+
+def test_a_block_of_a_large_operator_computes_few_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    v, _, _ = operators(l_shape(600))
+    sizes = []
+    sweep = PairSweep.__init__
+    monkeypatch.setattr(
+        PairSweep, "__init__", lambda self, *a: (sweep(self, *a), sizes.append(self.test.size * self.trial.size))[0]
+    )
+    block = v.block(np.arange(10), np.arange(600, 640))
+    assert sizes == [5 * 20]
+    assert not v.is_assembled
+    # the same far pairs with two Gauss points or three
+    np.testing.assert_allclose(block, v.matrix()[:10, 600:640], rtol=1e-14)
+
+
+@pytest.mark.parametrize("rows", [[-1], [72], [0.5], [[0]], [True]])
+def test_blocks_that_do_not_exist_are_refused(rows: list[object]) -> None:
     v, _, _ = operators(l_shape())
-    x = np.random.default_rng(3).normal(size=v.trial.n_dofs)
-    np.testing.assert_array_equal(v.as_linear_operator() @ x, v.matrix() @ x)
+    with pytest.raises(bk.InputError, match=r"block: rows is .*: give a list of whole numbers from 0 to 71"):
+        v.block(np.array(rows), np.arange(2))
 
 
 def test_mass_integrates_products() -> None:
     mesh = l_shape()
     space = bk.QuadraticSpace(mesh)
     total = np.ones(space.n_dofs // 2)
-    matrix = bk.mass(space, space).matrix()[::2, ::2]
+    matrix = bk.mass(space, space).matrix()
+    assert matrix.nnz == 2 * 9 * 36 - 2 * 36  # each element couples its three nodes, neighbours share one
+    matrix = matrix.toarray()[::2, ::2]
     assert total @ matrix @ total == pytest.approx(8.0, rel=1e-14)  # the length of the boundary
     np.testing.assert_array_equal(matrix, matrix.T)
 

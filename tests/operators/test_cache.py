@@ -17,10 +17,10 @@ from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
 from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.hdf5 import seal
 from bemkit.operators import cache
-from bemkit.operators.boundary import double_layer, hypersingular, mass, single_layer
+from bemkit.operators.boundary import Mass, double_layer, hypersingular, mass, single_layer
 from bemkit.operators.cache import CachedOperator, DamagedCacheError, MissingCacheError, StaleCacheError
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.steklov_poincare import GalerkinMap
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
 
 MATERIAL = Material(2.0, 0.3)
 
@@ -47,8 +47,13 @@ def test_what_is_read_is_what_was_written(make: Callable[[], CachedOperator], tm
     written, fresh = make(), make()
     cache.save(tmp_path / "operator.h5", written)
     cache.load(tmp_path / "operator.h5", fresh)
-    np.testing.assert_array_equal(fresh.matrix(), written.matrix())
-    assert not fresh.matrix().flags.writeable
+    one, other = fresh.matrix(), written.matrix()
+    if isinstance(fresh, Mass):
+        np.testing.assert_array_equal(one.toarray(), other.toarray())
+        one = one.data
+    else:
+        np.testing.assert_array_equal(one, other)
+    assert not one.flags.writeable
 
 
 def test_a_map_from_a_file_computes_nothing_and_gives_the_same_tractions(
@@ -59,7 +64,7 @@ def test_a_map_from_a_file_computes_nothing_and_gives_the_same_tractions(
     expected = written.tractions(u)
     cache.save(tmp_path / "map.h5", written)
     monkeypatch.setattr(
-        "bemkit.operators.steklov_poincare.layer_operators.assemble", lambda *_: pytest.fail("assembled again")
+        "bemkit.operators.steklov_poincare.layer_operators.assemble_together", lambda *_: pytest.fail("assembled again")
     )
     cache.load(tmp_path / "map.h5", fresh)
     # the same numbers, multiplied in another order

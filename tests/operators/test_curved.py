@@ -35,7 +35,7 @@ from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))
 

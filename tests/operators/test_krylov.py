@@ -30,8 +30,8 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.multigrid import Multigrid
 from bemkit.operators.linear.solvers import DenseCholesky, Krylov, LinearSolver
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import GalerkinMap
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
 from bemkit.operators.steklov_poincare.nodal_conditions import Support, supported
 
 L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))

@@ -30,7 +30,7 @@ from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.operators.somigliana.locate import PointNotInsideError
 from bemkit.operators.somigliana.moments import local_moments, straight_gradient_moments
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.results.interior import interior_fields
 
 Field = Callable[[FloatArray], FloatArray]

@@ -8,11 +8,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry import Algebraic, BoundaryMesh, Geometric, Polygon, Rectangle, Shape, Uniform, discretise
+from bemkit.errors import InputError
+from bemkit.geometry import (
+    Algebraic,
+    BoundaryMesh,
+    ExteriorOf,
+    Geometric,
+    Polygon,
+    Rectangle,
+    Shape,
+    Uniform,
+    discretise,
+)
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
+from bemkit.operators.linear.solvers import Automatic
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap, SteklovPoincare
+from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.testing import check_operator
 
 MATERIAL = Material(1.0, 0.3)
 L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
@@ -209,3 +223,16 @@ def test_symbols_on_inscribed_polygons_converge(kind: type, order: float, ceilin
     assert errors[-1].max() < ceiling
     assert observed.min() > order - 0.25
     assert observed.max() < order + 0.25
+
+
+@pytest.mark.parametrize("exterior", [False, True], ids=["inside", "outside"])
+@pytest.mark.parametrize("make", [GalerkinMap, CollocationMap])
+def test_maps_are_linear_operators_with_the_tags_they_claim(make: type, exterior: bool) -> None:
+    shape = Rectangle(2.0, 1.0)
+    check_operator(make(discretise((ExteriorOf(shape) if exterior else shape).outline(), n_elements=24), MATERIAL))
+
+
+def test_a_map_does_not_choose_a_linear_solver() -> None:
+    mesh = discretise(Rectangle(2.0, 1.0).outline(), n_elements=8)
+    with pytest.raises(InputError, match=r"linear_solver is Automatic\(\): a map does not choose"):
+        GalerkinMap(mesh, MATERIAL, linear_solver=Automatic())

@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.runs.run import UnsolvableSceneError, run_history
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 

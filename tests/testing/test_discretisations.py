@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.linear.solvers import LinearSolver
-from bemkit.operators.steklov_poincare import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.registry import DISCRETISATIONS

@@ -11,20 +11,21 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import LinearOperator, aslinearoperator
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.operators import boundary
 from bemkit.operators.boundary import (
     BoundaryOperator,
     DoubleLayer,
-    Tag,
+    PairOperator,
     adjoint_double_layer,
     double_layer,
     hypersingular,
     mass,
     single_layer,
 )
+from bemkit.operators.forms import SingleLayerForm, Tag
 from bemkit.operators.material import Material, Plane
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
 from tests.testing.test_spaces import public_classes
@@ -43,7 +44,8 @@ def operators_on(mesh: BoundaryMesh, material: Material) -> list[BoundaryOperato
     tractions: list[BoundarySpace] = [ConstantSpace(mesh), LinearSpace(mesh, broken)]
     result: list[BoundaryOperator] = []
     for t in tractions:
-        result += [single_layer(t, t, material), mass(t, t)]
+        result += [single_layer(t, t, material), mass(t, t), mass(t, t).T]
+        result += [PairOperator(SingleLayerForm(t, t, material))]
         for u in displacements:
             result += [double_layer(u, t, material), adjoint_double_layer(t, u, material), mass(u, t)]
             result += [single_layer(t, u, material)]
@@ -87,7 +89,7 @@ def test_every_tag_is_carried_by_some_operator() -> None:
     assert {tag for operator in operators for tag in operator.tags} == set(Tag)
 
 
-class Handmade:
+class Handmade(LinearOperator):
     """An operator given by its matrix."""
 
     def __init__(self, matrix: FloatArray, *tags: Tag, **changes: Any) -> None:
@@ -97,6 +99,8 @@ class Handmade:
         self.tags = changes.get("tags", frozenset(tags))
         self._matrix = matrix
         self._linear = changes.get("linear", aslinearoperator(matrix))
+        self._block = changes.get("block", matrix)
+        super().__init__(np.dtype(float), self._linear.shape)
         self.is_assembled = changes.get("is_assembled", False)
         matrix.setflags(write=changes.get("writeable", False))
         self._is_copied = changes.get("is_copied", False)
@@ -108,8 +112,14 @@ class Handmade:
             return copy
         return self._matrix
 
-    def as_linear_operator(self) -> LinearOperator:
-        return self._linear
+    def block(self, rows: IntArray, columns: IntArray) -> FloatArray:
+        return self._block[rows][:, columns]
+
+    def _matvec(self, x: FloatArray) -> FloatArray:
+        return self._linear.matvec(x)
+
+    def _rmatvec(self, y: FloatArray) -> FloatArray:
+        return self._linear.rmatvec(y)
 
 
 N = 2 * MESH.n_elements
@@ -135,13 +145,20 @@ def other_linear(matvec: Callable[[Any], Any], rmatvec: Callable[[Any], Any], n:
         (Handmade(np.eye(N), tags=frozenset({"symmetric"})), "not a frozenset of Tag"),
         (Handmade(np.eye(N), is_assembled=True), "is assembled before its matrix is asked for"),
         (Handmade(np.eye(N, dtype=np.float32)), "is not an array of doubles"),
-        (Handmade(np.eye(4)), r"matrix\(\) has the shape \(4, 4\), not \(test, trial\) dofs \(48, 48\)"),
+        (
+            Handmade(np.eye(4), block=np.eye(N)),
+            r"matrix\(\) has the shape \(4, 4\), not \(test, trial\) dofs \(48, 48\)",
+        ),
         (Handmade(with_entry(np.inf)), "holds 1 entries not finite"),
         (Handmade(np.eye(N), writeable=True), "can be written to"),
         (Handmade(np.eye(N), is_copied=True), "is built anew at every call"),
-        (Handmade(np.eye(N), linear=aslinearoperator(np.eye(4))), r"as_linear_operator\(\) has the shape \(4, 4\)"),
-        (Handmade(np.eye(N), linear=aslinearoperator(with_entry(1e-3))), "is not the matrix: it differs by"),
-        (Handmade(np.eye(N), linear=other_linear(lambda x: x, lambda x: -x)), "has a wrong adjoint: it differs by"),
+        (Handmade(np.eye(N), linear=aslinearoperator(np.eye(4))), r"has the shape \(4, 4\), its matrix \(48, 48\)"),
+        (
+            Handmade(np.eye(N), linear=aslinearoperator(with_entry(1e-3))),
+            "@ x is not that of the matrix: it differs",
+        ),
+        (Handmade(np.eye(N), linear=other_linear(lambda x: x, lambda x: -x)), "T is not the transpose: it differs by"),
+        (Handmade(np.eye(N), block=-np.eye(N) - np.ones((N, N))), "block.. is not that of the matrix: it differs by"),
         (Handmade(with_entry(1e-9), Tag.SYMMETRIC), "says it is symmetric: it differs by 1e-09 where entries reach 1"),
         (
             Handmade(-np.eye(N), Tag.POSITIVE_DEFINITE),

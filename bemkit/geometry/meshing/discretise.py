@@ -5,21 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, divide
 from bemkit.geometry.meshing.transition import gradual_positions
 from bemkit.geometry.outline import Outline
-from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.geometry.vectors import norms
-
-_N_PANELS = 256
-_N_PANEL_POINTS = 4
-_SPEED_TOLERANCE = 1e-12  # a speed that varies by less is constant up to round-off
 
 
 def discretise(
@@ -71,20 +64,14 @@ def discretise(
         division = division.half(symmetry)
         n_elements = _share_of_half(n_elements, division, symmetry)
         _check_sides_divided(density, division)
-    rulers = [_Ruler(side.curve) for side in outline.sides]
-    weights = [
-        density.get(outline.side_names[piece.side], 1.0) * rulers[piece.side].length(*piece.span)
-        for piece in division.pieces
-    ]
-    counts = share_elements(n_elements, np.array(weights))
+    lengths = division.piece_lengths
+    densities = [density.get(outline.side_names[piece.side], 1.0) for piece in division.pieces]
+    counts = share_elements(n_elements, lengths * densities)
     if isinstance(grading, Uniform):
-        lengths = np.array([rulers[piece.side].length(*piece.span) for piece in division.pieces])
         positions = _gradual(division, counts, lengths)
     else:
         positions = [_checked_positions(grading, int(count)) for count in counts]
-    return division.mesh(
-        [rulers[piece.side].parameters(piece.span, p) for piece, p in zip(division.pieces, positions, strict=True)]
-    )
+    return division.mesh([piece.at(p) for piece, p in zip(division.pieces, positions, strict=True)])
 
 
 def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
@@ -113,31 +100,6 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
     by_remainder = np.argsort(counts - quota, kind="stable")
     counts[by_remainder[: n_elements - int(counts.sum())]] += 1
     return counts
-
-
-class _Ruler:
-    """Measures a curve: parameter <-> arc length."""
-
-    def __init__(self, curve: Curve) -> None:
-        self._ends = np.linspace(0.0, 1.0, _N_PANELS + 1)
-        xi, weights = gauss_legendre(_N_PANEL_POINTS)
-        s = self._ends[:-1, None] + 0.5 / _N_PANELS * (1.0 + xi)
-        speed = norms(curve.derivative(s.ravel()))
-        self._arc_length = np.concatenate([[0.0], np.cumsum(0.5 / _N_PANELS * (speed.reshape(s.shape) @ weights))])
-        self._is_even = bool(np.ptp(speed) <= _SPEED_TOLERANCE * speed.max())
-
-    def length(self, start: float, end: float) -> float:
-        """Return the arc length between two parameters."""
-        return float(np.diff(np.interp([start, end], self._ends, self._arc_length))[0])
-
-    def parameters(self, span: tuple[float, float], positions: FloatArray) -> FloatArray:
-        """Return the parameters at fractions of the arc length of a span."""
-        if not self._is_even:
-            whole = np.interp(span, self._ends, self._arc_length)
-            lengths = whole[0] * (1.0 - positions) + whole[1] * positions
-            s: FloatArray = np.interp(lengths, self._arc_length, self._ends)
-            return s
-        return np.asarray(span[0] * (1.0 - positions) + span[1] * positions)
 
 
 def _gradual(division: Division, counts: IntArray, lengths: FloatArray) -> list[FloatArray]:

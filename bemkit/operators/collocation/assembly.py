@@ -13,16 +13,14 @@ on straight ones it is zero. Then (1/2 I + T) u = U t.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.collocation_points import Midpoints
-from bemkit.operators.collocation.columns import ColumnRun, covered, segments
-from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.collocation.collocation_points import Coefficients, CollocationPoints, constant_runs
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
@@ -31,37 +29,9 @@ from bemkit.operators.stopwatch import assembling
 CHUNK_PAIRS = 32768
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryData:
-    """Given tractions and displacements of elements, x + i y.
-
-    Parameters
-    ----------
-    traction : (n_elements,) complex array [Pa]
-    displacement : (n_elements,) complex array [m]
-    """
-
-    traction: ComplexArray
-    displacement: ComplexArray
-
-
-@dataclass(frozen=True, eq=False)
-class Filled:
-    """What a sweep over the pairs gives beside the columns that it writes.
-
-    Parameters
-    ----------
-    known : (n_elements,) complex array [m]
-        U t - T u of the data, without the free term.
-    n_pairs : int
-        Pairs of a midpoint and an element that were evaluated.
-    """
-
-    known: ComplexArray
-    n_pairs: int
-
-
-def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatArray, FloatArray]:
+def collocation_matrices(
+    mesh: BoundaryMesh, material: Material, *, takes_slopes: bool = False
+) -> tuple[FloatArray, FloatArray]:
     """Return the single and the double layer of constant densities at the element midpoints.
 
     Parameters
@@ -69,6 +39,8 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
     mesh : BoundaryMesh
         x is the point in the middle of the arc of each element.
     material : Material
+    takes_slopes : bool
+        As in `sweep_rows`.
 
     Returns
     -------
@@ -79,90 +51,93 @@ def collocation_matrices(mesh: BoundaryMesh, material: Material) -> tuple[FloatA
     """
     n = mesh.n_elements
     single, double = np.empty((n, 2, n, 2)), np.empty((n, 2, n, 2))
-    runs = [
-        [ColumnRun(slice(0, n), direction, m[:, 0, :, k], m[:, 1, :, k]) for k, direction in enumerate((1.0 + 0j, 1j))]
-        for m in (single, double)
-    ]
-    fill_columns(mesh, material, *runs)
+
+    def store(rows: slice, block: Coefficients) -> None:
+        write_columns(block.on_traction, block.on_conjugate_traction, single[rows, 0], single[rows, 1])
+        write_columns(block.on_displacement, block.on_conjugate_displacement, double[rows, 0], double[rows, 1])
+
+    sweep_rows(mesh, material, store, needs_single=np.ones(n, bool), needs_double=True, takes_slopes=takes_slopes)
     return single.reshape(2 * n, 2 * n), double.reshape(2 * n, 2 * n)
 
 
 @assembling()
-def fill_columns(
+def sweep_rows(
     mesh: BoundaryMesh,
     material: Material,
-    single: Sequence[ColumnRun],
-    double: Sequence[ColumnRun],
+    store: Callable[[slice, Coefficients], None],
     *,
-    takes_slopes: bool = False,
-    data: BoundaryData | None = None,
-) -> Filled:
-    """Evaluate some columns of the single and the double layer; entries of the others are not formed.
+    needs_single: BoolArray,
+    needs_double: bool,
+    takes_slopes: bool,
+) -> int:
+    """Evaluate the single and the double layer by chunks of rows, each of which is handed on as soon as it is there.
 
     Parameters
     ----------
     mesh : BoundaryMesh
         The images of elements that a symmetry adds are columns of the elements themselves.
     material : Material
-    single, double : sequence of ColumnRun
-        Columns that are wanted; they are written, not added.
+    store : callable
+        Takes the elements of some rows and the coefficients (n_rows, n_elements) of all densities there; called from
+        several threads, and owner of what it is given.
+    needs_single : (n_elements,) bool array
+        Elements whose columns of the single layer are evaluated; those of the others may be zero.
+    needs_double : bool
+        Whether the double layer is evaluated; if not, its coefficients mean nothing.
     takes_slopes : bool
         Whether the double layer is that of displacements with slopes; see
         `bemkit.operators.collocation.gradient_reconstruction`.
-    data : BoundaryData, optional
-        Given tractions and displacements, whose columns are multiplied by them and not stored.
 
     Returns
     -------
-    Filled
+    int
+        Pairs of a midpoint and an element that were evaluated.
 
     Notes
     -----
     The diagonal blocks of the double layer are such that constant displacements, which have constant values +1/2 or
     -1/2, keep them: an element of length h at coordinates of size one has its midpoint to eps / h only, and the
-    tractions there feel that divided by h again unless a translation causes none. The sums that this takes run over
-    the coefficients of all elements, also of those whose columns are not wanted.
+    tractions there feel that divided by h again unless a translation causes none.
     """
     n, whole = mesh.n_elements, mesh.whole
     images = [(1.0, 1.0)] if mesh.symmetry is None else mesh.symmetry.images.tolist()
     panels = Panels(whole)
-    midpoints = Midpoints(panels, material, mesh.diameter)
-    slopes = Slopes.of(whole, panels) if takes_slopes else None
-    data = BoundaryData(np.zeros(n, complex), np.zeros(n, complex)) if data is None else data
-    needs_single = np.tile(covered(single, n) | (data.traction != 0.0), len(images))
-    parts = [(part, bool(needs_single[part.start])) for part in segments(needs_single, whole.is_straight)]
-    needs_double = bool(double) or bool(data.displacement.any())
-    if not needs_double:
-        parts, slopes = [part for part in parts if part[1]], None
-    sums, known = np.zeros((2, n), complex), np.zeros(n, complex)
+    points = CollocationPoints(panels, material, mesh.diameter)
+    slopes = GradientReconstruction.of(whole, panels) if takes_slopes and needs_double else None
+    has_single = np.tile(needs_single, len(images))
+    runs = [(run, bool(has_single[run.start])) for run in constant_runs(has_single, whole.is_straight)]
+    runs = [(run, single) for run, single in runs if single or needs_double]
+    value_of_one = 0.5 if mesh.is_exterior else -0.5
 
-    def fill(rows: slice) -> None:
-        found = midpoints.evaluate(rows, parts, slopes is not None)
+    def evaluate(rows: slice) -> None:
+        block = points.evaluate(rows, runs, slopes is not None)
         if slopes is not None:
-            found.add_slopes(slopes)
+            block.add_slopes(slopes)
         if needs_double:
-            sums[:, rows] = found.on_displacement.sum(axis=1), found.on_conjugate_displacement.sum(axis=1)
-        found = found.folded(images)
-        for run in single:
-            run.write(rows, found.on_traction[:, run.elements], found.on_conjugate_traction[:, run.elements])
-        for run in double:
-            run.write(rows, found.on_displacement[:, run.elements], found.on_conjugate_displacement[:, run.elements])
-        if data.traction.any():
-            known[rows] += _product(found.on_traction, found.on_conjugate_traction, data.traction)
-        if data.displacement.any():
-            known[rows] -= _product(found.on_displacement, found.on_conjugate_displacement, data.displacement)
+            sums = block.on_displacement.sum(axis=1), block.on_conjugate_displacement.sum(axis=1)
+        block = block.folded(images)
+        if needs_double:
+            row, own = np.arange(rows.stop - rows.start), np.arange(rows.start, rows.stop)
+            block.on_displacement[row, own] += value_of_one - sums[0]
+            block.on_conjugate_displacement[row, own] -= sums[1]
+        store(rows, block)
 
     step = max(1, CHUNK_PAIRS // whole.n_elements)
     chunks = (slice(first, min(first + step, n)) for first in range(0, n, step))
-    for_each_chunk(fill, chunks, n_pairs=n * whole.n_elements)
-    own, balance = np.arange(n), ((0.5 if mesh.is_exterior else -0.5) - sums[0], -sums[1])
-    for run in double:
-        run.add(own, own, *balance)
-    known -= balance[0] * data.displacement + balance[1] * data.displacement.conj()
-    return Filled(known, n * sum(part.stop - part.start for part, _ in parts))
+    for_each_chunk(evaluate, chunks, n_pairs=n * whole.n_elements)
+    return n * sum(int(run.stop - run.start) for run, _ in runs)
 
 
-def _product(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, density: ComplexArray) -> ComplexArray:
-    """Return on v + on_conjugate conj(v), without BLAS: its threads and those of the chunks wait for each other."""
-    product: ComplexArray = np.einsum("ij,j->i", on, density) + np.einsum("ij,j->i", on_conjugate, density.conj())
-    return product
+def write_columns(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, x: FloatArray, y: FloatArray) -> None:
+    """Write the real form of v -> on v + on_conjugate conj(v).
+
+    Parameters
+    ----------
+    on, on_conjugate : (n_rows, n_elements) arrays
+    x, y : (n_rows, n_elements, 2) arrays
+        The two components of the result, by the components of v.
+    """
+    np.add(on.real, on_conjugate.real, out=x[:, :, 0])
+    np.subtract(on_conjugate.imag, on.imag, out=x[:, :, 1])
+    np.add(on.imag, on_conjugate.imag, out=y[:, :, 0])
+    np.subtract(on.real, on_conjugate.real, out=y[:, :, 1])

@@ -1,7 +1,8 @@
-"""What the midpoints of elements see of all elements: the coefficients of constant densities, and of slopes."""
+"""Coefficients of constant densities, and of their slopes, at the collocation points in the middle of elements."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
-from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals import curved_panels
 from bemkit.operators.integrals.inner import far_inner, inner_integrals, inner_on_element, store
 from bemkit.operators.integrals.pairs import Degrees, Inner
@@ -58,7 +59,7 @@ class Coefficients:
         tractions = np.zeros(shape), np.zeros(shape, complex)
         return cls(*tractions, *(np.empty(each, complex) for each in (shape, shape, on_slopes, on_slopes)))
 
-    def add_slopes(self, slopes: Slopes) -> None:
+    def add_slopes(self, slopes: GradientReconstruction) -> None:
         """Add the slopes that displacements suggest."""
         slopes.add_to(self.on_displacement, self.on_slope, is_conjugate=False)
         slopes.add_to(self.on_conjugate_displacement, self.on_conjugate_slope, is_conjugate=True)
@@ -85,19 +86,24 @@ def _folded(
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What points see of elements of half length 1 with a chord along the real axis.
+class _ElementIntegrals:
+    """Integrals over elements of half length 1 with a chord along the real axis, with the letters of `assembly`.
 
-    `angle` is D, `stretch` lambda, and `turn` is -i / 2 times the difference of rho / conj(rho) between the ends. `log`
-    and `half_quotient` are those of the single layer. `moments` are angle, stretch and turn with the density p(t)
-    (t on straight elements), turn with its conjugate.
+    Parameters
+    ----------
+    log, half_quotient : arrays, optional
+        L and Q / 2, of the single layer.
+    double, log_ratio, quotient_change : arrays
+        D, lambda and -i / 2 times the difference of rho / conj(rho) between the ends, of the double layer.
+    moments : tuple of arrays, optional
+        The same three with the density p(t) (t on straight elements), the last one with its conjugate.
     """
 
     log: FloatArray | None
     half_quotient: ComplexArray | None
-    angle: FloatArray
-    stretch: FloatArray
-    turn: ComplexArray
+    double: FloatArray
+    log_ratio: FloatArray
+    quotient_change: ComplexArray
     moments: tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray] | None
 
     def combine(
@@ -108,12 +114,12 @@ class _Seen:
         nu = material.effective_poisson_ratio
         b = -1.0 / (4.0 * np.pi * (1.0 - nu))
         turned, rates = b * panels.tangent[columns] ** 2, (0.5 / np.pi, b * (1.0 - 2.0 * nu))
-        _join(result.on_displacement, where, self.angle * rates[0], self.stretch * rates[1])
-        _multiply(result.on_conjugate_displacement, where, self.turn, turned)
+        _join(result.on_displacement, where, self.double * rates[0], self.log_ratio * rates[1])
+        _multiply(result.on_conjugate_displacement, where, self.quotient_change, turned)
         if self.moments is not None:
-            angle, stretch, turn = self.moments
-            _join(result.on_slope, where, angle * rates[0], stretch * rates[1])
-            _multiply(result.on_conjugate_slope, where, turn, turned)
+            double, log_ratio, quotient_change = self.moments
+            _join(result.on_slope, where, double * rates[0], log_ratio * rates[1])
+            _multiply(result.on_conjugate_slope, where, quotient_change, turned)
         if self.log is not None and self.half_quotient is not None:
             kappa = 3.0 - 4.0 * nu
             half = panels.half[columns]
@@ -124,7 +130,7 @@ class _Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Midpoints:
+class CollocationPoints:
     """Evaluates all pairs of midpoints and elements: far formulas first, then the close pairs exactly.
 
     Parameters
@@ -158,10 +164,10 @@ class Midpoints:
         for columns, has_single in parts:
             with np.errstate(all="ignore"):  # close pairs may overflow here; they are replaced
                 if self.panels.is_straight[columns.start]:
-                    seen, is_close = _straight_far(self.panels, rows, columns, distance, has_single, has_slopes)
+                    integrals, is_close = _straight_far(self.panels, rows, columns, distance, has_single, has_slopes)
                 else:
-                    seen, is_close = _curved_far(self.panels, rows, columns, has_single, has_slopes)
-                seen.combine(result, (everywhere, columns), self.panels, self.material, self.r0)
+                    integrals, is_close = _curved_far(self.panels, rows, columns, has_single, has_slopes)
+                integrals.combine(result, (everywhere, columns), self.panels, self.material, self.r0)
             row, column = np.nonzero(is_close)
             if row.size:
                 close = row + rows.start, column + columns.start
@@ -170,26 +176,33 @@ class Midpoints:
         return result
 
 
+def constant_runs(*labels: BoolArray) -> list[slice]:
+    """Cut all elements into the longest ranges on which no label (n_elements,) changes."""
+    changes = 1 + np.flatnonzero(np.any([label[1:] != label[:-1] for label in labels], axis=0))
+    edges = [0, *changes.tolist(), labels[0].size]
+    return [slice(first, last) for first, last in itertools.pairwise(edges)]
+
+
 def _straight_far(
     panels: Panels, rows: slice, columns: slice, distance: float, has_single: bool, has_slopes: bool
-) -> tuple[_Seen, BoolArray]:
+) -> tuple[_ElementIntegrals, BoolArray]:
     """Use the series of the closed forms; also return which pairs are too close for them."""
     zeta = (panels.centre[rows, None] - panels.centre[columns]) * panels.to_local[columns]
     first, second = kernels.far_moments(zeta, 1, kernels.terms_needed(distance))
-    eta, angle, stretch = zeta.imag.copy(), first.imag.copy(), first.real.copy()
+    eta, double, log_ratio = zeta.imag.copy(), first.imag.copy(), first.real.copy()
     product = zeta * zeta
     product -= 1.0
     squared = np.square(product.real)
     squared += np.square(product.imag)
     # |zeta^2 - 1| is |zeta|^2 up to 1; on the element itself it may be no number
     is_close: BoolArray = ~(squared > (distance**2 + 1.0) ** 2)
-    turn = product
-    turn *= eta * (2.0 / squared)
+    quotient_change = product
+    quotient_change *= eta * (2.0 / squared)
     moments = log = half_quotient = None
     if has_slopes:
         # int t / (zeta - t)^2 dt = zeta int 1 / (zeta - t)^2 dt - T_0
         of_slope = zeta.conj()
-        of_slope *= turn
+        of_slope *= quotient_change
         first *= eta
         of_slope -= first.conj()
         moments = second.imag, second.real, of_slope
@@ -197,13 +210,13 @@ def _straight_far(
         log = np.log(squared, out=squared)
         log *= 0.5
         log += second.real
-        half_quotient = _complex(1.0 + eta * angle, eta * stretch)
-    return _Seen(log, half_quotient, angle, stretch, turn, moments), is_close
+        half_quotient = _complex(1.0 + eta * double, eta * log_ratio)
+    return _ElementIntegrals(log, half_quotient, double, log_ratio, quotient_change, moments), is_close
 
 
 def _curved_far(
     panels: Panels, rows: slice, columns: slice, has_single: bool, has_slopes: bool
-) -> tuple[_Seen, BoolArray]:
+) -> tuple[_ElementIntegrals, BoolArray]:
     """Use a Gauss rule; also return which pairs are too close for it."""
     x = panels.centre[rows, None]
     zeta = (x - panels.centre[columns]) * panels.to_local[columns]
@@ -213,29 +226,29 @@ def _curved_far(
     plus, minus = zeta - start, zeta - end
     chord = (end - start).real
     # |plus|^2 - |minus|^2 = chord Re(plus + minus): log1p keeps the digits of the difference of two logarithms
-    stretch = 0.5 * np.log1p(chord * (plus + minus).real / (np.square(minus.real) + np.square(minus.imag)))
+    log_ratio = 0.5 * np.log1p(chord * (plus + minus).real / (np.square(minus.real) + np.square(minus.imag)))
     moments = _curved_moments(polynomials, zeta) if has_slopes else None
     reach = panels.half[columns] * panels.reach(CURVED_DISTANCE)[columns]
-    seen = _seen(inner, chord, plus, minus, plus.imag, stretch, has_single, moments)
-    return seen, squared_distance(x, panels.centre[columns]) < reach**2
+    integrals = _joined(inner, chord, plus, minus, plus.imag, log_ratio, has_single, moments)
+    return integrals, squared_distance(x, panels.centre[columns]) < reach**2
 
 
 def _curved_moments(polynomials: ComplexArray, zeta: ComplexArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Return the moments of curved elements far from points, by a Gauss rule for the derivatives themselves."""
     slopes = curved_panels.derivative(polynomials)
-    angle, stretch, turn = (np.zeros(zeta.shape, complex) for _ in range(3))
+    double, log_ratio, quotient_change = (np.zeros(zeta.shape, complex) for _ in range(3))
     for t, weight in zip(*gauss_legendre(CURVED_POINTS), strict=True):
         place = np.full(polynomials.shape[1], t + 0j)
         p, slope = curved_panels.evaluate(polynomials, place), curved_panels.evaluate(slopes, place)
         rho = zeta - p
         rate = slope / rho
-        angle += (weight * p) * rate.imag
-        stretch += (weight * p) * rate.real
-        turn -= (weight * p.conj()) * (rho / rho.conj() * rate.imag)
-    return angle, stretch, turn
+        double += (weight * p) * rate.imag
+        log_ratio += (weight * p) * rate.real
+        quotient_change -= (weight * p.conj()) * (rho / rho.conj() * rate.imag)
+    return double, log_ratio, quotient_change
 
 
-def _listed(panels: Panels, rows: IntArray, columns: IntArray, has_single: bool, has_slopes: bool) -> _Seen:
+def _listed(panels: Panels, rows: IntArray, columns: IntArray, has_single: bool, has_slopes: bool) -> _ElementIntegrals:
     """Evaluate listed pairs, all straight or all curved, exactly at any distance."""
     from_start, from_end = panels.centre[rows] - panels.start[columns], panels.centre[rows] - panels.end[columns]
     plus, minus = from_start * panels.to_local[columns], from_end * panels.to_local[columns]
@@ -250,9 +263,9 @@ def _listed(panels: Panels, rows: IntArray, columns: IntArray, has_single: bool,
         if is_straight:
             plus[same], minus[same] = 1.0, -1.0
     eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-    stretch = np.log(np.abs(plus)) - np.log(np.abs(minus))
+    log_ratio = np.log(np.abs(plus)) - np.log(np.abs(minus))
     moments = _moments_by_parts(inner, polynomials, plus, minus) if has_slopes else None
-    return _seen(inner, (plus - minus).real, plus, minus, eta, stretch, has_single, moments)
+    return _joined(inner, (plus - minus).real, plus, minus, eta, log_ratio, has_single, moments)
 
 
 def _moments_by_parts(
@@ -260,29 +273,31 @@ def _moments_by_parts(
 ) -> tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray]:
     """Return the moments from inner integrals and what the end points `plus` and `minus` away give."""
     quotients, logs = [plus / plus.conj(), minus / minus.conj()], [np.log(np.abs(plus)), np.log(np.abs(minus))]
-    angle, stretch, turn = (np.zeros(plus.shape, complex) for _ in range(3))
+    double, log_ratio, quotient_change = (np.zeros(plus.shape, complex) for _ in range(3))
     for m, factor in enumerate(polynomials[1:], 1):
         sign = (-1.0) ** m  # t**m at the start; it is one at the end
-        angle += factor * inner.double[m]
-        stretch += factor * (m * inner.log[m - 1] - logs[1] + sign * logs[0])
-        turn += factor.conj() * (-0.5j * (quotients[1] - sign * quotients[0] - m * inner.quotient[m - 1]))
-    return angle, stretch, turn
+        double += factor * inner.double[m]
+        log_ratio += factor * (m * inner.log[m - 1] - logs[1] + sign * logs[0])
+        quotient_change += factor.conj() * (-0.5j * (quotients[1] - sign * quotients[0] - m * inner.quotient[m - 1]))
+    return double, log_ratio, quotient_change
 
 
-def _seen(
+def _joined(
     inner: Inner,
     chord: FloatArray,
     plus: ComplexArray,
     minus: ComplexArray,
     eta: FloatArray,
-    stretch: FloatArray,
+    log_ratio: FloatArray,
     has_single: bool,
     moments: tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray] | None,
-) -> _Seen:
+) -> _ElementIntegrals:
     """Join inner integrals and what the end points give."""
-    turn: ComplexArray = chord * eta / (plus * minus).conj()  # the difference of rho / conj(rho), without cancellation
+    quotient_change: ComplexArray = (
+        chord * eta / (plus * minus).conj()
+    )  # the difference of rho / conj(rho), without cancellation
     log, half_quotient = (inner.log[0], 0.5 * inner.quotient[0]) if has_single else (None, None)
-    return _Seen(log, half_quotient, inner.double[0], stretch, turn, moments)
+    return _ElementIntegrals(log, half_quotient, inner.double[0], log_ratio, quotient_change, moments)
 
 
 def _multiply(

@@ -27,7 +27,7 @@ SHARP = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Slopes:
+class GradientReconstruction:
     """Slopes as combinations of midpoint values: s = before u_previous + own u + after u_following.
 
     Parameters
@@ -50,7 +50,7 @@ class Slopes:
     mean_after: ComplexArray
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, panels: Panels) -> Slopes:
+    def of(cls, mesh: BoundaryMesh, panels: Panels) -> GradientReconstruction:
         """Return the least-squares slopes on a closed mesh.
 
         Notes

@@ -2,8 +2,8 @@
 
 The displacement equation hardly tells a uniform pressure on a closed curve: it displaces nothing but what the
 compressibility allows, so that an error of the equation along the normals comes back as a pressure 1 / (1 - 2 nu) times
-larger, and at nu = 1/2 nothing is left of it within a hole. Betti's theorem for a field w that carries volume through
-the curve tells it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
+larger, and at nu = 1/2 nothing is left of it within a hole. Betti's theorem [Betti1872] for a field w that carries
+volume through the curve tells it at every ratio. In complex notation, with t(w) the tractions of w on the boundary,
 
     around a hole     w = a / conj(z - c),        t(w) ds = 2 mu i dw,     c in the hole, a its distance from the curve
     the outer curve   w = (1 - 2 nu) (z - c),     t(w) ds = -2 mu i dz
@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.collocation.gradient_reconstruction import Slopes
+from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -60,7 +60,7 @@ class Reciprocity:
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
         """
         panels = Panels(mesh.whole)
-        slopes = Slopes.of(mesh.whole, panels) if takes_slopes else None
+        slopes = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)

@@ -6,7 +6,8 @@ complex unless x lies on the curve) the distance factors,
 
     zeta - p(t) = (t0 - t) g(t),    g the divided difference of p, without zeros near [-1, 1],
 
-so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder.
+so that every integral is the closed form of the straight element seen from t0 plus a smooth remainder: singularity swap
+quadrature [AfKlintebergBarnett2021], with remainders instead of swapped densities.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ ELLIPSE = 1.8
 
 
 @dataclass(frozen=True, eq=False)
-class BentPanels:
+class CurvedPanels:
     """The polynomials of all elements of a mesh; straight ones are p(t) = t.
 
     Parameters
@@ -53,7 +54,7 @@ class BentPanels:
     bend: FloatArray
 
 
-def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> BentPanels:
+def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: ComplexArray) -> CurvedPanels:
     """Interpolate the curved elements of a mesh, up to the round-off of their coordinates.
 
     Raises
@@ -87,7 +88,7 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
             np.vander(np.linspace(-1.0, 1.0, 9), n_powers - 2, increasing=True) @ second[:, curved]
         ).max(axis=0)
     _check(mesh, curved, bend, is_unresolved)
-    return BentPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
+    return CurvedPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
 
 
 def _check(mesh: BoundaryMesh, curved: IntArray, bend: FloatArray, is_unresolved: BoolArray) -> None:
@@ -153,13 +154,13 @@ def divided_difference(coefficients: ComplexArray, root: ComplexArray) -> Comple
 
 
 def find_parameters(
-    panels: BentPanels, elements: IntArray, from_start: ComplexArray, from_end: ComplexArray
+    panels: CurvedPanels, elements: IntArray, from_start: ComplexArray, from_end: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray, BoolArray]:
     """Find the complex parameters t0 of points by Newton's method, each measured from the nearer end.
 
     Parameters
     ----------
-    panels : BentPanels
+    panels : CurvedPanels
     elements : (n,) int array
     from_start, from_end : (n,) complex arrays
         Local coordinates of the points relative to either end of the element.

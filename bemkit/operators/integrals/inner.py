@@ -1,7 +1,7 @@
 """Inner integrals over one trial element, seen from a point: closed forms, and what bending adds to them.
 
-With zeta - p(t) = (t0 - t) g(t) (see `bent`) the integrals over a curved element near the point are those of the
-straight element seen from t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
+With zeta - p(t) = (t0 - t) g(t) (see `curved_panels`) the integrals over a curved element near the point are those of
+the straight element seen from t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
 
     int t^b log|rho| dt        = straight + int t^b log|g| dt
     int t^b 2 pi k dt          = straight - int t^b Im(g' / g) dt
@@ -41,12 +41,12 @@ def inner_integrals(
         The points relative to either end of their element, each accurate near that end.
     """
     plus, minus = from_start * panels.to_local[trial], from_end * panels.to_local[trial]
-    if panels.bent is None or bool(panels.is_straight[trial].all()):
+    if panels.curved is None or bool(panels.is_straight[trial].all()):
         return _seen_from(degrees, plus, minus)
     result = Inner.zeros(degrees, trial.shape)
     zeta = local_coordinates(panels, trial, from_start)
     near = np.flatnonzero(np.abs(zeta) < panels.reach(curved_panels.ELLIPSE)[trial])
-    t_plus, t_minus, is_found = curved_panels.find_parameters(panels.bent, trial[near], plus[near], minus[near])
+    t_plus, t_minus, is_found = curved_panels.find_parameters(panels.curved, trial[near], plus[near], minus[near])
     near = near[is_found]
     store(result, near, near_inner(degrees, panels.polynomials(trial[near]), t_plus[is_found], t_minus[is_found]))
     is_far = np.ones(trial.size, bool)

@@ -1,7 +1,11 @@
-"""Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element."""
+"""Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element.
+
+Close and touching pairs are split towards their common points [SauterSchwab2011], with closed forms inside.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -12,14 +16,10 @@ from bemkit.operators import kernels
 from bemkit.operators.integrals.inner import N_SMOOTH, bending, far_inner, inner_integrals, local_coordinates
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
-SEPARATION = 3.0
-"""A piece of the test element is integrated once its centre is this many of its half lengths from every singular
-point."""
 N_REGULAR = 10
 N_TOUCHING = 20
-MAX_SPLITS = 60
-"""Pieces shorter than 2**-60 of an element carry nothing that a double can hold."""
 
 
 def integrate_separated(
@@ -79,11 +79,14 @@ def integrate_near(panels: Panels, degrees: Degrees, test: IntArray, trial: IntA
     return result
 
 
+@dataclass(frozen=True, eq=False)
 class _Pieces:
     """Pieces [low, high] of test elements, as fractions of the length from one end node."""
 
-    def __init__(self, pair: IntArray, low: FloatArray, high: FloatArray, touches: BoolArray) -> None:
-        self.pair, self.low, self.high, self.touches = pair, low, high, touches
+    pair: IntArray
+    low: FloatArray
+    high: FloatArray
+    touches: BoolArray
 
     def select(self, chosen: BoolArray) -> _Pieces:
         return _Pieces(self.pair[chosen], self.low[chosen], self.high[chosen], self.touches[chosen])
@@ -93,32 +96,20 @@ def _split(panels: Panels, test: IntArray, trial: IntArray, at_start: bool) -> _
     """Bisect one half of each test element until every piece may be integrated by a single rule."""
     node = (panels.start if at_start else panels.end)[test]
     number = (panels.start_node if at_start else panels.end_node)[test]
-    half = panels.half[test]
-    separation = panels.reach(SEPARATION)[test]
-    to_a, to_b = node - panels.start[trial], node - panels.end[trial]
-    meets_a, meets_b = number == panels.start_node[trial], number == panels.end_node[trial]
-    pair = np.arange(test.size)
-    low, high = np.zeros(test.size), np.full(test.size, 0.5)
-    done: list[_Pieces] = []
-    for split in range(MAX_SPLITS + 1):
+    reach = (panels.reach(SEPARATION) * panels.half)[test]
+    to_start, to_end = node - panels.start[trial], node - panels.end[trial]
+    meets_start, meets_end = number == panels.start_node[trial], number == panels.end_node[trial]
+
+    def is_clear(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+        # a piece that begins at a common node takes the rule for that, but must be away from the other node
         centre = panels.offset(test[pair], 0.5 * (low + high), at_start)
-        reach = (separation * half)[pair] * (high - low)
-        at_node = low == 0.0
-        a_is_clear, b_is_clear = np.abs(to_a[pair] + centre) >= reach, np.abs(to_b[pair] + centre) >= reach
-        touches = at_node & (meets_a | meets_b)[pair]
-        ready = (a_is_clear | (at_node & meets_a[pair])) & (b_is_clear | (at_node & meets_b[pair]))
-        if split == MAX_SPLITS:
-            ready[:] = True
-        done.append(_Pieces(pair[ready], low[ready], high[ready], touches[ready]))
-        rest = ~ready
-        if not rest.any():
-            break
-        pair, low, high = pair[rest], low[rest], high[rest]
-        middle = 0.5 * (low + high)
-        pair, low, high = np.tile(pair, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
-    return _Pieces(
-        *(np.concatenate([getattr(piece, name) for piece in done]) for name in ("pair", "low", "high", "touches"))
-    )
+        distance, at_node = reach[pair] * (high - low), low == 0.0
+        start_is_clear = (np.abs(to_start[pair] + centre) >= distance) | (at_node & meets_start[pair])
+        end_is_clear = (np.abs(to_end[pair] + centre) >= distance) | (at_node & meets_end[pair])
+        return np.asarray(start_is_clear & end_is_clear)
+
+    pair, low, high = split_until(is_clear, test.size, 0.0, 0.5)
+    return _Pieces(pair, low, high, (low == 0.0) & (meets_start | meets_end)[pair])
 
 
 def _integrate_pieces(
@@ -158,11 +149,11 @@ def _integrate_pieces(
 def integrate_same(panels: Panels, degrees: Degrees, test: IntArray) -> PairIntegrals:
     """Integrate elements against themselves: the logarithm scales from the unit element, bending adds smooth parts."""
     result = PairIntegrals.zeros(degrees, (test.size,))
-    if panels.bent is None or bool(panels.is_straight[test].all()):
+    if panels.curved is None or bool(panels.is_straight[test].all()):
         for a, b in np.ndindex(*result.log.shape[:2]):
             result.quotient[a, b] = kernels.interval_moment(a) * kernels.interval_moment(b)
     else:
-        coefficients = panels.bent.about_centre[:, test]
+        coefficients = panels.curved.about_centre[:, test]
         for xi, weight in zip(*gauss_legendre(N_SMOOTH), strict=True):
             inner = bending(degrees, coefficients, np.full(test.size, xi + 0j))
             result.add(np.full(test.size, weight), float(xi), inner)

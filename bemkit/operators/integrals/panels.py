@@ -40,23 +40,23 @@ class Panels:
         self.tangent: ComplexArray = span / (2.0 * self.half)
         self.centre: ComplexArray = self.start + 0.5 * span
         self.is_straight = mesh.is_straight
-        self.bent: curved_panels.BentPanels | None = None
+        self.curved: curved_panels.CurvedPanels | None = None
         if not self.is_straight.all():
             curved = np.flatnonzero(~self.is_straight)
             self.half[curved] = 0.5 * mesh.lengths[curved]
             self.centre[curved] = mesh.centres[curved] @ np.array([1.0, 1j])
-            self.bent = curved_panels.fit(mesh, self.tangent, self.half, self.centre)
+            self.curved = curved_panels.fit(mesh, self.tangent, self.half, self.centre)
         self.to_local: ComplexArray = self.tangent.conj() / self.half
 
     def polynomials(self, elements: IntArray) -> ComplexArray:
         """Return the coefficients (n_powers, n) of p for some elements."""
-        if self.bent is None:
+        if self.curved is None:
             return np.repeat(np.array([[0.0], [1.0 + 0j]]), elements.size, axis=1)
-        return self.bent.about_centre[:, elements]
+        return self.curved.about_centre[:, elements]
 
     def point(self, elements: IntArray, xi: float) -> ComplexArray:
         """Return the points of some elements at one local coordinate in [-1, 1]."""
-        if self.bent is None:
+        if self.curved is None:
             return self.centre[elements] + (xi * self.half * self.tangent)[elements]
         local = curved_panels.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
         return self.centre[elements] + (self.half * self.tangent)[elements] * local
@@ -73,9 +73,9 @@ class Panels:
             Which end.
         """
         step = self.tangent[elements] * (2.0 * self.half[elements] * (1.0 if at_start else -1.0))
-        if self.bent is None:
+        if self.curved is None:
             return step * fraction
-        about = (self.bent.about_start if at_start else self.bent.about_end)[1:, elements]
+        about = (self.curved.about_start if at_start else self.curved.about_end)[1:, elements]
         shift = np.broadcast_to(2.0 * fraction * (1.0 if at_start else -1.0), elements.shape).astype(complex)
         return step * fraction * curved_panels.evaluate(about, shift)
 
@@ -85,9 +85,9 @@ class Panels:
         Outside of a circle the parameter grows with the logarithm of the distance only; on straight elements both are
         the same.
         """
-        if self.bent is None:
+        if self.curved is None:
             return np.full(self.half.size, distance)
-        return curved_panels.stretched(self.bent.bend, distance)
+        return curved_panels.stretched(self.curved.bend, distance)
 
 
 def squared_distance(x: ComplexArray, y: ComplexArray) -> FloatArray:

@@ -3,12 +3,7 @@
 One search space serves all columns: with each of m columns every step adds m directions to it, so that fewer steps are
 needed than for one column alone, and every product with a matrix is a product with a block. The residuals are kept as
 R = Q C with columns of Q that are orthonormal in the inner product of the preconditioner; directions that have
-nothing left to give are dropped from Q.
-
-References
-----------
-D. P. O'Leary, The block conjugate gradient algorithm, Linear Algebra Appl. 29 (1980); A. A. Dubrulle, Retooling the
-method of block conjugate gradients, ETNA 12 (2001).
+nothing left to give are dropped from Q. After [OLeary1980] and [Dubrulle2001].
 """
 
 from __future__ import annotations

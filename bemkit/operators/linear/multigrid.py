@@ -31,7 +31,7 @@ class Multigrid:
         Row-major; kept, not copied.
     neighbours : (n, n) sparse matrix
         Symmetric positive definite, with the same smooth functions at the lower end of its spectrum; its
-        Ruge-Stueben hierarchy is taken for the dense matrix as well.
+        Ruge-Stueben hierarchy [RugeStueben1987] is taken for the dense matrix as well.
     coarsest : int
         Order from which on a matrix is factored instead of coarsened.
     name : str

@@ -1,4 +1,4 @@
-r"""Fields inside a body from its boundary data, by the representation formula u = V t - K u.
+r"""Fields inside a body from its boundary data, by the representation formula u = V t - K u [Somigliana1885].
 
 With complex displacements u = u_x + i u_y and z = x + i y, the formula is differentiated under the integral sign:
 
@@ -6,7 +6,7 @@ With complex displacements u = u_x + i u_y and z = x + i y, the formula is diffe
     2 mu du/dzbar  = D                          (shears)
     sigma_xx + sigma_yy = 4 Re Phi,    sigma_xx - sigma_yy + 2 i sigma_xy = 2 D
 
-(Kolosov and Muskhelishvili), where Phi and D are boundary integrals of the tractions and displacements. No division by
+[Muskhelishvili1953], where Phi and D are boundary integrals of the tractions and displacements. No division by
 1 - 2 nu occurs, so stresses hold for incompressible materials, too.
 """
 

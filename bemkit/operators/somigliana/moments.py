@@ -29,12 +29,10 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.validity.chords import derivative_on, evaluate_curves, point_on
 from bemkit.operators import kernels
 from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
-SEPARATION = 3.0
-"""A piece of a curved element is integrated once the point is this many of its half lengths from its middle."""
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
-MAX_SPLITS = 60
 CENTRE, START, END = 0, 1, 2
 AT_END = 0.5
 """Points closer to an end of an element than this, in half lengths, see its densities expanded about that end."""
@@ -271,19 +269,10 @@ class CurvedElements:
 
     def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """Bisect elements until each piece [low, high] is well away from its point."""
-        pair = np.arange(x.size)
-        low, high = np.full(x.size, -1.0), np.ones(x.size)
-        done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-        for split in range(MAX_SPLITS + 1):
+
+        def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
             y, slope = self.place(elements[pair], 0.5 * (low + high)[:, None])
-            reach = SEPARATION * 0.5 * (high - low) * np.abs(slope[:, 0])
-            ready = (np.abs(x[pair] - y[:, 0]) >= reach) | (split == MAX_SPLITS)
-            done.append((pair[ready], low[ready], high[ready]))
-            rest = ~ready
-            if not rest.any():
-                break
-            pair, low, high = pair[rest], low[rest], high[rest]
-            middle = 0.5 * (low + high)
-            pair, low, high = np.tile(pair, 2), np.concatenate([low, middle]), np.concatenate([middle, high])
-        pieces = zip(*done, strict=True)
-        return tuple(np.concatenate(piece) for piece in pieces)  # type: ignore[return-value]  # zip loses the length
+            away: BoolArray = np.abs(x[pair] - y[:, 0]) >= SEPARATION * 0.5 * (high - low) * np.abs(slope[:, 0])
+            return away
+
+        return split_until(is_away, x.size, -1.0, 1.0)

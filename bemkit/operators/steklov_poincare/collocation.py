@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
-import numpy as np
-
-from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.mixed_system import ColumnExchange
+from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
-class CollocationMap:
-    """Direct collocation with constant elements, (1/2 + T) u = U t at their midpoints, with tractions in equilibrium.
+class CollocationElasticity:
+    """Elasticity of a body by direct collocation, (1/2 + T) u = U t, with tractions in equilibrium.
+
+    Displacements and tractions are constant on elements; the equations hold at their midpoints.
 
     Parameters
     ----------
@@ -41,26 +38,8 @@ class CollocationMap:
         self.mesh = mesh
         self.material = material
         self.slopes = slopes
-        self.displacement_space = self.traction_space = ConstantSpace(mesh)
-
-    @cached_property
-    def _matrix(self) -> FloatArray:
-        n = self.mesh.n_elements
-        frame = np.broadcast_to(np.eye(2), (n, 2, 2))
-        everything_open = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
-        name = "the single layer operator"
-        exchange = ColumnExchange(self.mesh, self.material, everything_open, name, np.zeros((n, 2)), slopes=self.slopes)
-        matrix = exchange.condensed().stiffness
-        read_only(matrix)
-        return matrix
-
-    def matrix(self) -> FloatArray:
-        """Return the weak (n_dofs, n_dofs) matrix [Pa]; it is not symmetric."""
-        return self._matrix
-
-    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
-        """Return the resultants of a traction field on the elements."""
-        return integrate_traction(self.displacement_space, elements, traction)
+        self.displacement_space: BoundarySpace = ConstantSpace(mesh)
+        self.traction_space: BoundarySpace = self.displacement_space
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Exchange columns so that all unknowns but the open displacements stand on the left, and solve once.
@@ -68,7 +47,7 @@ class CollocationMap:
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """
         name = "the body held by its supports and its contact boundary"
-        return ColumnExchange(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
+        return MixedSystem(self.mesh, self.material, conditions, name, force, slopes=self.slopes).condensed()
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 1, 2) tractions: forces over lengths."""

@@ -12,8 +12,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.layer_operators import Layers
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -35,7 +34,7 @@ class FreeStiffness:
 
     Notes
     -----
-    The equivalent matrix is the hypersingular operator W_ff. With S' the map of the outside of the boundary,
+    The equivalent matrix is the hypersingular operator W_ff [SteinbachWendland1998]. With S' the map of the outside,
     W^-1 = S^-1 + S'^-1 up to rigid motions, hence S = W (1 + S'^-1 S): the energies of S lie between those of W and a
     few times them, for every mesh; thin bodies, too, because bending them is as easy for W as for S. Only the rigid
     motions of one loop against another are free in W and not in S; of several loops their energies are added.

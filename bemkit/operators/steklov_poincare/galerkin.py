@@ -8,25 +8,23 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
-from bemkit.operators.boundary import mass
 from bemkit.operators.counts import Work
-from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import DenseCholesky, LinearSolver, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverWish
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import integrate_traction
-from bemkit.operators.steklov_poincare.protocol import CondensedMap, TractionField
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
@@ -44,20 +42,20 @@ class GalerkinFactors:
         S, symmetric, without the uniform pressure.
     single_layer : Cholesky
         V = L L^T.
-    strained : (n_traction_dofs, n_dofs) array
-        L^-1 (1/2 M + K), without the part whose tractions exert a resultant.
+    whitened_trace : (n_traction_dofs, n_dofs) array
+        L^-1 (1/2 M + K), less the part whose tractions exert a resultant.
     work : Work
         What they took; nothing if they come from a cache.
     """
 
     matrix: FloatArray
     single_layer: Cholesky
-    strained: FloatArray
+    whitened_trace: FloatArray
     work: Work = field(default_factory=Work)
 
 
-class GalerkinMap:
-    """Symmetric Galerkin: S = W + (1/2 M + K)^T V^-1 (1/2 M + K), with tractions in exact equilibrium.
+class GalerkinElasticity:
+    """Elasticity of a body by symmetric Galerkin, S = W + B^T V^-1 B with B = 1/2 M + K.
 
     Parameters
     ----------
@@ -65,17 +63,22 @@ class GalerkinMap:
     material : Material
     displacement_space, traction_space : BoundarySpace, optional
         Continuous linear displacements and piecewise constant tractions unless given.
-    linear_solver : LinearSolver or Automatic
+    linear_solver : LinearSolver
         How `condense` solves for the free displacements: by forming S and factoring it unless given otherwise.
+
+    Raises
+    ------
+    InputError
+        If `linear_solver` is ``Automatic()``: that choice is made once, by the plan of a scene.
 
     Notes
     -----
-    Paper, eq. (28). V is inverted on the tractions that exert no resultant force and moment, which makes S
-    independent of the constant in the logarithm; S is symmetric, and positive definite on displacements without rigid
-    motions.
+    [Paper], eq. (28); [Steinbach2008]. V is inverted on the tractions that exert no resultant force and moment, so that
+    all tractions are in exact equilibrium and S is independent of the constant in the logarithm; S is symmetric, and
+    positive definite on displacements without rigid motions.
 
     At nu = 1/2 a uniform pressure on a loop causes no displacement, and only displacements that keep the volume are
-    possible: V is then inverted on tractions without such pressures, `matrix` is S without the pressure that keeps
+    possible: V is then inverted on tractions without such pressures, the matrix is S without the pressure that keeps
     the volume, and `condense` finds that pressure as one more unknown, as it does for compressible bodies.
     """
 
@@ -91,15 +94,22 @@ class GalerkinMap:
         self.material = material
         self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
-        self.linear_solver = linear_solver
+        if isinstance(linear_solver, Automatic):
+            raise InputError(
+                f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), Krylov(), or what "
+                "bemkit.operators.linear.choice.choose_linear_solver returns for it"
+            )
+        self.linear_solver: LinearSolver = linear_solver
 
     @cached_property
     def factors(self) -> GalerkinFactors:
         """What the map is made of when S is formed, computed on first use."""
         layers = self.__dict__.get("layers") or self._assemble()
-        strained = layers.strained()
-        work = layers.work + Work(right_hand_sides=strained.shape[1])
-        return GalerkinFactors(_symmetric_sum(layers.hypersingular, strained), layers.single_layer, strained, work)
+        whitened_trace = layers.whitened_trace()
+        work = layers.work + Work(right_hand_sides=whitened_trace.shape[1])
+        return GalerkinFactors(
+            _symmetric_sum(layers.hypersingular, whitened_trace), layers.single_layer, whitened_trace, work
+        )
 
     @cached_property
     def layers(self) -> Layers:
@@ -137,7 +147,10 @@ class GalerkinMap:
 
         Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
         """
-        fluxes = [self.nodal_forces(elements, lambda _, normals: normals).ravel() for elements in self._pressed]
+        fluxes = [
+            integrate_traction(self.displacement_space, elements, lambda _, normals: normals).ravel()
+            for elements in self._pressed
+        ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, vanishing_dofs(self.displacement_space)] = 0.0
         # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
@@ -170,25 +183,10 @@ class GalerkinMap:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
         self.__dict__["factors"] = factors  # where cached_property keeps its value
 
-    def matrix(self) -> FloatArray:
-        """Return the weak, symmetric matrix [Pa]; rigid motions are its kernel, and an exterior has none."""
-        if not self._volume.yields:
-            return self.factors.matrix
-        change = self._volume.change
-        matrix: FloatArray = self.factors.matrix + change @ change.T / self._volume.yields
-        read_only(matrix)
-        return matrix
-
-    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
-        """Return the consistent nodal forces of a traction field on some elements."""
-        return integrate_traction(self.displacement_space, elements, traction)
-
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not open by a Schur complement, with the linear solver of the map."""
-        n_open = int(np.count_nonzero(conditions.is_open))
-        choice = choose_linear_solver(self.linear_solver, self.displacement_space.n_dofs, n_open, physical_memory())
-        condense = self._condense_matrix if choice.solver.forms_matrix else self._condense_products
-        return condense(choice.solver, conditions, force)
+        condense = self._condense_matrix if self.linear_solver.forms_matrix else self._condense_products
+        return condense(self.linear_solver, conditions, force)
 
     def _condense_products(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Condense without forming S."""
@@ -224,7 +222,7 @@ class GalerkinMap:
         """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""
         if "factors" in self.__dict__ or "layers" not in self.__dict__:
             factors = self.factors
-            return factors.single_layer.solve_upper(factors.strained @ displacement)
+            return factors.single_layer.solve_upper(factors.whitened_trace @ displacement)
         return self.layers.tractions(displacement[:, None])[:, 0]
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
@@ -232,8 +230,8 @@ class GalerkinMap:
         tractions = self.tractions(displacement)
         at_nodes: FloatArray = tractions[self.traction_space.element_dofs]
         if self.material.is_incompressible and not self.mesh.is_exterior:
-            identity = mass(self.displacement_space, self.traction_space).matrix()
-            missing = force.ravel() - identity.T @ tractions.ravel()
+            carried = mass_product(self.traction_space, self.displacement_space, tractions.reshape(-1, 1))
+            missing = force.ravel() - carried[:, 0]
             pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
             normals = self._normals_of_true_mean()
             for elements, pressure in zip(self._pressed, pressures, strict=True):
@@ -251,11 +249,11 @@ class GalerkinMap:
         return shifted
 
 
-def _symmetric_sum(hyper: FloatArray, strained: FloatArray) -> FloatArray:
-    """Return the symmetric part of `hyper` plus strained^T strained, read-only."""
+def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
+    """Return the symmetric part of `hyper` plus whitened_trace^T whitened_trace, read-only."""
     from scipy.linalg.blas import dsyrk
 
-    half: FloatArray = dsyrk(1.0, strained, trans=1, lower=1)  # column-major, zero above the diagonal
+    half: FloatArray = dsyrk(1.0, whitened_trace, trans=1, lower=1)  # column-major, zero above the diagonal
     half[np.diag_indices_from(half)] *= 0.5
     half += 0.5 * hyper.T
     matrix = half + half.T

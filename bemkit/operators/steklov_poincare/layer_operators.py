@@ -9,8 +9,15 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.boundary import assemble, double_layer, hypersingular, mass, single_layer
+from bemkit.operators.assembly import assemble_together
 from bemkit.operators.counts import Entries, Work
+from bemkit.operators.forms import (
+    DoubleLayerForm,
+    HypersingularForm,
+    SingleLayerForm,
+    mass_entries,
+    mass_product,
+)
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
@@ -18,7 +25,7 @@ from bemkit.operators.rigid_modes import resting_motions
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """S = hypersingular + strain^T V^-1 strain, V inverted on tractions without a resultant or a uniform pressure.
+    """S = W + B^T V^-1 B, V inverted on tractions without a resultant or a uniform pressure.
 
     Parameters
     ----------
@@ -26,8 +33,8 @@ class Layers:
         V = L L^T.
     resultant : (n_traction_dofs, n_idle) array
         Orthonormal; L^-T times its complement are the tractions that exert no resultant.
-    strain : (n_traction_dofs, n_dofs) array
-        1/2 M + K.
+    trace_operator : (n_traction_dofs, n_dofs) array
+        B = 1/2 M + K.
     hypersingular : (n_dofs, n_dofs) array
         W.
     work : Work
@@ -36,25 +43,31 @@ class Layers:
 
     single_layer: Cholesky
     resultant: FloatArray
-    strain: FloatArray
+    trace_operator: FloatArray
     hypersingular: FloatArray
     work: Work
 
-    def strained(self, displacement: FloatArray | None = None) -> FloatArray:
-        """Return L^-1 (1/2 M + K) u without its part along `resultant`, for the columns of u (n_dofs, m) or of 1."""
-        strain = self.strain if displacement is None else multiply(self.strain, displacement)
-        strained = self.single_layer.solve_lower(strain)
+    def whitened_trace(self, displacement: FloatArray | None = None) -> FloatArray:
+        """Return L^-1 B u less its projection on `resultant`.
+
+        Parameters
+        ----------
+        displacement : (n_dofs, m) array, optional
+            Columns u; all unit vectors if left out.
+        """
+        trace = self.trace_operator if displacement is None else multiply(self.trace_operator, displacement)
+        whitened = self.single_layer.solve_lower(trace)
         if self.resultant.shape[1]:
-            strained -= multiply(self.resultant, multiply(self.resultant.T, strained))
-        return strained
+            whitened -= multiply(self.resultant, multiply(self.resultant.T, whitened))
+        return whitened
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs of the columns of (n_dofs, m) displacements."""
-        return self.single_layer.solve_upper(self.strained(displacement))
+        return self.single_layer.solve_upper(self.whitened_trace(displacement))
 
     def beyond_hypersingular(self, displacement: FloatArray) -> FloatArray:
         """Return (S - W) u for the columns of (n_dofs, m) displacements."""
-        return multiply(self.strain.T, self.tractions(displacement))
+        return multiply(self.trace_operator.T, self.tractions(displacement))
 
     def apply(self, displacement: FloatArray) -> FloatArray:
         """Return S u for the columns of (n_dofs, m) displacements."""
@@ -79,8 +92,8 @@ def assemble_layers(
         On tractions t with <V n, t> = 0, n the normals of a compressible body: those of its dilatation are n alone.
     """
     u, t, mesh = displacements, tractions, displacements.mesh
-    v, k, w = single_layer(t, t, material), double_layer(u, t, material), hypersingular(u, u, material)
-    n_pairs = assemble(v, k, w)
+    single = SingleLayerForm(t, t, material)
+    (v, k, w), n_pairs = assemble_together([single, DoubleLayerForm(u, t, material), HypersingularForm(u, u, material)])
     work = Work(
         element_pairs=n_pairs,
         single_layer=Entries.full(t.n_dofs, t.n_dofs),
@@ -88,26 +101,24 @@ def assemble_layers(
         hypersingular=Entries.full(u.n_dofs, u.n_dofs),
     )
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
-    annihilated = mass(t, t).matrix() @ pressures[:, : 0 if is_compressible else None]
+    annihilated = mass_product(t, t, pressures[:, : 0 if is_compressible else None])
     kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
-    factor = Cholesky(_without_kernel(v.matrix(), kernel), "the single layer operator")
+    factor = Cholesky(_without_kernel(v, kernel), "the single layer operator")
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
-    identity = mass(u, t).matrix()
     motions = resting_motions(mesh, dof_points(u))
-    resultants = identity @ motions
-    strain = 0.5 * identity
-    del identity
-    strain += k.matrix()
-    del k
+    resultants = mass_product(u, t, motions)
+    values, rows, columns = mass_entries(u, t)
+    np.add.at(k, (rows, columns), 0.5 * values)
     # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
-    strain = _without(strain, at_rest)
-    hyper = _without(_without(w.matrix(), at_rest).T, at_rest)
+    trace = _without(k, at_rest)
+    del k
+    hyper = _without(_without(w, at_rest).T, at_rest)
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
-    idle = np.column_stack([resultants, annihilated, strain @ dilatation])
+    idle = np.column_stack([resultants, annihilated, trace @ dilatation])
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
     work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
-    return Layers(factor, resultant, strain, hyper, work)
+    return Layers(factor, resultant, trace, hyper, work)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:

@@ -1,36 +1,33 @@
-"""The boundary equations of collocation, their columns exchanged so that all unknowns stand on the left."""
+"""The boundary equations of collocation with one unknown for each dof: its traction or its displacement."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.assembly import BoundaryData, fill_columns
-from bemkit.operators.collocation.columns import ColumnRun, column_runs
+from bemkit.operators.collocation.assembly import sweep_rows, write_columns
+from bemkit.operators.collocation.collocation_points import Coefficients
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries, Work
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import rotate_columns
-from bemkit.operators.steklov_poincare.prescribed import GivenData, in_plane
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Given data, and tractions and displacements by dof under them with the open displacements at rest."""
+    """Given data, and the unknowns (n_dofs,) under them with the open displacements at rest."""
 
     data: GivenData
     at_rest: FloatArray
 
 
-class ColumnExchange:
+class MixedSystem:
     """(1/2 + T) u = U t solved for every unknown but the open displacements.
 
     Parameters
@@ -54,12 +51,14 @@ class ColumnExchange:
 
     Notes
     -----
-    Columns that are multiplied by zero are neither computed nor stored: those of tractions on free directions without
-    a load, and of displacements in directions that are held at rest. Columns of given data are multiplied by them at
-    once and not stored either; loads that are no multiple of the one before take another sweep over the pairs.
+    The unknown of a dof is its displacement where the force is known, else its traction; the columns of the matrix are
+    those of the double layer there, else those of the single layer with the other sign. Columns that are multiplied by
+    zero are neither computed nor stored: those of tractions on free directions without a load, and of displacements in
+    directions that are held at rest. Columns of given data are multiplied by them at once and not stored either; loads
+    that are no multiple of the one before take another sweep over the pairs.
 
-    The equations along x come first, then those along y, so that columns are written without gaps; likewise the
-    unknowns: minus tractions where the displacement is given or open, then displacements where the traction is given.
+    The equations along x come first, then those along y, then the resultants of the tractions and the reciprocities;
+    for each of these there is one more unknown, an error of the displacement equations.
     """
 
     def __init__(
@@ -73,103 +72,117 @@ class ColumnExchange:
         slopes: bool = True,
     ) -> None:
         self._mesh, self._material, self._conditions, self._slopes = mesh, material, conditions, slopes
-        self._weights = np.repeat(mesh.lengths, 2)
-        motions = resting_motions(mesh, mesh.centres)
-        self._local_motions = rotate_columns(motions.T, conditions.frame).T
-        self._tractions, self._displacements = _in_two(~conditions.is_free), _in_two(conditions.is_free)
-        n_rows, n_tractions, opened = self._weights.size, self._tractions.size, _in_two(conditions.is_open)
-
-        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
-        self._on_traction = rotate_columns(reciprocity.on_traction, conditions.frame)
-        self._on_displacement = rotate_columns(reciprocity.on_displacement, conditions.frame)
-        errors = np.column_stack([motions, reciprocity.fields])
-        order = n_rows + errors.shape[1]
-        matrix, right = np.zeros((order, order)), np.zeros((order, opened.size), order="F")
-        frame = conditions.frame
-        single = column_runs(matrix[:n_rows, :n_tractions], self._tractions, frame)
-        double = column_runs(matrix[:n_rows, n_tractions:n_rows], self._displacements, frame)
-        data = GivenData.of(conditions, force, conditions.displacement)
-        known, work = self._sweep(data, single, [*double, *column_runs(right[:n_rows], opened, frame)])
-        matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
-        matrix[n_rows:, :n_tractions] = self._of_tractions(self._tractions)
-        matrix[n_rows:, n_tractions:n_rows] = self._of_displacements(self._displacements)
-        right[n_rows:] = self._of_displacements(opened)
-        self._factor = DenseLU(matrix, name)
-        self._response = -self._by_dof(self._factor.solve(right)[:, np.argsort(opened)])
-        work += Work(
-            single_layer=Entries.full(n_rows, n_tractions),
-            double_layer=Entries.full(n_rows, n_rows - n_tractions + opened.size),
-            factorisations=(self._factor.factorisation,),
-            right_hand_sides=opened.size,
+        self._weights, self._force = np.repeat(mesh.lengths, 2), force
+        self._free, self._fixed, self._open = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_open)
         )
-        self._force, self._base = force, _Solved(data, self._solution(data, known))
-        self._work = work + Work(right_hand_sides=1)
+        motions, reciprocity = resting_motions(mesh, mesh.centres), Reciprocity.of(mesh, material, takes_slopes=slopes)
+        self._find_balances(motions, reciprocity)
+
+        # the displacement equations with the columns of their errors, and the balances below them
+        errors = np.column_stack([motions, reciprocity.fields])
+        n_rows, order = self._weights.size, self._weights.size + errors.shape[1]
+        matrix, right = np.zeros((order, order)), np.zeros((order, self._open.size), order="F")
+        data = GivenData.of(conditions, force, conditions.displacement)
+        n_elements = mesh.n_elements
+        equations = matrix[:n_rows, :n_rows].reshape(2, n_elements, n_rows)
+        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._open.size))
+        matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
+        matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
+        right[n_rows:] = self._on_displacement[:, self._open]
+
+        self._factor = DenseLU(matrix, name)
+        self._response = -self._factor.solve(right)[:n_rows]
+        work += Work(
+            single_layer=Entries.full(n_rows, n_rows - self._free.size),
+            double_layer=Entries.full(n_rows, self._free.size + self._open.size),
+            factorisations=(self._factor.factorisation,),
+            right_hand_sides=self._open.size + 1,
+        )
+        self._work, self._base = work, _Solved(data, self._solution(data, known))
 
     def condensed(self) -> CondensedMap:
         """Return the condensed map under the first load."""
         return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
 
-    def _sweep(
-        self, data: GivenData, single: Sequence[ColumnRun] = (), double: Sequence[ColumnRun] = ()
-    ) -> tuple[FloatArray, Work]:
-        """Compute columns of unknowns, and what the given data contribute to the equations."""
-        frame, weights = self._conditions.frame, self._mesh.lengths
-        boundary_data = BoundaryData(in_plane(frame, data.force) / weights, in_plane(frame, data.displacement))
-        filled = fill_columns(self._mesh, self._material, single, double, takes_slopes=self._slopes, data=boundary_data)
-        own = np.arange(self._mesh.n_elements)
-        for run in double:
-            run.add(own, own, np.full(own.size, 0.5 + 0j), 0.0)
-        known = filled.known - 0.5 * boundary_data.displacement
-        n_rows = 2 * known.size
-        of_tractions, of_displacements = (Entries(n_rows * n) for n in (data.n_loaded, data.n_moved))
-        work = Work(element_pairs=filled.n_pairs, single_layer=of_tractions, double_layer=of_displacements)
-        return np.concatenate([known.real, known.imag]), work
-
-    def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
-        """Return the unknowns by dof, the open displacements at rest."""
-        free, fixed = (np.flatnonzero(x) for x in (self._conditions.is_free, self._conditions.is_fixed))
-        traction, displacement = data.force.ravel()[free] / self._weights[free], data.displacement.ravel()[fixed]
-        balances = self._of_tractions(free) @ traction - self._of_displacements(fixed) @ displacement
-        return self._by_dof(self._factor.solve(np.concatenate([known, balances])))
-
-    def _of_tractions(self, dofs: IntArray) -> FloatArray:
-        """Return the resultants of tractions, and their part in the reciprocities: (n_balances, n_dofs).
+    def _find_balances(self, motions: FloatArray, reciprocity: Reciprocity) -> None:
+        """Find on_traction @ t == on_displacement @ u for resultants and reciprocities, (n_balances, n_dofs) each.
 
         Resultants are of the size of the displacements that they cause: equations of one size are all solved to
         round-off; larger ones would gather that of their pivots.
         """
-        material = self._material
+        material, frame = self._material, self._conditions.frame
         compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
-        resultants = (self._local_motions[dofs] * (compliance * self._weights)[dofs, None]).T
-        return np.concatenate([resultants, self._on_traction[:, dofs]])
+        resultants = motions.T * (compliance * self._weights)
+        on_traction = np.concatenate([resultants, reciprocity.on_traction])
+        on_displacement = np.concatenate([np.zeros(resultants.shape), reciprocity.on_displacement])
+        self._on_traction, self._on_displacement = (rotate_columns(x, frame) for x in (on_traction, on_displacement))
 
-    def _of_displacements(self, dofs: IntArray) -> FloatArray:
-        """Return the part of displacements in the same equations, (n_balances, n_dofs); resultants have none."""
-        none = np.zeros((self._local_motions.shape[1], dofs.size))
-        return np.concatenate([none, self._on_displacement[:, dofs]])
+    def _sweep(
+        self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
+    ) -> tuple[FloatArray, Work]:
+        """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
 
-    def _by_dof(self, unknowns: FloatArray) -> FloatArray:
-        """Sort the unknowns by dof: tractions where the displacement is given or open, else displacements."""
-        result: FloatArray = np.empty((self._weights.size, *unknowns.shape[1:]))
-        n_tractions = self._tractions.size
-        result[self._tractions] = -unknowns[:n_tractions]
-        result[self._displacements] = unknowns[n_tractions : self._weights.size]
-        return result
+        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_open) those of open
+        displacements.
+        """
+        n, n_rows, frame = self._mesh.n_elements, self._weights.size, self._conditions.frame
+        loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
+        traction, displacement = data.force.ravel()[loaded] / self._weights[loaded], data.displacement.ravel()[moved]
+        unknown = np.zeros(0, np.intp) if matrix is None else np.flatnonzero(~self._conditions.is_free)
+        # elements with tractions, and the numbers of their dofs among those of all of them
+        loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
+        number = np.zeros(n_rows, np.intp)
+        number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
+        known = np.zeros((2, n))
+
+        def store(rows: slice, block: Coefficients) -> None:
+            n_chunk = rows.stop - rows.start
+            single = np.empty((2, n_chunk, 2 * loaded_elements.size))
+            on, on_conjugate = block.on_traction[:, loaded_elements], block.on_conjugate_traction[:, loaded_elements]
+            _write(on, on_conjugate, frame[loaded_elements], single)
+            known[:, rows] += _product(single[:, :, number[loaded]], traction)
+            if not needs_double:
+                return
+            block.on_displacement[np.arange(n_chunk), np.arange(rows.start, rows.stop)] += 0.5
+            double = np.empty((2, n_chunk, n_rows)) if matrix is None else matrix[:, rows]
+            _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
+            known[:, rows] -= _product(double[:, :, moved], displacement)
+            if right is not None:
+                right[:, rows] = double[:, :, self._open]
+                double[:, :, unknown] = -single[:, :, number[unknown]]
+
+        needs_double, needs_single = matrix is not None or moved.size > 0, np.zeros(n, bool)
+        needs_single[loaded_elements] = True
+        n_pairs = sweep_rows(
+            self._mesh,
+            self._material,
+            store,
+            needs_single=needs_single,
+            needs_double=needs_double,
+            takes_slopes=self._slopes,
+        )
+        of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
+        return known.ravel(), Work(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
+
+    def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
+        """Return the unknowns (n_dofs,), the open displacements at rest."""
+        traction, displacement = data.force.ravel() / self._weights, data.displacement.ravel()
+        balances = self._on_traction @ traction - self._on_displacement @ displacement
+        return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
 
     def _condensed(self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: Work) -> CondensedMap:
         """Return the condensed map under data that are a multiple of others, for which the equations are solved."""
         at_rest = factor * base.at_rest
         conditions, weights, response = self._conditions, self._weights, self._response
-        is_open, fixed = np.flatnonzero(conditions.is_open), np.flatnonzero(conditions.is_fixed)
         traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / weights
-        is_traction, given = ~conditions.is_free.ravel(), data.displacement.ravel()
+        is_free, given = conditions.is_free.ravel(), data.displacement.ravel()
 
         def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
             unknowns = at_rest + response @ open_displacement
-            local = np.where(is_traction, 0.0, unknowns)
-            local[fixed] = given[fixed]
-            local[is_open] = open_displacement
-            local_force = weights * np.where(is_traction, unknowns, traction)
+            local = np.where(is_free, unknowns, given)
+            local[self._open] = open_displacement
+            local_force = weights * np.where(is_free, traction, unknowns)
             displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(-1, 2))
             return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(-1, 2))
 
@@ -185,11 +198,27 @@ class ColumnExchange:
             solved = _Solved(other, self._solution(other, known))
             return self._condensed(force, other, solved, 1.0, work + Work(right_hand_sides=1))
 
-        own = weights[is_open]
-        load = own * (traction[is_open] - at_rest[is_open])
-        return CondensedMap(own[:, None] * response[is_open], load, recover, under, follow, work=work)
+        own = weights[self._open]
+        load = own * (traction[self._open] - at_rest[self._open])
+        return CondensedMap(own[:, None] * response[self._open], load, recover, under, follow, work=work)
 
 
-def _in_two(chosen: BoolArray) -> IntArray:
-    """Return the dofs of some directions (n_elements, 2): the first directions first, then the others."""
-    return np.concatenate([2 * np.flatnonzero(chosen[:, 0]), 2 * np.flatnonzero(chosen[:, 1]) + 1])
+def _dofs(elements: IntArray) -> IntArray:
+    return (2 * elements[:, None] + np.arange(2)).ravel()
+
+
+def _write(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, frame: FloatArray, columns: FloatArray) -> None:
+    """Write v -> on v + on_conjugate conj(v) into columns (2, n_rows, n_dofs), v in the frames of the elements."""
+    x, y = columns.reshape(2, len(on), -1, 2)
+    write_columns(on, on_conjugate, x, y)
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    for component in (x, y) if turned.size else ():
+        along_x, along_y = component[:, turned, 0], component[:, turned, 1]
+        for k in range(2):
+            component[:, turned, k] = along_x * frame[turned, k, 0] + along_y * frame[turned, k, 1]
+
+
+def _product(columns: FloatArray, values: FloatArray) -> FloatArray:
+    """Return columns (2, n_rows, n) times values, without BLAS, whose threads would wait for those of the sweep."""
+    product: FloatArray = np.einsum("crn,n->cr", columns, values)
+    return product

@@ -18,8 +18,7 @@ from bemkit.operators.linear.solvers import Choice, Krylov
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import possible_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.prescribed import GivenData
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 _BYTES = 8
 

@@ -1,4 +1,4 @@
-"""What is known at the displacement nodes of a body: fixed, free or open directions."""
+"""What is known at the displacement nodes of a body: fixed, free or open directions, forces and displacements."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
+from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import possible_motions, rigid_motions
@@ -22,6 +23,11 @@ HELD = 1e-6
 """A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
 from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
 with a million times the load holds nothing."""
+_SAME = 4.0 * np.finfo(float).eps
+"""Relative difference of two loads that the product with a load factor may leave."""
+
+TractionField = Callable[[FloatArray, FloatArray], FloatArray]
+"""Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
 
 
 class ConflictingSupportsError(InputError):
@@ -78,6 +84,86 @@ class NodalConditions:
         """Directions whose force is known, (n_nodes, 2)."""
         free: BoolArray = ~(self.is_fixed | self.is_open)
         return free
+
+
+@dataclass(frozen=True, eq=False)
+class GivenData:
+    """Forces on free directions and displacements of fixed ones, in the frames of the nodes.
+
+    Parameters
+    ----------
+    force : (n_nodes, 2) array [N/m]
+        Zero on directions that are not free.
+    displacement : (n_nodes, 2) array [m]
+        Zero on directions that are not fixed.
+    """
+
+    force: FloatArray
+    displacement: FloatArray
+
+    @classmethod
+    def of(cls, conditions: NodalConditions, force: FloatArray, displacement: FloatArray) -> GivenData:
+        """Return the data of nodal forces in x and y, and of displacements in the frames."""
+        local = np.einsum("nkc,nc->nk", conditions.frame, force)
+        return cls(np.where(conditions.is_free, local, 0.0), np.where(conditions.is_fixed, displacement, 0.0))
+
+    @property
+    def n_loaded(self) -> int:
+        """Number of directions with a force."""
+        return int(np.count_nonzero(self.force))
+
+    @property
+    def n_moved(self) -> int:
+        """Number of directions with a displacement."""
+        return int(np.count_nonzero(self.displacement))
+
+    def factor_of(self, base: GivenData) -> float | None:
+        """Return the factor by which these data are a multiple of others, None if they are none."""
+        own, other = (np.concatenate([data.force.ravel(), data.displacement.ravel()]) for data in (self, base))
+        if not own.any():
+            return 0.0
+        k = int(np.argmax(np.abs(other)))
+        factor = float(own[k] / other[k]) if other[k] else 0.0
+        return factor if np.all(np.abs(own - factor * other) <= _SAME * np.abs(own)) else None
+
+
+def integrate_traction(space: BoundarySpace, elements: IntArray, field: TractionField) -> FloatArray:
+    """Return the consistent nodal forces (n_nodes, 2) [N/m] of tractions on some elements.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        Its scalar basis functions are what the tractions are integrated against.
+    elements : (m,) int array
+    field : callable
+        See `TractionField`.
+    """
+    points, weights = gauss_legendre(space.degree + 5)  # exact for tractions up to the ninth power of the coordinates
+    places = space.mesh.points(elements, points)
+    normals = space.mesh.normals_at(elements, points)
+    values = field(places.reshape(-1, 2), normals.reshape(-1, 2)).reshape(places.shape)
+    measure = space.mesh.jacobian(elements, points) * weights
+    local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
+    result = np.zeros((space.n_dofs // 2, 2))
+    np.add.at(result, space.element_dofs[elements], local)
+    return result
+
+
+def rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
+    """Express the columns (2 * node + component) of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    if not turned.size:
+        return matrix
+    result = matrix.copy()
+    x, y = matrix[:, 2 * turned], matrix[:, 2 * turned + 1]
+    for k in range(2):
+        result[:, 2 * turned + k] = frame[turned, k, 0] * x + frame[turned, k, 1] * y
+    return result
+
+
+def rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
+    """Express the rows (2 * node + component) of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
+    return rotate_columns(matrix.T, frame).T
 
 
 def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditions:

@@ -13,9 +13,6 @@ from bemkit.operators.linear.block_cg import Iterations
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
-TractionField = Callable[[FloatArray, FloatArray], FloatArray]
-"""Tractions on the boundary: (n, 2) points [m] and (n, 2) outward unit normals there -> (n, 2) values [Pa]."""
-
 
 @dataclass(frozen=True, eq=False)
 class CondensedMap:
@@ -60,7 +57,7 @@ class CondensedMap:
 
 
 class SteklovPoincare(Protocol):
-    """The elastic body seen from its boundary: weak forces = matrix @ displacements."""
+    """The elastic body seen from its boundary: nodal forces that go with displacements."""
 
     @property
     def material(self) -> Material:
@@ -73,12 +70,6 @@ class SteklovPoincare(Protocol):
     @property
     def traction_space(self) -> BoundarySpace:
         """The space of the tractions."""
-
-    def matrix(self) -> FloatArray:
-        """Return the weak (n_dofs, n_dofs) matrix [Pa]; its forces are in equilibrium."""
-
-    def nodal_forces(self, elements: IntArray, traction: TractionField) -> FloatArray:
-        """Return the (n_nodes, 2) nodal forces [N/m] of a traction field [Pa] on some elements."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""

@@ -10,8 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.counts import Work
 from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.operators.steklov_poincare.nodes import rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
 

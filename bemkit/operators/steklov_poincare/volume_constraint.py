@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Factor
-from bemkit.operators.steklov_poincare.nodes import rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import rotate_rows
 
 
 @dataclass(frozen=True, eq=False)

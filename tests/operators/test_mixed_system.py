@@ -1,4 +1,4 @@
-"""Collocation column by column: the same answers as with whole matrices, and nothing computed that zero multiplies."""
+"""Collocation with one unknown for each dof: the answers of whole matrices, nothing computed that zero multiplies."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import pytest
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, Ring, discretise
 from bemkit.geometry.spaces import corner_nodes
-from bemkit.operators.collocation.assembly import collocation_matrices, fill_columns
-from bemkit.operators.collocation.columns import column_runs
+from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
-from bemkit.operators.steklov_poincare import CollocationMap
+from bemkit.operators.steklov_poincare.maps import CollocationMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from tests.operators.test_curved import composite
 
@@ -71,11 +70,7 @@ def whole_equations(
 
 def with_slopes(mesh: BoundaryMesh) -> FloatArray:
     """Return the double layer of displacements with slopes as one matrix."""
-    n = mesh.n_elements
-    matrix = np.empty((2 * n, 2 * n))
-    dofs = np.arange(2 * n).reshape(n, 2).T.ravel()
-    fill_columns(mesh, MATERIAL, [], column_runs(matrix, dofs, np.tile(np.eye(2), (n, 1, 1))), takes_slopes=True)
-    return matrix.reshape(2, n, 2, n).transpose(1, 0, 3, 2).reshape(2 * n, 2 * n)
+    return collocation_matrices(mesh, MATERIAL, takes_slopes=True)[1]
 
 
 def slopes_of(mesh: BoundaryMesh) -> FloatArray:

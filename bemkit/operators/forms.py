@@ -1,0 +1,217 @@
+"""The bilinear forms of plane elasticity on boundary spaces, as combinations of scalar integrals over element pairs.
+
+With r = y - x, Q = r r^T / |r|^2, J = [[0, 1], [-1, 0]], mu the shear modulus, nu the (effective) Poisson ratio, d/ds
+the tangential derivative and k the Laplace double layer kernel, for continuous u on closed curves:
+
+    <V t, q> = 1 / (8 pi mu (1 - nu)) int int q^T (-(3 - 4 nu) log(|r| / r0) I + Q) t
+    <K u, q> = int int k q^T u + 1 / (4 pi (1 - nu)) int int q^T ((1 - 2 nu) J log|r| + J Q) du/ds
+    <W u, v> = mu / (2 pi (1 - nu)) int int dv/ds^T (-log|r| I + Q) du/ds
+
+so that all of them are combinations of the scalar integrals of `integrals`. The forms are those of [Steinbach2008] and
+[SauterSchwab2011], K and W integrated by parts after [Han1994].
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.spaces import BoundarySpace, local_coefficients
+from bemkit.operators.assembly import Block, Tensor, TrialTerm
+from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.material import Material
+
+
+class Tag(enum.Enum):
+    """Promises about an operator; `bemkit.testing.check_operator` proves each one."""
+
+    SYMMETRIC = "symmetric"
+    POSITIVE_DEFINITE = "positive definite"
+    POSITIVE_SEMIDEFINITE = "positive semidefinite"
+    KILLS_RIGID_MOTIONS = "zero on rigid motions"
+    KILLS_TRANSLATIONS = "zero on translations"
+
+
+def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:
+    """Raise GeometryError unless two spaces live on one mesh."""
+    if trial.mesh is not test.mesh:
+        msg = "trial and test space live on different meshes: build both on the same BoundaryMesh object"
+        raise GeometryError(msg)
+
+
+@dataclass(frozen=True, eq=False)
+class _PairForm:
+    """A form <A trial, test>; see `bemkit.operators.assembly.PairForm` for what subclasses say."""
+
+    trial: BoundarySpace
+    test: BoundarySpace
+    material: Material
+
+    def __post_init__(self) -> None:
+        require_one_mesh(self.trial, self.test)
+
+
+def _derivative(coefficients: FloatArray) -> FloatArray:
+    """Return the monomial coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
+    n = coefficients.shape[1]
+    if n == 1:
+        return np.zeros_like(coefficients)
+    return coefficients[:, 1:] * np.arange(1, n)
+
+
+@dataclass(frozen=True, eq=False)
+class SingleLayerForm(_PairForm):
+    """V: traction -> displacement."""
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Symmetric and definite on one space; a uniform pressure does not deform an incompressible body: V n = 0."""
+        is_one = self.trial is self.test
+        return definite(self.trial, self.material.effective_poisson_ratio < 0.5) if is_one else frozenset()
+
+    @property
+    def degrees(self) -> Degrees:
+        """The integrals it needs."""
+        return Degrees(log=(self.test.degree, self.trial.degree))
+
+    @property
+    def test_coefficients(self) -> FloatArray:
+        """Those of the basis."""
+        return local_coefficients(self.test)
+
+    def trial_terms(self) -> list[TrialTerm]:
+        """Return the one term of V."""
+        return [TrialTerm(local_coefficients(self.trial), self._tensor)]
+
+    def _tensor(self, block: Block, a: int, b: int) -> Tensor:
+        nu = self.material.effective_poisson_ratio
+        factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
+        quotient = block.integrals.quotient[a, b]
+        diagonal = (-factor * (3.0 - 4.0 * nu)) * block.integrals.log[a, b]
+        diagonal += (factor * ((3.0 - 4.0 * nu) * block.log_scale + 0.5)) * block.mass(a, b)
+        half_difference, off = (0.5 * factor) * quotient.real, (0.5 * factor) * quotient.imag
+        return diagonal + half_difference, off, off, diagonal - half_difference
+
+
+@dataclass(frozen=True, eq=False)
+class DoubleLayerForm(_PairForm):
+    """K: displacement -> displacement, for continuous displacements."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_continuous(self.trial, "double_layer", "trial")
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """None."""
+        return frozenset()
+
+    @property
+    def degrees(self) -> Degrees:
+        """The integrals it needs."""
+        test, trial = self.test.degree, self.trial.degree
+        return Degrees(log=(test, trial - 1), double=(test, trial))
+
+    @property
+    def test_coefficients(self) -> FloatArray:
+        """Those of the basis."""
+        return local_coefficients(self.test)
+
+    def trial_terms(self) -> list[TrialTerm]:
+        """Return the scalar double layer of u, and the kernels that act on du/ds."""
+        coefficients = local_coefficients(self.trial)
+        return [TrialTerm(coefficients, self._scalar), TrialTerm(_derivative(coefficients), self._slope)]
+
+    def _scalar(self, block: Block, a: int, b: int) -> Tensor:
+        diagonal = block.integrals.double[a, b]
+        return diagonal, None, None, diagonal
+
+    def _slope(self, block: Block, a: int, b: int) -> Tensor:
+        nu = self.material.effective_poisson_ratio
+        factor = 1.0 / (4.0 * np.pi * (1.0 - nu)) / block.trial_half
+        log = (factor * (1.0 - 2.0 * nu)) * block.integrals.log[a, b]
+        half_quotient = (0.5 * factor) * block.integrals.quotient[a, b]
+        real, imaginary = half_quotient.real, half_quotient.imag
+        return imaginary, log - real, -(log + real), -imaginary
+
+
+@dataclass(frozen=True, eq=False)
+class HypersingularForm(_PairForm):
+    """W: displacement -> traction, for continuous displacements."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _require_continuous(self.trial, "hypersingular", "trial")
+        _require_continuous(self.test, "hypersingular", "test")
+
+    @property
+    def tags(self) -> frozenset[Tag]:
+        """Symmetric on one space; the rotation of a curved element is no polynomial, hence not in the space."""
+        is_straight = bool(self.trial.mesh.is_straight.all())
+        kernel = Tag.KILLS_RIGID_MOTIONS if is_straight else Tag.KILLS_TRANSLATIONS
+        symmetric = {Tag.SYMMETRIC, Tag.POSITIVE_SEMIDEFINITE} if self.trial is self.test else set[Tag]()
+        return frozenset(symmetric | {kernel})
+
+    @property
+    def degrees(self) -> Degrees:
+        """The integrals it needs."""
+        return Degrees(log=(self.test.degree - 1, self.trial.degree - 1))
+
+    @property
+    def test_coefficients(self) -> FloatArray:
+        """Those of the derivative of the basis."""
+        return _derivative(local_coefficients(self.test))
+
+    def trial_terms(self) -> list[TrialTerm]:
+        """Return the one term of W, on du/ds and dv/ds."""
+        return [TrialTerm(_derivative(local_coefficients(self.trial)), self._tensor)]
+
+    def _tensor(self, block: Block, a: int, b: int) -> Tensor:
+        nu = self.material.effective_poisson_ratio
+        factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - nu)) / (block.test_half * block.trial_half)
+        log = -factor * block.integrals.log[a, b]
+        half_quotient = (0.5 * factor) * block.integrals.quotient[a, b]
+        real, imaginary = half_quotient.real, half_quotient.imag
+        return log + real, imaginary, imaginary, log - real
+
+
+def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:
+    """Return the tags of a symmetric operator that is positive but on dofs that are zero by symmetry."""
+    is_definite = is_positive and not vanishing_dofs(space).any()
+    return frozenset({Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE if is_definite else Tag.POSITIVE_SEMIDEFINITE})
+
+
+def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
+    if not space.is_continuous:
+        msg = (
+            f"{operator} needs a continuous {role} space, but {type(space).__name__} may jump: "
+            "take LinearSpace(mesh) or QuadraticSpace(mesh) without broken nodes"
+        )
+        raise GeometryError(msg)
+
+
+def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the entries of the identity <u, q> with their rows and columns, (n,) each; entries at one place add up."""
+    require_one_mesh(trial, test)
+    points, weights = gauss_legendre(test.degree + trial.degree + 1)
+    local = (test.basis(points) * weights) @ trial.basis(points).T
+    values = (0.5 * test.mesh.lengths)[:, None, None, None] * local[:, :, None] * np.ones(2)
+    component = np.arange(2)
+    rows = 2 * test.element_dofs[:, :, None, None] + component + np.zeros_like(values, np.intp)
+    columns = 2 * trial.element_dofs[:, None, :, None] + component + np.zeros_like(values, np.intp)
+    values[vanishing_dofs(test)[rows] | vanishing_dofs(trial)[columns]] = 0.0
+    return values.ravel(), rows.ravel(), columns.ravel()
+
+
+def mass_product(trial: BoundarySpace, test: BoundarySpace, functions: FloatArray) -> FloatArray:
+    """Return <u, q> for all test functions q: (test.n_dofs, m), u in the columns of (trial.n_dofs, m)."""
+    values, rows, columns = mass_entries(trial, test)
+    result = np.zeros((test.n_dofs, functions.shape[1]))
+    np.add.at(result, rows, values[:, None] * functions[columns])
+    return result
