@@ -114,7 +114,7 @@ class PairOperator(_DenseOperator):
     @property
     @abstractmethod
     def test_coefficients(self) -> FloatArray:
-        """(n_local, n_powers) monomial coefficients on the test element."""
+        """(n_local, n_polynomials) Legendre coefficients on the test element."""
 
     @abstractmethod
     def trial_terms(self) -> list[TrialTerm]:
@@ -125,11 +125,8 @@ class PairOperator(_DenseOperator):
 
 
 def _derivative(coefficients: FloatArray) -> FloatArray:
-    """Return the monomial coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
-    n = coefficients.shape[1]
-    if n == 1:
-        return np.zeros_like(coefficients)
-    return coefficients[:, 1:] * np.arange(1, n)
+    """Return the Legendre coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
+    return np.asarray(np.polynomial.legendre.legder(coefficients, axis=1), np.float64)
 
 
 class SingleLayer(PairOperator):

@@ -53,7 +53,7 @@ def this_machine() -> Machine:
     small = np.linspace(0.0, 1.0, 50)
 
     def evaluate() -> None:
-        kernels.far_moments(points, 1, kernels.terms_needed(16.0))
+        kernels.far_integrals(points, 1, kernels.terms_needed(16.0))
         kernels.far_log_product(points)
 
     def call() -> None:
