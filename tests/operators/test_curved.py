@@ -105,9 +105,9 @@ def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
             inner = inner_integrals(panels, Degrees(log=(0, 12), double=(0, 12)), np.array([0]), *from_ends)
             ends = [-1, real, 1] if -1 < real < 1 else [-1, 1]
             for b in (0, 1, 5, 12):
-                # the arc is known to the round-off of its coordinates, eps R / half length = eps n / pi; the upward
-                # recurrence of high degrees adds to it
-                tolerance = 2e-15 * (n_elements + 10) * (1.0 + 0.1 * b)
+                # the arc is known to the round-off of its coordinates, eps R / half length = eps n / pi; next to
+                # an end P_b, whose slope is b (b + 1) / 2 there, magnifies the round-off of the parameter
+                tolerance = 2e-15 * (n_elements + 10 + b * (b + 1) / 2)
                 log, quotient, angle = (mpmath.quad(partial(f, place, x, bend, b), ends) for f in INTEGRANDS)
                 assert inner.log[b][0] == pytest.approx(float(log), abs=tolerance)
                 assert inner.quotient[b][0] == pytest.approx(complex(quotient), abs=tolerance)
