@@ -49,18 +49,18 @@ class BoundarySpace(Protocol):
 
 
 def local_coefficients(space: BoundarySpace) -> FloatArray:
-    """Return the monomial coefficients of the local basis.
+    """Return the Legendre coefficients of the local basis.
 
     Returns
     -------
     (n_local, degree + 1) array
-        Row p holds the coefficients of xi**0 ... xi**degree of the local basis function p.
+        Row p holds the coefficients of P_0 ... P_degree of the local basis function p.
     """
     n = space.degree + 1
-    xi = np.cos((np.arange(n) + 0.5) * np.pi / n)
-    vandermonde = np.vander(xi, n, increasing=True)
-    coefficients: FloatArray = np.linalg.solve(vandermonde, space.basis(xi).T).T
-    coefficients[np.abs(coefficients) < 1e-14] = 0.0  # round-off of the solve; keeps sums free of empty terms
+    xi, weights = np.polynomial.legendre.leggauss(n)
+    polynomials = np.polynomial.legendre.legvander(xi, space.degree)
+    coefficients: FloatArray = (space.basis(xi) * weights) @ polynomials * (np.arange(n) + 0.5)
+    coefficients[np.abs(coefficients) < 1e-14] = 0.0  # round-off; keeps sums free of empty terms
     return coefficients
 
 

@@ -1,7 +1,7 @@
 """Assembly of bilinear forms: one sweep over the element pairs serves all matrices that are wanted.
 
-A form is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of powers of the local
-coordinates, weighted by the monomial coefficients of the local test and trial functions. Its columns are gathered
+A form is a sum of 2 x 2 tensors of scalar integrals, one for each pair (a, b) of Legendre polynomials of the local
+coordinates, weighted by the Legendre coefficients of the local test and trial functions. Its columns are gathered
 first, in a buffer of a few rows of elements, so that the large matrix is written once.
 
 On a mesh with a symmetry the rows are those of the mesh, the trial elements those of the whole body, and the columns of
@@ -44,7 +44,7 @@ class Block:
         self.log_scale = log_scale
 
     def mass(self, a: int, b: int) -> FloatArray:
-        """Return the integrals of xi**a t**b themselves, (n_rows, n_trial)."""
+        """Return the integrals of P_a(xi) P_b(t) themselves, (n_rows, n_trial)."""
         constant = kernels.interval_moment(a) * kernels.interval_moment(b)
         return constant * (self.test_half * self.trial_half)
 
@@ -55,10 +55,10 @@ class TrialTerm:
 
     Parameters
     ----------
-    coefficients : (n_local, n_powers) array
-        Monomial coefficients of what the kernel acts on: the trial functions or their derivatives.
+    coefficients : (n_local, n_polynomials) array
+        Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
     tensor : callable
-        (block, a, b) -> the 2 x 2 tensor of integrals of the powers a (test) and b (trial).
+        (block, a, b) -> the 2 x 2 tensor of integrals of P_a (test) and P_b (trial).
     """
 
     coefficients: FloatArray
@@ -90,7 +90,7 @@ class PairForm(Protocol):
 
     @property
     def test_coefficients(self) -> FloatArray:
-        """(n_local, n_powers) monomial coefficients on the test element."""
+        """(n_local, n_polynomials) Legendre coefficients on the test element."""
 
     def trial_terms(self) -> list[TrialTerm]:
         """Return the parts that share the test coefficients."""
@@ -196,7 +196,7 @@ class _Target:
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
     def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:
-        """Return, for each power a on the test elements, the four components by element row and trial dof."""
+        """Return, for each degree a on the test elements, the four components by element row and trial dof."""
         n_rows = block.test_half.shape[0]
         result = []
         for a in range(self.test_coefficients.shape[1]):

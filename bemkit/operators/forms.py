@@ -58,11 +58,8 @@ class _PairForm:
 
 
 def _derivative(coefficients: FloatArray) -> FloatArray:
-    """Return the monomial coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
-    n = coefficients.shape[1]
-    if n == 1:
-        return np.zeros_like(coefficients)
-    return coefficients[:, 1:] * np.arange(1, n)
+    """Return the Legendre coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
+    return np.asarray(np.polynomial.legendre.legder(coefficients, axis=1), np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,24 @@
 r"""Formulas only: polynomial densities on one straight element, seen from a point.
 
 Complex notation. The element runs from a to b with unit tangent tau, half length l and centre c; a point x has the
-local coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. With
+local coordinate zeta = (x - c) / (l tau), so that the element is the interval [-1, 1]. With the Legendre polynomials
+P_k and their Cauchy integrals
 
-    T_k = int_{-1}^{1} t^k / (zeta - t) dt,    T_0 = log((zeta + 1) / (zeta - 1)),    T_k = zeta T_{k-1} - m_{k-1},
+    C_k = int_{-1}^{1} P_k(t) / (zeta - t) dt = 2 Q_k(zeta),    C_0 = log((zeta + 1) / (zeta - 1)),
 
-(m_k = int t^k dt) every integral that elasticity needs is a short combination, for rho = x - y:
+(Q_k is the Legendre function of the second kind; [DLMF, 14.12.13]) every integral that elasticity needs is a short
+combination, for rho = x - y and m_k = int P_k dt, which is 2 for k = 0 and 0 otherwise:
 
-    int t^k log|rho| ds        = l (m_k log l + [log|zeta - 1| - (-1)^{k+1} log|zeta + 1| + Re T_{k+1}] / (k + 1))
-    int t^k rho / conj(rho) ds = l tau^2 (m_k + 2 i eta conj(T_k)),   eta = Im zeta
-    int t^k k(x, y) ds         = Im T_k / (2 pi),   k = -(1/2 pi) d log|rho| / dn_y the Laplace double layer
+    int P_k log|rho| ds        = l (m_k log l + Re (C_{k+1} - C_{k-1}) / (2 k + 1)),   k > 0
+                               = l (m_k log l + log|zeta^2 - 1| + Re C_1),             k = 0
+    int P_k rho / conj(rho) ds = l tau^2 (m_k + 2 i eta conj(C_k)),   eta = Im zeta
+    int P_k k(x, y) ds         = Im C_k / (2 pi),   k = -(1/2 pi) d log|rho| / dn_y the Laplace double layer
 
-The recursion loses digits like |zeta|^(2k), so far points take the series of the highest T and recurse downwards.
+The C_k satisfy the recurrence of the P_k, (k + 1) C_{k+1} = (2 k + 1) zeta C_k - k C_{k-1}, of which they are the
+smallest solution: upward it loses digits like r^(2 k), with r = |zeta + sqrt(zeta^2 - 1)| the sum of the half axes of
+the ellipse through zeta with foci -1 and 1, and downward it gains them. So points close to the element take it upward
+from the logarithm, the others downward as a continued fraction ([DLMF, 3.6]), and points far away from the power
+series of the two highest.
 """
 
 from __future__ import annotations
@@ -23,13 +30,16 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 
-FAR = 6.0
-"""Local distance |zeta| beyond which the series replaces the logarithms."""
+LOST = 30.0
+"""Factor of round-off that the upward recurrence may lose before the downward one takes over."""
+BANDS = (1.6, 3.0, 1.0e2, math.inf)
+"""Upper ends of the bands of r whose points go downward together, in as many steps as the lower end needs."""
+DIGITS = 17.0
 
 
 def interval_moment(k: int) -> float:
-    """Return m_k, the integral of t**k over [-1, 1]."""
-    return 2.0 / (k + 1) if k % 2 == 0 else 0.0
+    """Return m_k, the integral of P_k over [-1, 1]."""
+    return 2.0 if k == 0 else 0.0
 
 
 def terms_needed(distance: float) -> int:
@@ -37,8 +47,8 @@ def terms_needed(distance: float) -> int:
     return max(1, math.ceil(16.5 / (2.0 * math.log10(distance))))
 
 
-def far_moments(zeta: ComplexArray, highest: int, n_terms: int) -> list[ComplexArray]:
-    """Return T_0 ... T_highest at points far from the element.
+def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> list[ComplexArray]:
+    """Return C_0 ... C_highest at points far from the element.
 
     Parameters
     ----------
@@ -47,26 +57,42 @@ def far_moments(zeta: ComplexArray, highest: int, n_terms: int) -> list[ComplexA
     highest : int
         At least 1.
     n_terms : int
-        Terms of the series T_k = sum over j with j + k even of 2 / (j + k + 1) zeta**(-j-1).
+        Terms of the power series in 1 / zeta**2.
 
     Returns
     -------
     list of complex arrays
-        T_0 ... T_highest, each to relative round-off.
+        C_0 ... C_highest, each to relative round-off.
     """
     inverse = 1.0 / zeta
     w = inverse * inverse
-    first = highest % 2  # the smallest j with j + highest even
-    series = np.full_like(zeta, 2.0 / (first + 2 * (n_terms - 1) + highest + 1))
-    for term in range(n_terms - 2, -1, -1):
-        series *= w
-        series += 2.0 / (first + 2 * term + highest + 1)
-    series *= inverse if first == 0 else w
-    moments = [series]
-    for k in range(highest - 1, -1, -1):
-        constant = interval_moment(k)
-        moments.append((moments[-1] + constant) * inverse if constant else moments[-1] * inverse)
-    return moments[::-1]
+    power = inverse
+    for _ in range(highest - 1):
+        power = power * inverse
+    below, top = (_series(k, w, n_terms) for k in (highest - 1, highest))
+    below *= power
+    top *= power
+    top *= inverse
+    integrals = [top, below]
+    for k in range(highest - 1, 0, -1):
+        lower = ((2 * k + 1) / k) * zeta
+        lower *= integrals[-1]
+        lower -= ((k + 1) / k) * integrals[-2]
+        integrals.append(lower)
+    return integrals[::-1]
+
+
+def _series(k: int, w: ComplexArray, n_terms: int) -> ComplexArray:
+    """Return zeta**(k + 1) C_k as a power series in w = 1 / zeta**2 [DLMF, 14.3.7 and 15.2.1]."""
+    coefficients = [2.0 * math.factorial(k) / math.prod(range(1, 2 * k + 2, 2))]
+    for j in range(n_terms - 1):
+        factor = (k + 1 + 2 * j) * (k + 2 + 2 * j) / (2.0 * (j + 1) * (2 * k + 3 + 2 * j))
+        coefficients.append(coefficients[-1] * factor)
+    result = np.full_like(w, coefficients[-1])
+    for coefficient in coefficients[-2::-1]:
+        result *= w
+        result += coefficient
+    return result
 
 
 def far_log_product(zeta: ComplexArray) -> FloatArray:
@@ -80,65 +106,110 @@ def far_log_product(zeta: ComplexArray) -> FloatArray:
     return squared
 
 
-def near_moments(
-    plus: ComplexArray, minus: ComplexArray, highest: int
-) -> tuple[list[ComplexArray], FloatArray, FloatArray]:
-    """Return the moments at points at any distance from the element, exact to round-off.
+def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple[list[ComplexArray], FloatArray]:
+    """Return the Cauchy integrals at points at any distance from the element, exact to round-off.
 
     Parameters
     ----------
     plus, minus : (n,) complex arrays
         zeta + 1 and zeta - 1, each formed from the distance to its own end point so that it is exact near that end.
     highest : int
-        Highest moment.
+        Highest degree.
 
     Returns
     -------
-    moments : list of (n,) complex arrays
-        T_0 ... T_highest.
-    log_minus, log_plus : (n,) arrays
-        log|zeta - 1| and log|zeta + 1|.
-
-    Notes
-    -----
-    The angle theta = -Im T_0 is the one under which the element is seen, in (-pi, pi].
+    integrals : list of (n,) complex arrays
+        C_0 ... C_highest. The angle -Im C_0 is the one under which the element is seen, in (-pi, pi].
+    log_product : (n,) array
+        log|zeta**2 - 1|.
     """
     abs_plus, abs_minus = np.abs(plus), np.abs(minus)
     log_plus, log_minus = np.log(abs_plus), np.log(abs_minus)
-    near_a = abs_plus < abs_minus
-    eta = np.where(near_a, plus.imag, minus.imag)
-    zeta = np.where(near_a, plus - 1.0, minus + 1.0)
+    near_start = abs_plus < abs_minus
+    eta = np.where(near_start, plus.imag, minus.imag)
+    zeta = np.where(near_start, plus - 1.0, minus + 1.0)
     xi = zeta.real
-    # |zeta+1|^2 - |zeta-1|^2 = 4 xi: log1p keeps the digits of the difference of two nearly equal logarithms
+    # |zeta + 1|^2 - |zeta - 1|^2 = 4 xi: log1p keeps the digits of the difference of two nearly equal logarithms
     ratio = np.divide(
         4.0 * xi, abs_minus * abs_minus, out=np.zeros_like(xi), where=np.abs(xi) < abs_minus * abs_minus / 8.0
     )
     lam = np.where(ratio != 0.0, 0.5 * np.log1p(ratio), log_plus - log_minus)
     theta = np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta)
-    moments: list[ComplexArray] = [lam - 1j * theta]
-    for k in range(1, highest + 1):
-        moments.append(zeta * moments[-1] - interval_moment(k - 1))
-    far = np.minimum(abs_plus, abs_minus) > FAR
-    if far.any():
-        for k, moment in enumerate(far_moments(zeta[far], max(highest, 1), terms_needed(FAR - 1.0))[: highest + 1]):
-            moments[k][far] = moment
-    return moments, log_minus, log_plus
+    integrals: list[ComplexArray] = [lam - 1j * theta]
+    if highest:
+        integrals.append(zeta * integrals[0] - 2.0)
+    for k in range(1, highest):
+        integrals.append(((2 * k + 1) * zeta * integrals[k] - k * integrals[k - 1]) / (k + 1))
+    if highest:
+        # half the sum of the distances to the foci is one half axis of the ellipse through the point
+        axis = 0.5 * (abs_plus + abs_minus)
+        _replace_far(integrals, zeta, axis + np.sqrt(np.maximum((axis - 1.0) * (axis + 1.0), 0.0)))
+    return integrals, log_minus + log_plus
 
 
-def log_moment(k: int, moments: Sequence[ComplexArray], log_product: FloatArray) -> FloatArray:
-    """Return Re int t**k log(zeta - t) dt, that is the log integral for an element of half length 1.
+def _replace_far(integrals: list[ComplexArray], zeta: ComplexArray, size: FloatArray) -> None:
+    """Put in the downward recurrence where the upward one loses digits; `size` is r."""
+    highest = len(integrals) - 1
+    lower = LOST ** (0.5 / highest)
+    for upper in BANDS:
+        chosen = np.flatnonzero((size > lower) & (size <= upper))
+        if chosen.size:
+            steps = math.ceil(DIGITS / (2.0 * math.log10(lower)))
+            for k, ratio in enumerate(_ratios(zeta[chosen], highest, steps), start=1):
+                integrals[k][chosen] = ratio * integrals[k - 1][chosen]
+        lower = max(lower, upper)
 
-    `log_product` is log|zeta**2 - 1|; `moments` must reach T_{k+1}.
+
+def _ratios(zeta: ComplexArray, highest: int, steps: int) -> list[ComplexArray]:
+    """Return C_k / C_{k-1} for k = 1 ... highest by a continued fraction of so many more steps."""
+    ratio = np.zeros_like(zeta)
+    ratios = []
+    for k in range(highest + steps, 0, -1):
+        ratio = k / ((2 * k + 1) * zeta - (k + 1) * ratio)
+        ratios.append(ratio)
+    return ratios[: steps - 1 : -1] if steps else ratios[::-1]
+
+
+def log_integral(k: int, integrals: Sequence[ComplexArray], log_product: FloatArray) -> FloatArray:
+    """Return Re int P_k log(zeta - t) dt, that is the log integral for an element of half length 1.
+
+    `log_product` is log|zeta**2 - 1|; `integrals` must reach C_{k+1}.
     """
-    ends = log_product if k % 2 == 0 else -moments[0].real
-    result: FloatArray = ends + moments[k + 1].real
-    return result if k == 0 else result / (k + 1)
+    if k == 0:
+        result: FloatArray = log_product + integrals[1].real
+        return result
+    difference: FloatArray = integrals[k + 1].real - integrals[k - 1].real
+    return difference / (2 * k + 1)
 
 
-def quotient_moment(k: int, moments: Sequence[ComplexArray], eta: FloatArray) -> ComplexArray:
-    """Return int t**k rho / conj(rho) dt for an element of half length 1 along the real axis."""
-    result: ComplexArray = moments[k].conj() * (2j * eta)
+def quotient_integral(k: int, integrals: Sequence[ComplexArray], eta: FloatArray) -> ComplexArray:
+    """Return int P_k rho / conj(rho) dt for an element of half length 1 along the real axis."""
+    result: ComplexArray = integrals[k].conj() * (2j * eta)
     constant = interval_moment(k)
     if constant:
         result += constant
     return result
+
+
+def log_on_itself(a: int, b: int) -> float:
+    """Return the integral of P_a(s) P_b(t) log|s - t| over [-1, 1]**2, from int P_a Q_c [DLMF, 14.17.8]."""
+    if a == b == 0:
+        return 4.0 * math.log(2.0) - 6.0
+    if (a + b) % 2:
+        return 0.0
+    low, high = sorted((a, b))
+    # int P_a Q_c = 2 / ((a - c) (a + c + 1)) for odd a - c; the inner integral is (2 Q_{b+1} - 2 Q_{b-1}) / (2 b + 1)
+    products = [2.0 / ((low - c) * (c + low + 1)) for c in (high + 1, high - 1)]
+    return 2.0 * (products[0] - products[1]) / (2 * high + 1)
+
+
+def legendre_of_monomials(highest: int) -> FloatArray:
+    """Return the square matrix whose row m holds the Legendre coefficients of t**m."""
+    rows = [np.polynomial.legendre.poly2leg(row[: m + 1]) for m, row in enumerate(np.eye(highest + 1))]
+    return np.stack([np.pad(row, (0, highest + 1 - row.size)) for row in rows])
+
+
+def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:
+    """Return P_0 ... P_highest at points of [-1, 1], of shape (highest + 1, *shape of t)."""
+    values = np.polynomial.legendre.legvander(np.asarray(t, float), highest)
+    return np.moveaxis(values, -1, 0).reshape(highest + 1, *np.shape(t))

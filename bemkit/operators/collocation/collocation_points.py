@@ -188,7 +188,7 @@ def _straight_far(
 ) -> tuple[_ElementIntegrals, BoolArray]:
     """Use the series of the closed forms; also return which pairs are too close for them."""
     zeta = (panels.centre[rows, None] - panels.centre[columns]) * panels.to_local[columns]
-    first, second = kernels.far_moments(zeta, 1, kernels.terms_needed(distance))
+    first, second = kernels.far_integrals(zeta, 1, kernels.terms_needed(distance))
     eta, double, log_ratio = zeta.imag.copy(), first.imag.copy(), first.real.copy()
     product = zeta * zeta
     product -= 1.0
@@ -272,14 +272,17 @@ def _moments_by_parts(
     inner: Inner, polynomials: ComplexArray, plus: ComplexArray, minus: ComplexArray
 ) -> tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray]:
     """Return the moments from inner integrals and what the end points `plus` and `minus` away give."""
-    quotients, logs = [plus / plus.conj(), minus / minus.conj()], [np.log(np.abs(plus)), np.log(np.abs(minus))]
-    double, log_ratio, quotient_change = (np.zeros(plus.shape, complex) for _ in range(3))
-    for m, factor in enumerate(polynomials[1:], 1):
-        sign = (-1.0) ** m  # t**m at the start; it is one at the end
-        double += factor * inner.double[m]
-        log_ratio += factor * (m * inner.log[m - 1] - logs[1] + sign * logs[0])
-        quotient_change += factor.conj() * (-0.5j * (quotients[1] - sign * quotients[0] - m * inner.quotient[m - 1]))
-    return double, log_ratio, quotient_change
+    coefficients = kernels.legendre_of_monomials(len(polynomials) - 1).T @ polynomials
+    slopes = np.polynomial.legendre.legder(coefficients)
+    signs = (-1.0) ** np.arange(len(coefficients))  # P_k at the start; it is one at the end
+    at_start, at_end = signs @ coefficients, coefficients.sum(axis=0)
+    double = sum(factor * value for factor, value in zip(coefficients, inner.double, strict=False))
+    log_ratio = at_start * np.log(np.abs(plus)) - at_end * np.log(np.abs(minus))
+    quotient_change = at_end.conj() * (minus / minus.conj()) - at_start.conj() * (plus / plus.conj())
+    for slope, log, quotient in zip(slopes, inner.log, inner.quotient, strict=False):
+        log_ratio = log_ratio + slope * log
+        quotient_change -= slope.conj() * quotient
+    return double, log_ratio, -0.5j * quotient_change
 
 
 def _joined(

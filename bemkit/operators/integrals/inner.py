@@ -3,9 +3,9 @@
 With zeta - p(t) = (t0 - t) g(t) (see `curved_panels`) the integrals over a curved element near the point are those of
 the straight element seen from t0 = xi + i eta, plus integrals of functions that are smooth on [-1, 1]:
 
-    int t^b log|rho| dt        = straight + int t^b log|g| dt
-    int t^b 2 pi k dt          = straight - int t^b Im(g' / g) dt
-    int t^b rho / conj(rho) dt = int t^b h dt + 2 i eta (h0 conj(T_b) + int t^b (h - h0) / (conj(t0) - t) dt),
+    int P_b log|rho| dt        = straight + int P_b log|g| dt
+    int P_b 2 pi k dt          = straight - int P_b Im(g' / g) dt
+    int P_b rho / conj(rho) dt = int P_b h dt + 2 i eta (h0 conj(C_b) + int P_b (h - h0) / (conj(t0) - t) dt),
 
 with h = g / conj(g) on the real axis and h0 its value at conj(t0). Nothing is singular or cancels, wherever the point
 lies. Far from the element the integrands themselves are smooth and a Gauss rule serves.
@@ -52,7 +52,7 @@ def inner_integrals(
     is_far = np.ones(trial.size, bool)
     is_far[near] = False
     far = np.flatnonzero(is_far)
-    store(result, far, far_inner(degrees, panels.polynomials(trial[far]), zeta[far], N_SMOOTH))
+    store(result, far, far_inner(degrees, panels.polynomials(trial[far]), zeta[far], N_SMOOTH + degrees.extra_points))
     return result
 
 
@@ -65,9 +65,9 @@ def local_coordinates(panels: Panels, trial: IntArray, from_start: ComplexArray)
 def inner_on_element(panels: Panels, degrees: Degrees, elements: IntArray, xi: float) -> Inner:
     """Integrate over elements seen from their own points at the local coordinate `xi`; k is a principal value."""
     end: ComplexArray = np.full(elements.size, 1.0 + 0j)
-    moments, log_minus, log_plus = kernels.near_moments(xi + end, xi - end, degrees.highest_moment)
-    principal: list[ComplexArray] = [moment.real.astype(complex) for moment in moments]
-    straight = Inner.straight(degrees, principal, log_minus + log_plus, np.zeros(elements.size))
+    integrals, log_product = kernels.near_integrals(xi + end, xi - end, degrees.highest_integral)
+    principal: list[ComplexArray] = [integral.real.astype(complex) for integral in integrals]
+    straight = Inner.straight(degrees, principal, log_product, np.zeros(elements.size))
     return _sum(straight, bending(degrees, panels.polynomials(elements), np.full(elements.size, xi + 0j)))
 
 
@@ -82,10 +82,10 @@ def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
 
 
 def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
-    """Return the closed forms of straight elements; `plus` and `minus` as in `kernels.near_moments`."""
-    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
+    """Return the closed forms of straight elements; `plus` and `minus` as in `kernels.near_integrals`."""
+    integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
     eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-    return Inner.straight(degrees, moments, log_minus + log_plus, eta)
+    return Inner.straight(degrees, integrals, log_product, eta)
 
 
 def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray, minus: ComplexArray) -> Inner:
@@ -98,12 +98,12 @@ def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray,
         The polynomials p of the elements.
     plus, minus : (n,) complex arrays
     """
-    moments, log_minus, log_plus = kernels.near_moments(plus, minus, degrees.highest_moment)
+    integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
     at_start = np.abs(plus) < np.abs(minus)
     eta = np.where(at_start, plus.imag, minus.imag)
     root = np.where(at_start, plus - 1.0, minus + 1.0)
-    straight = Inner.straight(degrees, moments, log_minus + log_plus, eta)
-    return _sum(straight, bending(degrees, coefficients, root, eta, moments))
+    straight = Inner.straight(degrees, integrals, log_product, eta)
+    return _sum(straight, bending(degrees, coefficients, root, eta, integrals))
 
 
 def _sum(straight: Inner, smooth: Inner) -> Inner:
@@ -120,30 +120,31 @@ def bending(
     coefficients: ComplexArray,
     root: ComplexArray,
     eta: FloatArray | None = None,
-    moments: list[ComplexArray] | None = None,
+    integrals: list[ComplexArray] | None = None,
 ) -> Inner:
     """Return what bending adds to log and double, and the whole quotient, at points with the parameters `root` (n,).
 
-    Points on the elements themselves need neither `eta`, which is zero, nor the moments T_b.
+    Points on the elements themselves need neither `eta`, which is zero, nor the integrals C_b.
     """
-    n_log, n_double = degrees.trial_powers
+    n_log, n_double = degrees.n_trial
     divided = curved_panels.divided_difference(coefficients, root)
-    t, _ = gauss_legendre(N_SMOOTH)
+    n_points = N_SMOOTH + degrees.extra_points
+    t, _ = gauss_legendre(n_points)
     powers = np.vander(t, divided.shape[0], increasing=True)
     g = _product(powers, divided)
     size = np.square(g.real) + np.square(g.imag)
     ratio = g * g / size
-    log: list[FloatArray] = list(_weights(n_log) @ (0.5 * np.log(size)))
-    quotient: list[ComplexArray] = list(_product(_weights(n_log), ratio))
-    if n_log and eta is not None and moments is not None:
+    log: list[FloatArray] = list(_weights(n_log, n_points) @ (0.5 * np.log(size)))
+    quotient: list[ComplexArray] = list(_product(_weights(n_log, n_points), ratio))
+    if n_log and eta is not None and integrals is not None:
         at_mirror = curved_panels.evaluate(divided, root.conj()) / curved_panels.evaluate(divided, root).conj()
         gap = root.conj() - t[:, None]
         gap[gap == 0.0] = 1.0  # then eta is zero, and with it the whole term
-        change = _product(_weights(n_log), (ratio - at_mirror) / gap)
+        change = _product(_weights(n_log, n_points), (ratio - at_mirror) / gap)
         for b in range(n_log):
-            quotient[b] = quotient[b] + (2j * eta) * (at_mirror * moments[b].conj() + change[b])
+            quotient[b] = quotient[b] + (2j * eta) * (at_mirror * integrals[b].conj() + change[b])
     slope = _product(powers[:, :-1], curved_panels.derivative(divided))
-    double: list[FloatArray] = list(_weights(n_double) @ (-(slope * g.conj()).imag / size))
+    double: list[FloatArray] = list(_weights(n_double, n_points) @ (-(slope * g.conj()).imag / size))
     return Inner(log, quotient, double)
 
 
@@ -160,10 +161,12 @@ def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, 
     n_points : int
         Enough for the distance of the points.
     """
-    n_log, n_double = degrees.trial_powers
+    n_log, n_double = degrees.n_trial
     result = Inner.zeros(degrees, zeta.shape)
     slopes = curved_panels.derivative(coefficients)
-    for t, weight in zip(*gauss_legendre(n_points), strict=True):
+    points, weights = gauss_legendre(n_points)
+    factors = weights * kernels.legendre_values(max(n_log, n_double, 1) - 1, points)
+    for t, factor in zip(points, factors.T.tolist(), strict=True):
         place = np.full(coefficients.shape[1], t + 0j)
         rho = zeta - curved_panels.evaluate(coefficients, place)
         size = np.square(rho.real) + np.square(rho.imag)
@@ -173,10 +176,10 @@ def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, 
         if n_double:
             angle = (curved_panels.evaluate(slopes, place) * rho.conj()).imag / size
         for b in range(n_log):
-            result.log[b] += (0.5 * weight * t**b) * log
-            result.quotient[b] += (weight * t**b) * quotient
+            result.log[b] += (0.5 * factor[b]) * log
+            result.quotient[b] += factor[b] * quotient
         for b in range(n_double):
-            result.double[b] += (weight * t**b) * angle
+            result.double[b] += factor[b] * angle
     return result
 
 
@@ -186,8 +189,8 @@ def _product(matrix: FloatArray, values: ComplexArray) -> ComplexArray:
     return np.asarray(matrix @ values.view(float)).view(complex)
 
 
-def _weights(n_powers: int) -> FloatArray:
-    """Return the weights of the rule for smooth remainders, times t**b: (n_powers, N_SMOOTH)."""
-    t, weights = gauss_legendre(N_SMOOTH)
-    result: FloatArray = weights * np.vander(t, n_powers, increasing=True).T
+def _weights(n_polynomials: int, n_points: int) -> FloatArray:
+    """Return the weights of the rule for smooth remainders, times P_b: (n_polynomials, n_points)."""
+    t, weights = gauss_legendre(n_points)
+    result: FloatArray = weights * kernels.legendre_values(max(n_polynomials - 1, 0), t)[:n_polynomials]
     return result

@@ -1,10 +1,11 @@
 """Element-pair integrals: the one place where coincident, touching, near and far elements are told apart.
 
-For a test element i and a trial element j, with local coordinates xi and t in [-1, 1] on each, the scalar integrals
+For a test element i and a trial element j, with local coordinates xi and t in [-1, 1] on each and the Legendre
+polynomials P_k, the scalar integrals
 
-    log[a, b]      = int int xi^a t^b log|x - y|
-    quotient[a, b] = int int xi^a t^b (x - y) / conj(x - y)          (complex: Q11 - Q22 + 2i Q12)
-    double[a, b]   = int int xi^a t^b k(x, y)                        (Laplace double layer)
+    log[a, b]      = int int P_a(xi) P_b(t) log|x - y|
+    quotient[a, b] = int int P_a(xi) P_b(t) (x - y) / conj(x - y)          (complex: Q11 - Q22 + 2i Q12)
+    double[a, b]   = int int P_a(xi) P_b(t) k(x, y)                        (Laplace double layer)
 
 serve all four operators. The inner integral is closed form on straight elements (`kernels`); on curved ones it is the
 same closed form plus a smooth remainder near by, and a Gauss rule far away (`inner`). The outer is a Gauss rule whose
@@ -32,7 +33,8 @@ from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels, squared_distance
 
 # An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points
-# with an error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15.
+# with an error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15. A factor P_a costs a digits
+# of that base, so every rule has `Degrees.extra_points` more.
 GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the test element] from which each is enough."""
 DENSE_DISTANCE = 45.0
@@ -77,6 +79,10 @@ class PairSweep:
         is_close |= level > self.base
         self._rows, self._columns = np.nonzero(is_close)
         self._listed = self._correct(level[self._rows, self._columns])
+
+    def _n_points(self, level: int) -> int:
+        """Return the number of points of a Gauss level."""
+        return GAUSS_LEVELS[level][0] + self.degrees.extra_points
 
     def row_slices(self) -> Iterator[slice]:
         """Yield the chunks as slices of the test elements."""
@@ -125,7 +131,8 @@ class PairSweep:
         is_same = test == trial
         is_straight = self.panels.is_straight[trial]
         for kind in (is_straight, ~is_straight):
-            for number, (n_points, _) in enumerate(GAUSS_LEVELS):
+            for number in range(len(GAUSS_LEVELS)):
+                n_points = self._n_points(number)
                 for chosen in _batches(np.flatnonzero(kind & (level == number)), 2 * CHUNK_PAIRS // n_points):
                     values = integrate_separated(self.panels, self.degrees, test[chosen], trial[chosen], n_points)
                     _assign(result, chosen, values)
@@ -159,12 +166,12 @@ class PairSweep:
         result = PairIntegrals.zeros(self.degrees, (test.size, trial.size))
         n_terms = kernels.terms_needed(DENSE_DISTANCE)
         to_local, offset = p.to_local[trial], p.to_local[trial] * p.centre[trial]
-        for xi, weight in zip(*gauss_legendre(GAUSS_LEVELS[self.base][0]), strict=True):
+        for xi, weight in zip(*gauss_legendre(self._n_points(self.base)), strict=True):
             zeta = p.point(test, float(xi))[:, None] * to_local
             zeta -= offset
-            moments = kernels.far_moments(zeta, self.degrees.highest_moment, n_terms)
+            integrals = kernels.far_integrals(zeta, self.degrees.highest_integral, n_terms)
             log_product = kernels.far_log_product(zeta) if self.degrees.log else zeta.real
-            result.add(float(weight), float(xi), Inner.straight(self.degrees, moments, log_product, zeta.imag))
+            result.add(float(weight), float(xi), Inner.straight(self.degrees, integrals, log_product, zeta.imag))
         result.scale(p.half[test, None], p.half[trial], p.tangent[trial])
         return result
 
@@ -172,7 +179,7 @@ class PairSweep:
         """Integrate with the base rule on both elements."""
         p, test = self.panels, self.test[rows]
         result = PairIntegrals.zeros(self.degrees, (test.size, trial.size))
-        n_points = GAUSS_LEVELS[self.base][0]
+        n_points = self._n_points(self.base)
         polynomials = p.polynomials(trial)
         for xi, weight in zip(*gauss_legendre(n_points), strict=True):
             zeta = (p.point(test, float(xi))[:, None] - p.centre[trial]) * p.to_local[trial]

@@ -23,6 +23,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.kernels import legendre_of_monomials
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
 from bemkit.operators.somigliana.moments import (
@@ -264,7 +265,9 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
             f"give {shape} finite numbers, one row for each scalar dof"
         )
     values: ComplexArray = dofs[:, 0] + 1j * dofs[:, 1]
-    about_centre: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
+    about_centre: ComplexArray = (
+        values[space.element_dofs] @ local_coefficients(space) @ np.linalg.inv(legendre_of_monomials(space.degree))
+    )
     powers = range(space.degree + 1)
     result = np.zeros((3, *about_centre.shape), complex)
     for origin, e in ((CENTRE, 0.0), (START, -1.0), (END, 1.0)):

@@ -34,6 +34,8 @@ from bemkit.operators.integrals.splitting import SEPARATION, split_until
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
 CENTRE, START, END = 0, 1, 2
+FAR = 6.0
+"""Local distance |zeta| beyond which a series replaces the upward recursion of G and H."""
 AT_END = 0.5
 """Points closer to an end of an element than this, in half lengths, see its densities expanded about that end."""
 
@@ -76,12 +78,13 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
     n_orders : int
         1 for T alone, 2 for T and G, 3 for T, G and H.
     """
-    orders, _, _ = kernels.near_moments(plus, minus, highest)
-    result = [orders]
+    integrals, _ = kernels.near_integrals(plus, minus, highest)
+    # the Legendre coefficients of powers are positive: nothing cancels
+    result = [list(np.tensordot(kernels.legendre_of_monomials(highest), np.stack(integrals), 1))]
     zeta = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
     product = plus * minus
     first = (2.0 / product, 2.0 * zeta / (product * product))
-    far = np.minimum(np.abs(plus), np.abs(minus)) > kernels.FAR
+    far = np.minimum(np.abs(plus), np.abs(minus)) > FAR
     for order in range(1, n_orders):
         row = [first[order - 1]]
         for k in range(1, highest + 1):
@@ -100,7 +103,7 @@ def _replace_far(
     highest = len(row) - 1
     first = highest % 2  # terms with j + highest odd vanish
     series = np.zeros_like(inverse)
-    for j in range(first + 2 * (kernels.terms_needed(kernels.FAR - 1.0) + 2), first - 1, -2):
+    for j in range(first + 2 * (kernels.terms_needed(FAR - 1.0) + 2), first - 1, -2):
         series = series * inverse * inverse + 2.0 * comb(j + order, order) / (j + highest + 1)
     row[highest][far] = series * inverse ** (first + order + 1)
     for k in range(highest - 1, -1, -1):
@@ -128,16 +131,17 @@ def straight_displacement_moments(
     t, g = local_moments(plus, minus, highest + 1, 2)
     log_product = np.log(np.abs(plus)) + np.log(np.abs(minus))
     powers = range(highest + 1)
-    constants = [kernels.interval_moment(k) for k in powers]
+    constants = [2.0 / (k + 1) if k % 2 == 0 else 0.0 for k in powers]
     return DisplacementMoments(
         log=np.stack(
             [
-                half * (m * np.log(half / length) + kernels.log_moment(k, t, log_product))
+                half
+                * (m * np.log(half / length) + (log_product if m else -t[0].real) / (k + 1) + t[k + 1].real / (k + 1))
                 for k, m in enumerate(constants)
             ]
         ),
         measure=np.stack([half * m for m in constants]),
-        quotient=np.stack([half * square * kernels.quotient_moment(k, t, eta) for k in powers]),
+        quotient=np.stack([half * square * (2j * eta * t[k].conj() + m) for k, m in enumerate(constants)]),
         cauchy=np.stack(t[: highest + 1]),
         turn=np.stack([2j * eta * square * g[k].conj() for k in powers]),
     )
