@@ -15,7 +15,7 @@ from bemkit.operators.counts import Work
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
-from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Family
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Registry
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS = 12
@@ -227,9 +227,9 @@ def _nan_first(value: float) -> float:
     return value if value == value else float("inf")
 
 
-def _word(family: Family, value: object) -> str:
+def _word(registry: Registry, value: object) -> str:
     try:
-        return family.kind_of(value)
+        return registry.kind_of(value)
     except InputError:  # a class of one's own
         return type(value).__name__
 
