@@ -73,10 +73,6 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
     space : BoundarySpace
         The displacement space, on the dimensionless mesh.
 
-    Returns
-    -------
-    ContactData
-
     Notes
     -----
     A node of several contact parts belongs to the one whose obstacle is nearest, and to the first of those that are

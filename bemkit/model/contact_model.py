@@ -168,14 +168,6 @@ class Model:
 def build_model(prepared: Prepared) -> Model:
     """Assemble the operators of a scene and condense the body onto its contact boundary.
 
-    Parameters
-    ----------
-    prepared : Prepared
-
-    Returns
-    -------
-    Model
-
     Raises
     ------
     FreeBodyError

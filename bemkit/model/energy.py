@@ -27,11 +27,6 @@ _CARRIED = 64.0 * float(np.finfo(float).eps)
 def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolution:
     """Return the outcome of a solve, named NEGATIVE_ENERGY if the energy of the body is negative or can become so.
 
-    Parameters
-    ----------
-    model : Model
-    result : ContactSolution
-
     Returns
     -------
     ContactSolution

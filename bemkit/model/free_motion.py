@@ -127,7 +127,7 @@ def _rigid_mode(prepared: Prepared, load: UnsolvableLoad) -> FloatArray:
 def _along_obstacle(normal: FloatArray, mode: FloatArray) -> FloatArray:
     """Return the part of a mode (3,) that does not lift the nodes whose normal components are (n, 3) @ mode.
 
-    Full friction enters a sliding escape as a lift of s |v_t|; the body itself moves along the obstacle. Where it
+    Full friction enters a sliding load as a lift of s |v_t|; the body itself moves along the obstacle. Where it
     cannot, as on a curved one, the mode is returned as it is.
     """
     lift = np.linalg.lstsq(normal, normal @ mode, rcond=_ROUND_OFF)[0]

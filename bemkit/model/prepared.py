@@ -257,10 +257,6 @@ def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Pre
     units : Units, optional
         By default `find_units` of the scene.
 
-    Returns
-    -------
-    Prepared
-
     Raises
     ------
     TooFarError

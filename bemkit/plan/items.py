@@ -93,10 +93,6 @@ def plan_items(
         Load steps.
     proposal : Symmetry, optional
         A symmetry that the scene has but does not use.
-
-    Returns
-    -------
-    tuple of PlanItem
     """
     history = "the whole load comes in one step"
     if n_steps > 1:

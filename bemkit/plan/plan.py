@@ -87,10 +87,6 @@ def make_plan(scene: Scene, mesh: BoundaryMesh, *, proposal: Symmetry | None = N
     proposal : Symmetry, optional
         A symmetry that the scene has but does not use, from `bemkit.scene.symmetry.find_symmetry`.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     ValueError
@@ -134,10 +130,6 @@ def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
 def check_memory(plan: Plan) -> None:
     """Refuse a plan whose matrices cannot fit into this computer.
 
-    Parameters
-    ----------
-    plan : Plan
-
     Raises
     ------
     TooLargeError
@@ -159,12 +151,12 @@ def check_elements(scene: Scene) -> None:
     TooLargeError
         As `check_memory`.
     """
-    wished = scene.mesh.elements
-    if wished is None or wished <= _MANY:
+    n_elements = scene.mesh.elements
+    if n_elements is None or n_elements <= _MANY:
         return
     small = replace(scene, mesh=replace(scene.mesh, elements=_FEW))
     plan = make_plan(small, small.build_mesh())
-    growth = wished / _FEW
+    growth = n_elements / _FEW
     _check(int(growth * plan.sizes.n_elements), int(growth**2 * plan.memory))
 
 

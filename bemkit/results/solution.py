@@ -6,8 +6,8 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -191,3 +191,31 @@ class Solution:
             "work": self.work.as_dict(),
             "memory": dict(self.memory),
         }
+
+
+def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence[str]) -> Solution:
+    """Return a solution with the steps, linear solves, times and memory of all that led to it.
+
+    Parameters
+    ----------
+    result : Solution
+    solutions : sequence of Solution
+        All of them, in the order in which they were solved.
+    names : sequence of str
+        What each of them is, for the remarks of its steps: "load step 1 of 3".
+    """
+    records: list[StepRecord] = []
+    for name, solution in zip(names, solutions, strict=True):
+        first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+        for record in solution.history:
+            message = f"{name}; {record.message}".rstrip("; ")
+            total = spent + record.linear_solves
+            records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
+    return replace(
+        result,
+        history=tuple(records),
+        linear_solves=sum(solution.linear_solves for solution in solutions),
+        outer_steps=sum(solution.outer_steps for solution in solutions),
+        timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
+        memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
+    )

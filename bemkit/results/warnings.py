@@ -27,10 +27,6 @@ FEWEST_NODES = 4
 def find_warnings(solution: Solution) -> tuple[str, ...]:
     """Say what is doubtful about a solution.
 
-    Parameters
-    ----------
-    solution : Solution
-
     Returns
     -------
     tuple of str

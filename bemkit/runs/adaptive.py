@@ -1,4 +1,4 @@
-"""Meshes that follow the solution until a wished accuracy is reached.
+"""Meshes that follow the solution until the accuracy asked for is reached.
 
 Each mesh is made anew from the solution before it: its pieces end where the contact status changes, so that these
 points are nodes and the mesh is graded towards them; elements are shared by the estimated errors, and half of them lie
@@ -20,8 +20,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partition
 from bemkit.plan import make_plan
-from bemkit.results.solution import Solution
-from bemkit.results.totals import with_totals
+from bemkit.results.solution import Solution, with_totals
 from bemkit.runs.history import run_on_mesh
 from bemkit.scene.mesh_options import MOST_ELEMENTS
 from bemkit.scene.scene import Scene
@@ -36,7 +35,7 @@ TRANSITION = 3.0
 MOST_FOR_TRANSITIONS = 2
 """Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
 SAFETY = 0.8
-"""The next mesh is planned for this part of the wished error."""
+"""The next mesh is planned for this part of the error asked for."""
 
 
 def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None = None) -> tuple[Solution, ...]:
@@ -89,7 +88,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             return _ending(solutions)
         partition = better_partition(
             partition,
-            _wish(solution),
+            _target_density(solution),
             _next_size(solution, options.accuracy),
             cuts=_cuts(partition, solution),
             spread_over=contact,
@@ -117,7 +116,7 @@ def _rate(solution: Solution) -> int:
     return 2 * solution.scene.discretisation.displacement_space(solution.mesh).degree + 1
 
 
-def _wish(solution: Solution) -> FloatArray:
+def _target_density(solution: Solution) -> FloatArray:
     """Return how many elements should replace each one.
 
     The squared error of an element cut into m falls like m**-rate; for the smallest sum over a given number of elements
@@ -131,10 +130,10 @@ def _wish(solution: Solution) -> FloatArray:
 
 def _next_size(solution: Solution, accuracy: float) -> int:
     """Return the number of elements that the accuracy needs, or a step towards it."""
-    rate, wish = _rate(solution), _wish(solution)
+    rate, density = _rate(solution), _target_density(solution)
     allowed = (SAFETY * accuracy) ** 2 * 2.0 * solution.energy
     spread = SPREAD if solution.scene.contact_parts else 0.0
-    needed = (wish.sum() / allowed) ** (1.0 / rate) * wish.sum() / (1.0 - spread) if allowed > 0.0 else 0.0
+    needed = (density.sum() / allowed) ** (1.0 / rate) * density.sum() / (1.0 - spread) if allowed > 0.0 else 0.0
     n_elements = solution.mesh.n_elements
     smallest = SMALLEST_GROWTH if _error(solution) > accuracy else 1.0
     return int(np.clip(needed, smallest * n_elements, LARGEST_GROWTH * n_elements))
@@ -183,16 +182,16 @@ def _cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
 
 
 def _ending(solutions: list[Solution], obstacle: str = "") -> tuple[Solution, ...]:
-    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was wished."""
+    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for."""
     best = min((solution for solution in solutions if solution.is_converged), key=_error, default=solutions[-1])
     message, status = (
         f"{len(solutions)} meshes, the last with {best.mesh.n_elements} elements. {best.message}",
         best.status,
     )
     if obstacle:
-        wished = best.scene.mesh.accuracy
+        accuracy = best.scene.mesh.accuracy
         message = (
-            f"The accuracy {wished:g} was not reached: {obstacle}; estimated error {_error(best):.1e}; allow more "
+            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {_error(best):.1e}; allow more "
             f"elements or time, or ask for less. {message}"
         )
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status

@@ -17,6 +17,7 @@ from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
 from bemkit.runs.history import run_history as run_history
 from bemkit.runs.timing import Stage
+from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import StepRecord
 from bemkit.solvers.multistart import probe
@@ -99,7 +100,7 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if len(scene.load_factors) > 1:
         raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
-    (prepared,), plan, clock = prepared_and_planned([scene], mesh)
+    (prepared,), plan, clock = prepared_and_planned(load_steps(scene), mesh)
     with blas_threads_for(plan.sizes.n_displacements):
         model, clock = built(prepared, clock)
         load = find_unsolvable_load(model.problem)

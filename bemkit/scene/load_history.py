@@ -19,10 +19,6 @@ from bemkit.scene.scene import Scene
 def load_steps(scene: Scene) -> tuple[Scene, ...]:
     """Return the steps of a scene's load history, each a scene of its own with a single load.
 
-    Parameters
-    ----------
-    scene : Scene
-
     Returns
     -------
     tuple of Scene

@@ -187,10 +187,6 @@ class Scene:
         is_held : (n_contact,) bool array, optional
             Nodes without friction, whatever their part. None by default.
 
-        Returns
-        -------
-        FrictionLaw
-
         Raises
         ------
         LawError
@@ -214,10 +210,6 @@ class Scene:
 
     def build_mesh(self) -> BoundaryMesh:
         """Divide the boundary into elements, with one mesh part for each part of the scene.
-
-        Returns
-        -------
-        BoundaryMesh
 
         Raises
         ------

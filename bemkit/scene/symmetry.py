@@ -103,10 +103,6 @@ def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
 def find_symmetry(scene: SymmetricScene) -> Symmetry | None:
     """Find the lines through the middle of a body, along x and y, about which a scene is symmetric.
 
-    Parameters
-    ----------
-    scene : SymmetricScene
-
     Returns
     -------
     Symmetry or None

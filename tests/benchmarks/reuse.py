@@ -90,8 +90,8 @@ def nested_levels(scene: bk.Scene) -> list[Level]:
         if (n_accurate and resolved) or n_accurate > adaptive.MOST_FOR_TRANSITIONS:
             return levels
         cuts = adaptive._cuts(partition, solution)
-        wish, size = adaptive._wish(solution), adaptive._next_size(solution, accuracy)
-        wanted = better_partition(partition, wish, size, cuts=cuts, spread_over=contact)
+        density, size = adaptive._target_density(solution), adaptive._next_size(solution, accuracy)
+        wanted = better_partition(partition, density, size, cuts=cuts, spread_over=contact)
         new = nested_partition(partition, wanted, cuts)
         levels.append(Level(bk.run(scene, mesh=new.mesh, start=solution), kept_share(partition, new)))
         partition = new

@@ -95,3 +95,10 @@ def test_the_command_says_how_many(tmp_path: Path, capsys: pytest.CaptureFixture
     assert len(errors) == 5
     assert all(line.startswith("bemkit: error: ") for line in errors)
     assert "part 'foot': friction law: friction_coefficient" in errors[2]
+
+
+def test_a_single_load_factor_scales_the_load() -> None:
+    scene = block()
+    (found,) = run_probe(dataclasses.replace(scene, load_factors=(2.0,)), n_starts=1)
+    (single,) = run_probe(scene, n_starts=1)
+    assert found.force_normal == pytest.approx(2.0 * single.force_normal, rel=1e-9)

@@ -154,11 +154,11 @@ def test_times_and_solves_are_those_of_all_meshes() -> None:
 def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = paper(1, mesh=bk.MeshOptions(accuracy=1e-3))
 
-    def failing(scene: bk.Scene, *, mesh: bk.BoundaryMesh, start: bk.Solution | None, **others: Any) -> bk.Solution:
+    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
         solution = bk.run(scene, mesh=mesh, start=start)
         return solution if start is None else dataclasses.replace(solution, status=bk.Status.STALLED)
 
-    monkeypatch.setattr(bemkit.runs.adaptive, "run", failing)
+    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", failing)
     failed, best = run_adaptive(scene)
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
@@ -167,12 +167,12 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatc
 
 
 def test_a_finer_mesh_that_is_refused_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(scene: bk.Scene, *, mesh: bk.BoundaryMesh, start: bk.Solution | None, **others: Any) -> bk.Solution:
+    def refusing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
         if start is not None:
             raise bk.InputError("no memory left")
         return bk.run(scene, mesh=mesh)
 
-    monkeypatch.setattr(bemkit.runs.adaptive, "run", refusing)
+    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", refusing)
     (best,) = run_adaptive(paper(1, mesh=bk.MeshOptions(accuracy=1e-3)))
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
     assert "elements cannot be solved (no memory left)" in best.message

@@ -13,7 +13,7 @@ import pytest
 from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curves, discretise, spaces
 from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.testing import CheckFailed, check_curve, check_space
 
 MESHES = [
@@ -37,6 +37,7 @@ def spaces_on(mesh: BoundaryMesh) -> list[Any]:
         QuadraticSpace(mesh),
         QuadraticSpace(mesh, corners),
         QuadraticSpace(mesh, np.zeros(mesh.n_nodes, bool)),
+        ElementwiseSpace(QuadraticSpace(mesh)),
     ]
 
 
@@ -55,7 +56,7 @@ def public_classes(module: ModuleType, member: str) -> set[type]:
 
 
 @pytest.mark.parametrize("mesh", MESHES, ids=["plate", "triangle"])
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(7))
 def test_spaces_conform(mesh: BoundaryMesh, number: int) -> None:
     check_space(spaces_on(mesh)[number])
 

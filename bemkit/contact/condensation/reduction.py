@@ -201,11 +201,11 @@ def condensed_body(
     elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
 ) -> CondensedBody:
     """Reduce a body to its contact boundary, with the conditions and nodes that `contact_conditions` has found."""
+    space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
     if not contact.nodes.size:
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
     is_free = find_tangents(conditions, contact)
     unknowns = find_unknowns(conditions, contact, is_free)
     stiffness = unknowns.to_open.T @ condensed.stiffness @ unknowns.to_open

@@ -132,10 +132,6 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         Components of all traction dofs.
     degree : int
         Of the displacements.
-
-    Returns
-    -------
-    BodyNeeds
     """
     t, u, f, o = n_tractions, case.n_displacements, case.n_free, case.n_open
     mesh, solver = case.mesh, case.linear_solver.solver
@@ -216,10 +212,6 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     case : BodyCase
     takes_slopes : bool
         Whether the double layer takes slopes between neighbouring elements.
-
-    Returns
-    -------
-    BodyNeeds
     """
     u, o, mesh = case.n_displacements, case.n_open, case.mesh
     n_single, n_double = case.n_fixed + o, case.n_free + o
