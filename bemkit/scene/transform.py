@@ -20,7 +20,7 @@ from bemkit.scene.scene import Scene
 
 
 @dataclass(frozen=True)
-class Stretch:
+class AffineMap:
     """The map x -> factor * x + shift of the plane, component by component.
 
     Parameters
@@ -43,21 +43,21 @@ class Stretch:
         return original
 
     def normals_back(self, normals: FloatArray) -> FloatArray:
-        """Return the unit normals that belong to the normals of the stretched boundary."""
+        """Return the unit normals that belong to the normals of the transformed boundary."""
         if self.is_uniform:
             return normals
         original = normals * np.array(self.factor)
         return np.asarray(original / np.hypot(*original.T)[:, None])
 
     def normals_forward(self, normals: FloatArray) -> FloatArray:
-        """Return the unit normals of the stretched boundary that belong to normals of the original."""
+        """Return the unit normals of the transformed boundary that belong to normals of the original."""
         return self._inverse.normals_back(normals)
 
     @property
-    def _inverse(self) -> Stretch:
-        return Stretch((1.0 / self.factor[0], 1.0 / self.factor[1]))
+    def _inverse(self) -> AffineMap:
+        return AffineMap((1.0 / self.factor[0], 1.0 / self.factor[1]))
 
-    def moved(self, symmetry: Symmetry) -> Symmetry:
+    def transformed(self, symmetry: Symmetry) -> Symmetry:
         """Map symmetry lines."""
         places = zip((symmetry.x, symmetry.y), self.factor, self.shift, strict=True)
         return Symmetry(*(None if place is None else place * factor + shift for place, factor, shift in places))
@@ -69,71 +69,71 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class MovedField:
+class TransformedField:
     """``factor`` times a field of the original body, as a function of the moved coordinates."""
 
     field: ScalarField
-    stretch: Stretch
+    affine: AffineMap
     factor: float = 1.0
 
     def __call__(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Evaluate at moved coordinates."""
-        return self.factor * evaluate_field(self.field, self.stretch.back(np.column_stack([x, y])))
+        return self.factor * evaluate_field(self.field, self.affine.back(np.column_stack([x, y])))
 
 
 @dataclass(frozen=True)
-class MovedRegion:
+class TransformedRegion:
     """A condition on the original coordinates, as a function of the moved ones."""
 
     region: Region
-    stretch: Stretch
+    affine: AffineMap
 
     def __call__(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Evaluate at moved coordinates."""
-        original = self.stretch.back(np.column_stack([x, y]))
+        original = self.affine.back(np.column_stack([x, y]))
         return np.asarray(self.region(original[:, 0], original[:, 1]))
 
 
 @dataclass(frozen=True)
-class MovedObstacle:
+class TransformedObstacle:
     """An obstacle whose gap is ``factor`` times the gap of the original body, plus ``offset`` [m]."""
 
     obstacle: Obstacle
-    stretch: Stretch = Stretch()
+    affine: AffineMap = AffineMap()
     factor: float = 1.0
     offset: float = 0.0
 
     def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Measure the gap at moved points; see `Obstacle.gap`."""
-        original = self.obstacle.gap(self.stretch.back(points), self.stretch.normals_back(normals))
+        original = self.obstacle.gap(self.affine.back(points), self.affine.normals_back(normals))
         return self.factor * original + self.offset
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction of contact at moved points; see `DirectedObstacle.approach`."""
-        _, direction = measure_contact(self.obstacle, self.stretch.back(points), self.stretch.normals_back(normals))
-        return self.stretch.normals_forward(direction)
+        _, direction = measure_contact(self.obstacle, self.affine.back(points), self.affine.normals_back(normals))
+        return self.affine.normals_forward(direction)
 
 
 @dataclass(frozen=True)
-class MovedLaw(FrictionLaw):
+class TransformedLaw(FrictionLaw):
     """A friction law at moved points, its stresses multiplied by `stress`."""
 
     law: FrictionLaw
-    stretch: Stretch
+    affine: AffineMap
     stress: float
 
     def at(self, points: FloatArray) -> FrictionLaw:
         """Return the law for contact nodes given by their moved points."""
-        return self.law.at(self.stretch.back(points)).scaled(1.0 / self.stress)
+        return self.law.at(self.affine.back(points)).scaled(1.0 / self.stress)
 
     @property
     def is_frictionless(self) -> bool:
-        """What the law says."""
+        """Whether the original law knows no friction."""
         return self.law.is_frictionless
 
     @property
     def acts_across_gap(self) -> bool | BoolArray:
-        """What the law says."""
+        """Whether the original law acts where the gap is open."""
         return self.law.acts_across_gap
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
@@ -146,34 +146,35 @@ class MovedLaw(FrictionLaw):
 
 
 @dataclass(frozen=True)
-class MovedShape:
-    """A shape after a stretch and a shift."""
+class TransformedShape:
+    """A shape after an affine map."""
 
     shape: Shape
-    stretch: Stretch
+    affine: AffineMap
 
     def outline(self) -> Outline:
-        """Return the moved boundary, its sides under their names."""
+        """Return the transformed boundary, its sides under their names."""
         outline = self.shape.outline()
         loops = tuple(
-            tuple(Side(side.name, _moved_curve(side.curve, self.stretch)) for side in loop) for loop in outline.loops
+            tuple(Side(side.name, _transformed_curve(side.curve, self.affine)) for side in loop)
+            for loop in outline.loops
         )
         return Outline(loops, outline.is_exterior)
 
 
-def moved_scene(
-    scene: Scene, stretch: Stretch, *, stress: float = 1.0, displacement: float | None = None, modulus: float = 1.0
+def transformed_scene(
+    scene: Scene, affine: AffineMap, *, stress: float = 1.0, displacement: float | None = None, modulus: float = 1.0
 ) -> Scene:
-    """Return a scene after a stretch, with its numbers multiplied.
+    """Return a scene after an affine map, with its numbers multiplied.
 
     Parameters
     ----------
     scene : Scene
-    stretch : Stretch
+    affine : AffineMap
     stress : float
         Factor of all loads, and of the stresses in the friction law.
     displacement : float, optional
-        Factor of gaps and prescribed displacements; the first factor of the stretch if left out.
+        Factor of gaps and prescribed displacements; the first factor of the map if left out.
     modulus : float
         Factor of Young's modulus.
 
@@ -182,13 +183,13 @@ def moved_scene(
     Scene
         Its fields, regions and obstacles are functions, so it cannot be written to a file.
     """
-    factor = stretch.factor[0] if displacement is None else displacement
+    factor = affine.factor[0] if displacement is None else displacement
     material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
-    parts = tuple(_moved_part(part, stretch, stress, factor) for part in scene.parts)
-    law = MovedLaw(scene.law, stretch, stress)
-    symmetry = None if scene.symmetry is None else stretch.moved(scene.symmetry)
+    parts = tuple(_transformed_part(part, affine, stress, factor) for part in scene.parts)
+    law = TransformedLaw(scene.law, affine, stress)
+    symmetry = None if scene.symmetry is None else affine.transformed(scene.symmetry)
     return replace(
-        scene, shape=MovedShape(scene.shape, stretch), material=material, parts=parts, law=law, symmetry=symmetry
+        scene, shape=TransformedShape(scene.shape, affine), material=material, parts=parts, law=law, symmetry=symmetry
     )
 
 
@@ -197,7 +198,7 @@ def with_gap_offset(scene: Scene, offset: float) -> Scene:
     return with_conditions(
         scene,
         lambda condition: (
-            replace(condition, obstacle=MovedObstacle(condition.obstacle, offset=offset))
+            replace(condition, obstacle=TransformedObstacle(condition.obstacle, offset=offset))
             if isinstance(condition, Contact)
             else condition
         ),
@@ -234,14 +235,14 @@ def _combined(
     return field
 
 
-def _moved_part(part: Part, stretch: Stretch, stress: float, displacement: float) -> Part:
-    where = None if part.where is None else MovedRegion(part.where, stretch)
-    return replace(part, condition=_moved_condition(part.condition, stretch, stress, displacement), where=where)
+def _transformed_part(part: Part, affine: AffineMap, stress: float, displacement: float) -> Part:
+    where = None if part.where is None else TransformedRegion(part.where, affine)
+    return replace(part, condition=_transformed_condition(part.condition, affine, stress, displacement), where=where)
 
 
-def _moved_condition(condition: Condition, stretch: Stretch, stress: float, displacement: float) -> Condition:
-    def moved(field: ScalarField, factor: float) -> MovedField:
-        return MovedField(field, stretch, factor)
+def _transformed_condition(condition: Condition, affine: AffineMap, stress: float, displacement: float) -> Condition:
+    def moved(field: ScalarField, factor: float) -> TransformedField:
+        return TransformedField(field, affine, factor)
 
     match condition:
         case Traction(x, y):
@@ -252,18 +253,18 @@ def _moved_condition(condition: Condition, stretch: Stretch, stress: float, disp
             components = [None if value is None else moved(value, displacement) for value in (x, y)]
             return PrescribedDisplacement(*components)
         case Contact(obstacle, law):
-            own = None if law is None else MovedLaw(law, stretch, stress)
-            return Contact(MovedObstacle(obstacle, stretch, displacement), own)
+            own = None if law is None else TransformedLaw(law, affine, stress)
+            return Contact(TransformedObstacle(obstacle, affine, displacement), own)
     return condition
 
 
-def _moved_curve(curve: Curve, stretch: Stretch) -> Curve:
+def _transformed_curve(curve: Curve, affine: AffineMap) -> Curve:
     if curve.is_straight:
-        start, end = stretch.forward(curve.point(np.array([0.0, 1.0]))).tolist()
+        start, end = affine.forward(curve.point(np.array([0.0, 1.0]))).tolist()
         return Segment(tuple(start), tuple(end))
-    factor = stretch.factor[0]
-    if stretch.is_uniform:
-        return MovedCurve(curve, (-stretch.shift[0] / factor, -stretch.shift[1] / factor), factor)
+    factor = affine.factor[0]
+    if affine.is_uniform:
+        return MovedCurve(curve, (-affine.shift[0] / factor, -affine.shift[1] / factor), factor)
     return ParametricCurve(
-        lambda s: stretch.forward(curve.point(s)), lambda s: curve.derivative(s) * np.array(stretch.factor)
+        lambda s: affine.forward(curve.point(s)), lambda s: curve.derivative(s) * np.array(affine.factor)
     )

@@ -15,7 +15,7 @@ from bemkit.geometry.grading import Uniform
 from bemkit.geometry.shapes import Rectangle
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Contact, MeshOptions, Part, Pressure, Scene, Traction
-from bemkit.scene.transform import Stretch, moved_scene, with_gap_offset, with_turned_loads
+from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -199,7 +199,9 @@ def _pushed(baseline: Solution, value: float) -> Case:
 def _stretched(baseline: Solution, value: float) -> Case:
     # stiffnesses of thin bodies differ by the third power of their slenderness
     precision = PRECISION + np.finfo(float).eps * max(value, 1.0 / value) ** 3
-    return Case(value, moved_scene(baseline.scene, Stretch((value, 1.0)), displacement=1.0), precision=precision)
+    return Case(
+        value, transformed_scene(baseline.scene, AffineMap((value, 1.0)), displacement=1.0), precision=precision
+    )
 
 
 def _newton(rho: float) -> ContactSolver:

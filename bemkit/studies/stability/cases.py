@@ -11,7 +11,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Scene
-from bemkit.scene.transform import Stretch, moved_scene
+from bemkit.scene.transform import AffineMap, transformed_scene
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
@@ -41,8 +41,10 @@ class Similarity:
 
     def apply(self, scene: Scene) -> Scene:
         """Return the similar scene."""
-        stretch = Stretch((self.length, self.length), self.shift)
-        return moved_scene(scene, stretch, stress=self.stress, displacement=self.displacement, modulus=self.modulus)
+        affine = AffineMap((self.length, self.length), self.shift)
+        return transformed_scene(
+            scene, affine, stress=self.stress, displacement=self.displacement, modulus=self.modulus
+        )
 
 
 @dataclass(frozen=True)

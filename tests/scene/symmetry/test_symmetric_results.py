@@ -13,7 +13,7 @@ from bemkit.cli.console import print_summary
 from bemkit.operators.cache import StaleCacheError, load, save
 from bemkit.results.figures import draw_deformation, node_displacement
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
-from bemkit.scene.transform import Stretch, moved_scene
+from bemkit.scene.transform import AffineMap, transformed_scene
 from bemkit.studies.stability.independent_check import check_solution
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
 
@@ -92,7 +92,7 @@ def test_the_summary_says_which_values_it_shows(capsys: pytest.CaptureFixture[st
 
 def test_moved_scenes_take_their_lines_along() -> None:
     scene = replace(square(), symmetry=bk.Symmetry(x=0.5))
-    moved = moved_scene(scene, Stretch((2.0, 2.0), (7.0, 1.0)))
+    moved = transformed_scene(scene, AffineMap((2.0, 2.0), (7.0, 1.0)))
     assert moved.symmetry == bk.Symmetry(x=8.0)
     assert bk.run(moved).force_normal == pytest.approx(2.0 * bk.run(scene).force_normal, rel=1e-12)
 

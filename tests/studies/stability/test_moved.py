@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.scene.transform import Stretch, moved_scene, with_gap_offset, with_turned_loads
+from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.studies.stability.cases import Similarity, elements_at_ends
 from bemkit.studies.stability.degenerate import degenerate_diameters
 from bemkit.studies.stability.sweep import difference
@@ -56,14 +56,14 @@ def test_interference_scales_like_every_other_length() -> None:
 def test_a_stretched_scene_is_the_scene_of_the_stretched_shape() -> None:
     press = bk.Part("press", bk.Pressure(bk.Expression("1 + x")), ("top",), bk.Expression("x > 0.25"))
     wall = bk.Part("wall", bk.Roller(), sides=("right",))
-    stretched = bk.run(moved_scene(block(FLOOR, press, wall), Stretch((3.0, 1.0)), displacement=1.0))
+    stretched = bk.run(transformed_scene(block(FLOOR, press, wall), AffineMap((3.0, 1.0)), displacement=1.0))
     press = bk.Part("press", bk.Pressure(bk.Expression("1 + x / 3")), ("top",), bk.Expression("x > 0.75"))
     direct = bk.run(block(FLOOR, press, wall, shape=bk.Rectangle(3.0, 1.0)))
     np.testing.assert_allclose(stretched.contact.sigma_n, direct.contact.sigma_n, atol=1e-12)
 
 
 def test_a_stretched_circle_is_an_ellipse() -> None:
-    scene = moved_scene(disc(), Stretch((2.0, 1.0)), displacement=1.0)
+    scene = transformed_scene(disc(), AffineMap((2.0, 1.0)), displacement=1.0)
     nodes = scene.build_mesh().nodes
     np.testing.assert_allclose((nodes[:, 0] / 2.0) ** 2 + (nodes[:, 1] - 1.0) ** 2, 1.0, rtol=1e-12)
 
