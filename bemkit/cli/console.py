@@ -227,9 +227,9 @@ def _nan_first(value: float) -> float:
     return value if value == value else float("inf")
 
 
-def _word(family: Registry, value: object) -> str:
+def _word(registry: Registry, value: object) -> str:
     try:
-        return family.kind_of(value)
+        return registry.kind_of(value)
     except InputError:  # a class of one's own
         return type(value).__name__
 

@@ -120,7 +120,7 @@ def _along(solution: Solution, places: Places) -> FloatArray:
     own = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
     basis = space.basis(np.clip(2.0 * (places.s - ends[own]) / lengths[own] + 1.0, -1.0, 1.0))
     at_dofs = (ends - lengths)[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0)
-    rows = np.array([name == places.part for name in table.part])
+    rows = table.rows(places.part)
     columns = [np.interp(at_dofs, table.s[rows], getattr(table, name)[rows])[own] for name in COLUMNS]
     return np.asarray(np.einsum("pn,cnp->cn", basis, np.stack(columns)))
 

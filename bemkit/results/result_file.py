@@ -9,7 +9,7 @@ stranger runs no code. The layout, version 2:
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
-    /boundary        points, displacement, centres, traction, traction_dofs (one row per element)
+    /boundary        points, displacement, centres, traction, traction_dofs
     /contact, /transitions, /history    tables: one dataset per column, all of one length
     /plan, /work     texts: linear solver, sizes and counts as JSON
     /warnings        texts, one sentence each; a file without them has none
@@ -103,8 +103,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_attributes(file.create_group("timings"), solution.timings)
         _write_mesh(file.create_group("mesh"), solution.mesh)
         for name in _BOUNDARY:
-            values = getattr(solution.boundary, name)
-            file.create_dataset(f"boundary/{name}", data=values.reshape(len(values), -1))
+            file.create_dataset(f"boundary/{name}", data=getattr(solution.boundary, name))
         contact = {"part": list(solution.contact.part), **solution.contact.columns()}
         write_table(file.create_group("contact"), contact)
         write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
@@ -219,9 +218,7 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     summary = reader.attributes("summary")
     mesh = _read_mesh(reader, scene)
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
-    fields = {name: reader.floats(f"boundary/{name}") for name in _BOUNDARY}
-    traction_dofs = fields.pop("traction_dofs")
-    boundary = BoundaryFields(**fields, traction_dofs=traction_dofs.reshape(len(traction_dofs), -1, 2))
+    boundary = BoundaryFields(**{name: reader.floats(f"boundary/{name}") for name in _BOUNDARY})
     if len(boundary.centres) != mesh.n_elements:
         raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return Solution(

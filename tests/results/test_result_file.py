@@ -16,7 +16,6 @@ import pytest
 
 import bemkit.results.result_file
 from bemkit.hdf5 import MARK, Reader, seal
-from bemkit.results.interior import interior_fields
 from bemkit.results.result_file import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
@@ -71,20 +70,6 @@ def assert_same(one: Solution, other: Solution) -> None:
 
 def test_a_result_comes_back_bit_for_bit(file: Path, solution: Solution) -> None:
     assert_same(solution, read_result(file))
-
-
-def test_files_without_traction_dofs_and_planned_costs_are_read(file: Path, solution: Solution) -> None:
-    """As older versions have written them: tractions are the means, and the counts of the plan those of the run."""
-    with h5py.File(file, "r+") as stored:
-        del stored["boundary/traction_dofs"], stored["plan/work"]
-        for name in ("memory", "seconds"):
-            del stored["plan"].attrs[name]
-    seal(file, MARK)
-    again = read_result(file)
-    np.testing.assert_array_equal(again.boundary.traction_dofs, solution.boundary.traction)
-    assert (again.plan.work, again.plan.memory, again.plan.seconds) == (solution.work, 0, 0.0)
-    x = np.array([[0.5, 0.5]])
-    np.testing.assert_array_equal(interior_fields(again).stress(x), interior_fields(solution).stress(x))
 
 
 def test_curved_meshes_and_infinite_gaps_come_back(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     normals, direction = np.zeros((2, table.n_contact, 2))
     distance = np.full(table.n_contact, np.inf)
     for part in solution.scene.contact_parts:
-        own = np.array([name == part.name for name in table.part])
+        own = table.rows(part.name)
         if isinstance(part.condition, Contact) and own.any():
             normals[own] = _mean_normals(solution, boundary, part.name)[nodes[own]]
             distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
