@@ -47,8 +47,8 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
     """Solve the equations linearised at a residual, for the given sets.
 
     If the sets do not hold the body, it stays near its present displacements: exactly there if the forces on it
-    balance, or else held by weak springs during this step, weaker after `n_regularised` such steps with the same sets. Raises
-    `SingularResponse` if even springs at all free nodes do not hold it.
+    balance, or else held by weak springs during this step, weaker after `n_regularised` such steps with the same sets.
+    Raises `SingularResponse` if even springs at all free nodes do not hold it.
     """
     body = equations.problem.body
     linear = equations.linearised(residual, sets)
