@@ -82,20 +82,8 @@ class ContactProblem:
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response of the body; where it has eliminated the tangent, ``sigma_t = 0`` whatever is asked.
 
-        Drivers ask this instead of the body itself, and need not know where there is no friction.
-
-        Parameters
-        ----------
-        conditions : LinearConditions
-
-        Returns
-        -------
-        ContactState
-
-        Raises
-        ------
-        SingularResponse
-            If the conditions do not determine the response.
+        Drivers ask this instead of the body itself, and need not know where there is no friction. Raises
+        `SingularResponse` if the conditions do not determine the response.
         """
         return self.body.respond(self.without_eliminated(conditions))
 

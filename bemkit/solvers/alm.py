@@ -128,22 +128,8 @@ class InnerResult:
 
 
 def solve_projected(equations: ProjectionEquations, start: ContactState, options: InnerNewton) -> InnerResult:
-    """Solve projection equations with fixed multipliers by semismooth Newton.
+    """Solve projection equations with fixed multipliers by semismooth Newton, from a response of the body.
 
-    Parameters
-    ----------
-    equations : ProjectionEquations
-        With a multiplier.
-    start : ContactState
-        A response of the body.
-    options : InnerNewton
-
-    Returns
-    -------
-    InnerResult
-
-    Notes
-    -----
     With a given bound the residual along a Newton direction d, weighted, ``sum w residual . d``, is the slope of a
     convex function if the body is symmetric (the augmented energy), so going to its zero makes the iteration descend
     from any start.

@@ -44,28 +44,11 @@ class Response:
 
 
 def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets, n_regularised: int = 0) -> Response:
-    """Solve the linearised equations.
+    """Solve the equations linearised at a residual, for the given sets.
 
-    Parameters
-    ----------
-    equations : ProjectionEquations
-    residual : Residual
-        Where to linearise.
-    sets : ActiveSets
-        Sets of the Newton matrix.
-    n_regularised : int
-        Steps before this one that springs held with the same sets.
-
-    Returns
-    -------
-    Response
-        If the sets do not hold the body, it stays near its present displacements: exactly there if the forces on it
-        balance, or else held by weak springs during this step.
-
-    Raises
-    ------
-    SingularResponse
-        If even springs at all free nodes do not.
+    If the sets do not hold the body, it stays near its present displacements: exactly there if the forces on it
+    balance, or else held by weak springs during this step, weaker after `n_regularised` such steps with the same sets.
+    Raises `SingularResponse` if even springs at all free nodes do not hold it.
     """
     body = equations.problem.body
     linear = equations.linearised(residual, sets)
@@ -143,16 +126,7 @@ class FloatingResponse:
     free_motions: FloatArray
 
     def nearest(self, displacement: FloatArray) -> ContactState:
-        """Return the position nearest to some displacements, by least squares over all contact nodes.
-
-        Parameters
-        ----------
-        displacement : (n_contact, 2) array [m]
-
-        Returns
-        -------
-        ContactState
-        """
+        """Return the position nearest to displacements (n_contact, 2) [m], by least squares over all contact nodes."""
         motions = self.free_motions.reshape(len(self.free_motions), -1)
         way = (displacement - self.state.displacement).ravel()
         shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
@@ -160,20 +134,8 @@ class FloatingResponse:
 
 
 def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:
-    """Return the response under conditions that leave rigid motions free, if the forces along these balance.
+    """Return the response under conditions that leave rigid motions free, if there are any and forces balance.
 
-    Parameters
-    ----------
-    body : LinearBody
-    conditions : LinearConditions
-
-    Returns
-    -------
-    FloatingResponse or None
-        None also if the conditions leave no motion free.
-
-    Notes
-    -----
     Where only tractions are prescribed, as many displacements are held as there are free motions: just enough to
     determine the response, so that their reactions are what is out of balance. If that is round-off, the prescribed
     tractions take their place. The result carries them to the last digit; weak springs would leave a little

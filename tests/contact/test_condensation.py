@@ -15,6 +15,7 @@ from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
+from bemkit.operators.equilibrium import resultant_imbalance
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -237,3 +238,30 @@ def test_a_body_under_its_own_weight_is_certified(law: FrictionLaw) -> None:
     assert solution.certificate.force_imbalance < 1e-10
     weightless = replace(body, condensed=replace(body.condensed, volume_force=None))
     assert weightless.imbalance(solution.state).force > 0.3  # as if nothing pressed the block down
+
+
+def test_forces_inside_a_body_have_a_moment() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    lift = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    beside, below = (np.array([0.0, -1.0, -x]) for x in (0.0, 1.0))  # a unit weight at x = 0, and at x = 1
+    assert resultant_imbalance(points, lift, (0, 1, 2), 0.0, below).worst < 1e-15
+    off = resultant_imbalance(points, lift, (0, 1, 2), 0.0, beside)
+    assert off.force < 1e-15
+    assert off.moment == pytest.approx(1.0 / (2.0 * 2.0 / 3.0))  # a couple of 1 by the forces 2 and the arm 2/3
+
+
+def test_contact_meets_a_support_that_moves_along_an_oblique_direction() -> None:
+    mesh = mesh_of(Polygon(((0.0, 0.0), (2.0, 0.0), (1.0, 3.0**0.5))), 30, "side-1", "side-2")
+    elastic = GalerkinMap(mesh, MATERIAL, LinearSpace(mesh))
+    normal = mesh.normals[mesh.part("side-2")]
+    wall = Support(
+        "side-2", mesh.part("side-2"), normal[:, None, :], lambda points: np.tile(0.1 * normal[0], (len(points), 1))
+    )
+    body = condense(elastic, [wall], side_of(elastic, "side-1"), np.zeros((mesh.n_nodes, 2)))
+    assert body.is_held.sum() == 1
+    none = np.zeros(body.n_contact)
+    state = respond(body, stick(np.random.default_rng(2).normal(size=body.n_contact), none))
+    recovered = body.recover(state)[0][body.nodes.nodes]
+    own = np.einsum("nkc,nc->nk", body.nodes.frame, recovered)
+    np.testing.assert_allclose(own, state.displacement, atol=1e-12)
+    np.testing.assert_allclose(recovered[body.is_held] @ normal[0], 0.1, rtol=1e-12)

@@ -7,6 +7,7 @@ import pytest
 
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
+from bemkit.operators.equilibrium import Imbalance
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
@@ -44,6 +45,19 @@ def test_a_body_that_claims_too_much_is_found_out():
     claimed = solve(inexact_problem(Coulomb(0.5), accuracy=1e-14), FixedPoint(), tolerance=1e-8, throw=False)
     assert claimed.status is Status.INNER_FAILED
     assert solve(inexact_problem(Coulomb(0.5)), FixedPoint(), tolerance=1e-8).is_converged
+
+
+class Unforgiving(Inexact):
+    """A body that measures its balance to within its accuracy, and allows for no round-off."""
+
+    def imbalance(self, state):
+        return Imbalance(5e-11, 0.0)
+
+
+def test_the_inner_problems_of_the_fixed_point_end_where_the_body_ends():
+    body = Unforgiving(block_body(), accuracy=1e-10)
+    problem = ContactProblem(body, np.zeros(body.n_contact), Coulomb(0.5))
+    assert solve(problem, FixedPoint()).is_converged  # its inner_tolerance is 1e-11
 
 
 @pytest.mark.parametrize("accuracy", [1e-14, 1e-10])

@@ -66,19 +66,9 @@ def contact_frame(directions: FloatArray) -> FloatArray:
 
 
 def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the nodes of some elements in their order, and the outward normals there.
+    """Return the nodes (n,) of some elements (m,) in their order, as scalar dofs, and the outward unit normals (n, 2).
 
-    Parameters
-    ----------
-    space : BoundarySpace
-    elements : (m,) array
-
-    Returns
-    -------
-    nodes : (n,) array
-        Scalar dofs.
-    normals : (n, 2) array
-        Unit normals, averaged over those of the elements that meet at a node.
+    Normals are averaged over those of the elements that meet at a node.
     """
     dofs = space.element_dofs[elements]
     order = dofs.ravel()[np.sort(np.unique(dofs.ravel(), return_index=True)[1])]
@@ -183,20 +173,10 @@ def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArr
 
 
 def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_supported: BoolArray) -> BoolArray:
-    """Return the contact nodes whose tangential displacement is an unknown.
+    """Return (n_contact,) bool: the contact nodes whose tangential displacement is an unknown.
 
-    Parameters
-    ----------
-    motions : (n_motions, n_contact, 2) array
-        Normal and tangential components of the rigid motions that no support holds, of any sizes.
-    is_frictionless : (n_contact,) bool array
-    is_supported : (n_contact,) bool array
-        Nodes that a support holds in one direction; they have no tangent of their own.
-
-    Returns
-    -------
-    (n_contact,) bool array
-        All nodes with friction, and at most as many others as there are motions.
+    These are all nodes with friction, and at most as many others as there are `motions` (n_motions, n_contact, 2) that
+    no support holds, in (n, t) components of any size. Nodes that a support holds have no tangent of their own.
     """
     is_retained = ~is_frictionless
     if not motions.size:
