@@ -10,10 +10,12 @@ all images of an element are gathered into its own, with the signs that the comp
 
 from __future__ import annotations
 
+import enum
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any, Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -65,35 +67,64 @@ class TrialTerm:
     tensor: Callable[[Block, int, int], Tensor]
 
 
-class PairForm(Protocol):
-    """A bilinear form on two boundary spaces, made of integrals over pairs of elements."""
+class Tag(enum.Enum):
+    """Promises about an operator; `bemkit.testing.check_operator` proves each one."""
+
+    SYMMETRIC = "symmetric"
+    POSITIVE_DEFINITE = "positive definite"
+    POSITIVE_SEMIDEFINITE = "positive semidefinite"
+    KILLS_RIGID_MOTIONS = "zero on rigid motions"
+    KILLS_TRANSLATIONS = "zero on translations"
+
+
+@dataclass(frozen=True, eq=False)
+class PairForm(ABC):
+    """A bilinear form <A trial, test> made of integrals over pairs of elements.
+
+    Parameters
+    ----------
+    trial, test : BoundarySpace
+        The space of the argument, and the one that the result is tested with.
+    material : Material
+
+    Raises
+    ------
+    GeometryError
+        If the spaces live on different meshes.
+    """
+
+    trial: BoundarySpace
+    test: BoundarySpace
+    material: Material
+
+    def __post_init__(self) -> None:
+        require_one_mesh(self.trial, self.test)
 
     @property
-    def trial(self) -> BoundarySpace:
-        """The space of the argument."""
+    def tags(self) -> frozenset[Tag]:
+        """What is promised of its matrix."""
+        return frozenset()
 
     @property
-    def test(self) -> BoundarySpace:
-        """The space the result is tested with."""
-
-    @property
-    def material(self) -> Material:
-        """The material of the body."""
-
-    @property
-    def tags(self) -> frozenset[Any]:
-        """What is promised of its matrix; see `bemkit.operators.forms.Tag`."""
-
-    @property
+    @abstractmethod
     def degrees(self) -> Degrees:
         """The integrals it needs."""
 
     @property
+    @abstractmethod
     def test_coefficients(self) -> FloatArray:
         """(n_local, n_polynomials) Legendre coefficients on the test element."""
 
+    @abstractmethod
     def trial_terms(self) -> list[TrialTerm]:
         """Return the parts that share the test coefficients."""
+
+
+def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:
+    """Raise GeometryError unless two spaces live on one mesh."""
+    if trial.mesh is not test.mesh:
+        msg = "trial and test space live on different meshes: build both on the same BoundaryMesh object"
+        raise GeometryError(msg)
 
 
 @assembling()

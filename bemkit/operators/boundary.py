@@ -17,12 +17,11 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.assembly import PairForm, assemble_block, assemble_together
+from bemkit.operators.assembly import PairForm, Tag, assemble_block, assemble_together
 from bemkit.operators.forms import (
     DoubleLayerForm,
     HypersingularForm,
     SingleLayerForm,
-    Tag,
     definite,
     mass_entries,
 )

@@ -13,7 +13,6 @@ so that all of them are combinations of the scalar integrals of `integrals`. The
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,38 +22,8 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.operators.assembly import Block, Tensor, TrialTerm
+from bemkit.operators.assembly import Block, PairForm, Tag, Tensor, TrialTerm, require_one_mesh
 from bemkit.operators.integrals.pairs import Degrees
-from bemkit.operators.material import Material
-
-
-class Tag(enum.Enum):
-    """Promises about an operator; `bemkit.testing.check_operator` proves each one."""
-
-    SYMMETRIC = "symmetric"
-    POSITIVE_DEFINITE = "positive definite"
-    POSITIVE_SEMIDEFINITE = "positive semidefinite"
-    KILLS_RIGID_MOTIONS = "zero on rigid motions"
-    KILLS_TRANSLATIONS = "zero on translations"
-
-
-def require_one_mesh(trial: BoundarySpace, test: BoundarySpace) -> None:
-    """Raise GeometryError unless two spaces live on one mesh."""
-    if trial.mesh is not test.mesh:
-        msg = "trial and test space live on different meshes: build both on the same BoundaryMesh object"
-        raise GeometryError(msg)
-
-
-@dataclass(frozen=True, eq=False)
-class _PairForm:
-    """A form <A trial, test>; see `bemkit.operators.assembly.PairForm` for what subclasses say."""
-
-    trial: BoundarySpace
-    test: BoundarySpace
-    material: Material
-
-    def __post_init__(self) -> None:
-        require_one_mesh(self.trial, self.test)
 
 
 def _derivative(coefficients: FloatArray) -> FloatArray:
@@ -63,7 +32,7 @@ def _derivative(coefficients: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class SingleLayerForm(_PairForm):
+class SingleLayerForm(PairForm):
     """V: traction -> displacement."""
 
     @property
@@ -97,17 +66,12 @@ class SingleLayerForm(_PairForm):
 
 
 @dataclass(frozen=True, eq=False)
-class DoubleLayerForm(_PairForm):
+class DoubleLayerForm(PairForm):
     """K: displacement -> displacement, for continuous displacements."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _require_continuous(self.trial, "double_layer", "trial")
-
-    @property
-    def tags(self) -> frozenset[Tag]:
-        """None."""
-        return frozenset()
 
     @property
     def degrees(self) -> Degrees:
@@ -139,7 +103,7 @@ class DoubleLayerForm(_PairForm):
 
 
 @dataclass(frozen=True, eq=False)
-class HypersingularForm(_PairForm):
+class HypersingularForm(PairForm):
     """W: displacement -> traction, for continuous displacements."""
 
     def __post_init__(self) -> None:

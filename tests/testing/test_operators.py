@@ -15,6 +15,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, corner_nodes
 from bemkit.operators import boundary
+from bemkit.operators.assembly import Tag
 from bemkit.operators.boundary import (
     BoundaryOperator,
     DoubleLayer,
@@ -25,7 +26,7 @@ from bemkit.operators.boundary import (
     mass,
     single_layer,
 )
-from bemkit.operators.forms import SingleLayerForm, Tag
+from bemkit.operators.forms import SingleLayerForm
 from bemkit.operators.material import Material, Plane
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
 from tests.testing.test_spaces import public_classes

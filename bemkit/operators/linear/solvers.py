@@ -9,7 +9,7 @@ there is one right-hand side for each direction that is open to contact.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeAlias
 
 import numpy as np
 
@@ -88,10 +88,7 @@ class LinearSolver(Protocol):
 class DenseCholesky:
     """Form the matrix and factor it."""
 
-    @property
-    def forms_matrix(self) -> bool:
-        """True."""
-        return True
+    forms_matrix: ClassVar[bool] = True
 
     def factor(self, operator: DefiniteOperator, name: str) -> Cholesky:
         """Return the Cholesky factor."""
@@ -118,6 +115,8 @@ class Krylov:
         If `rtol` is not between 0 and 1, or there is no step, or no unknown on the coarsest level.
     """
 
+    forms_matrix: ClassVar[bool] = False
+
     rtol: float = 1e-9
     max_steps: int = 300
     coarsest: int = 8000
@@ -136,11 +135,6 @@ class Krylov:
         volume and of shape; at nu = 1/2 an equation of its own keeps the volume.
         """
         return self.rtol if material.is_incompressible else self.rtol / (1.0 - 2.0 * material.effective_poisson_ratio)
-
-    @property
-    def forms_matrix(self) -> bool:
-        """False."""
-        return False
 
     def factor(self, operator: DefiniteOperator, name: str) -> KrylovFactor:
         """Return the operator with its preconditioner."""

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.forms import Tag
+from bemkit.operators.assembly import Tag
 from bemkit.operators.linear.solvers import DenseCholesky, LinearSolverWish
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
