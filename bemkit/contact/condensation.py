@@ -17,7 +17,7 @@ from bemkit.contact.nodes import free_motions, held_nodes
 from bemkit.contact.unknowns import Unknowns, find_free_tangents, find_tangents, find_unknowns
 from bemkit.errors import InputError
 from bemkit.geometry.space import dof_points
-from bemkit.operators.balance import Imbalance, resultant_imbalance, round_off_of
+from bemkit.operators.balance import NOISE, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.nodal import NodalConditions, Support
 from bemkit.operators.rigid import possible_motions, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -42,6 +42,8 @@ class CondensedBody:
         The displacements of the contact nodes that `dense` solves for.
     points : (n_nodes, 2) array [m]
         Where the nodal forces act.
+    force : (n_nodes, 2) array [N/m]
+        Given nodal forces, in x and y.
     conditions : NodalConditions
         Of the displacement nodes, the contact nodes open.
     nodes : ContactNodes
@@ -60,6 +62,7 @@ class CondensedBody:
     condensed: CondensedMap
     unknowns: Unknowns
     points: FloatArray
+    force: FloatArray
     conditions: NodalConditions
     nodes: ContactNodes
     balanced: tuple[int, ...] = (0, 1, 2)
@@ -131,7 +134,7 @@ class CondensedBody:
         unknowns = find_unknowns(conditions, self.nodes, self.tangent_is_free)
         free = find_free_tangents(conditions, self.nodes, self.tangent_is_free, unknowns, condensed)
         dense = replace(self.dense, load=unknowns.load(condensed), free_tangents=free)
-        return replace(self, dense=dense, condensed=condensed, unknowns=unknowns, conditions=conditions)
+        return replace(self, dense=dense, condensed=condensed, unknowns=unknowns, force=force, conditions=conditions)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
@@ -140,24 +143,32 @@ class CondensedBody:
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body (loads, contact, reactions) are from equilibrium of forces and moments.
 
-        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. Its
-        round-off is that of the forces, which in thin bodies are small differences of large terms.
+        The numbers also cover the contact nodes themselves; see `DenseBody.unbalanced`. Prescribed displacements would
+        cause any forces on a clamped body, so that its condensed load is no measure: those at hand are. Their round-off
+        is that of the terms whose differences they are, small ones in thin bodies and in those that move far.
         """
         displacement, force = self.recover(state)
-        of_contact = self.dense.imbalance(state)
-        total = float(np.abs(force).sum())
-        if not self.balanced or self._only_moves(displacement, total):
-            return of_contact
         round_off = round_off_of(displacement, self.condensed.sensitivity)
+        noise = self._noise(displacement, round_off)
+        reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
+        given = self._in_frames(self.force)[~self.conditions.is_fixed]
+        of_contact = self.dense.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
+        if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
+            return of_contact
         return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, round_off))
 
-    def _only_moves(self, displacement: FloatArray, total: float) -> bool:
-        """Whether the body has moved rigidly, so that its forces are what is left of terms which cancel."""
+    def _in_frames(self, force: FloatArray) -> FloatArray:
+        """Return forces (n_nodes, 2) in the frames of the nodes."""
+        return np.einsum("nkc,nc->nk", self.conditions.frame, force)
+
+    def _noise(self, displacement: FloatArray, round_off: float) -> float:
+        """Return the largest forces [N/m] that may be what is left of terms which cancel."""
+        terms = np.finfo(float).eps * float(np.abs(displacement).max()) * float(np.abs(self.dense.stiffness).sum())
+        return NOISE * max(terms, round_off)
+
+    def _only_moves(self, displacement: FloatArray) -> bool:
+        """Whether the body has moved rigidly."""
         reach = float(np.abs(displacement).max())
-        terms = np.finfo(float).eps * reach * float(np.abs(self.dense.stiffness).sum())
-        # sums of hundreds of terms leave some eps of their sizes; loads that strain a body by less are lost in them
-        if total > 64.0 * max(terms, round_off_of(displacement, self.condensed.sensitivity)):
-            return False
         motions = rigid_motions(self.points, self.points.mean(axis=0), float(np.ptp(self.points, axis=0).max()))
         motions = motions.reshape(-1, 3)
         rigid = motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
@@ -207,5 +218,5 @@ def condense(
     motions = free_motions(conditions, contact, space)
     modulus = elastic.material.plane_modulus
     dense = DenseBody(stiffness, unknowns.load(condensed), contact.weights, motions, free, modulus)
-    points = dof_points(space)
-    return CondensedBody(dense, condensed, unknowns, points, conditions, contact, possible_motions(space.mesh))
+    points, balanced = dof_points(space), possible_motions(space.mesh)
+    return CondensedBody(dense, condensed, unknowns, points, force, conditions, contact, balanced)

@@ -10,7 +10,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
-from bemkit.operators.balance import Imbalance
+from bemkit.operators.balance import Imbalance, Unbalanced
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
@@ -169,34 +169,37 @@ class DenseBody:
         return self._motions @ self.load
 
     def imbalance(self, state: ContactState) -> Imbalance:
+        """Return how far the state is from equilibrium, relative to load and contact forces; see `unbalanced`."""
+        return self.unbalanced(state).beside(self.load)
+
+    def unbalanced(self, state: ContactState) -> Unbalanced:
         """Return the largest nodal force out of balance, and the work of load and tractions on rigid motions.
 
         Notes
         -----
         The first number is the residual of ``weights * t = stiffness @ u - load`` (and of free tangents that do not
-        follow), so it also detects states that are no response of this body. It is relative to the largest nodal force
-        (term of the sums), the second one to the largest load or contact force. Round-off is what the stiffness makes
-        of the rigid part of the displacements, and that of the sums.
+        follow), so it also detects states that are no response of this body. Round-off is what the stiffness makes of
+        the rigid part of the displacements, and that of the sums.
         """
-        forces = (self.weights[:, None] * state.traction).ravel()[self._unknowns]
-        unknowns = state.displacement.ravel()[self._unknowns]
-        terms = self.stiffness * unknowns
-        stray = self._stray_forces(state, unknowns)
-        largest = max(np.abs(forces).max(), np.abs(self.load).max(), np.abs(terms).max(), stray)
-        if largest == 0.0:
-            return Imbalance(0.0, 0.0)
-        missing = np.abs(terms.sum(axis=1) - self.load - forces).max()
+        contact = (self.weights[:, None] * state.traction).ravel()
+        forces, unknowns = contact[self._unknowns], state.displacement.ravel()[self._unknowns]
+        terms = np.abs(self.stiffness * unknowns)
+        missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
         left = float(np.max(self._left_by_motions(unknowns), initial=0.0))
-        residual = Imbalance(float(np.maximum(missing, stray) / largest), 0.0, left / float(largest))
+        sums = np.finfo(float).eps * terms.sum(axis=1)
         motions = self._motions
-        if not len(motions):
-            return residual
-        # Not relative to the stiffness terms: a body on its way to infinity would balance any load by comparison.
-        given = max(np.abs(forces).max(), np.abs(self.load).max()) or largest
-        defect = self._motion_defect @ np.abs(unknowns)
-        round_off = defect + np.finfo(float).eps * np.abs(terms).sum()
-        work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
-        return residual.joined(Imbalance(0.0, float(work / given), float(round_off / given)))
+        work, defect = 0.0, 0.0
+        if len(motions):
+            work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
+            defect = self._motion_defect @ np.abs(unknowns)
+        return Unbalanced(
+            contact=contact,
+            at_nodes=float(np.maximum(missing, self._stray_forces(state, unknowns))),
+            on_motions=float(work),
+            nodes_round_off=float(left + sums.max()),
+            motions_round_off=float(defect + sums.sum()),
+            terms=float(terms.max()),
+        )
 
     def _left_by_motions(self, unknowns: FloatArray) -> FloatArray:
         """Return the forces (n_unknowns,) that round-off of the stiffness makes of the rigid part of displacements."""
