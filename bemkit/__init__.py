@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import Gap as Gap
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
-    from bemkit.contact.obstacle import PolygonalObstacle as PolygonalObstacle
+    from bemkit.contact.polygon import PolygonalObstacle as PolygonalObstacle
     from bemkit.errors import BemkitError as BemkitError
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
@@ -102,7 +102,8 @@ if TYPE_CHECKING:
 _HOME = {
     "cascade": ("run_cascade",),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
-    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle", "PolygonalObstacle"),
+    "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
+    "contact.polygon": ("PolygonalObstacle",),
     "errors": ("BemkitError", "InputError", "NoResultError"),
     "expression": ("Expression",),
     "geometry.discretise": ("discretise",),

@@ -159,7 +159,7 @@ class CondensedBody:
 
     def _in_frames(self, force: FloatArray) -> FloatArray:
         """Return forces (n_nodes, 2) in the frames of the nodes."""
-        return np.einsum("nkc,nc->nk", self.conditions.frame, force)
+        return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, force))
 
     def _noise(self, displacement: FloatArray, round_off: float) -> float:
         """Return the largest forces [N/m] that may be what is left of terms which cancel."""

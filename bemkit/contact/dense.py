@@ -190,12 +190,12 @@ class DenseBody:
         motions = self._motions
         work, defect = 0.0, 0.0
         if len(motions):
-            work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
-            defect = self._motion_defect @ np.abs(unknowns)
+            work = float(np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max())
+            defect = float(self._motion_defect @ np.abs(unknowns))
         return Unbalanced(
             contact=contact,
             at_nodes=float(np.maximum(missing, self._stray_forces(state, unknowns))),
-            on_motions=float(work),
+            on_motions=work,
             nodes_round_off=float(left + sums.max()),
             motions_round_off=float(defect + sums.sum()),
             terms=float(terms.max()),
