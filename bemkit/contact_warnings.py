@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact_data import find_contact
 from bemkit.model import Model
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -52,16 +51,15 @@ def _oblique(model: Model, node_status: IntArray) -> list[str]:
 
 
 def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
-    everywhere = find_contact(model.scene, model.mesh, model.elastic.displacement_space)
-    nodes = everywhere.nodes
-    overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - everywhere.gap
+    candidates, nodes = model.candidates, model.candidates.nodes
+    overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - candidates.gap
     overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
     found = []
-    for part in dict.fromkeys(everywhere.parts):
-        own = np.array([name == part for name in everywhere.parts])
+    for part in dict.fromkeys(candidates.parts):
+        own = np.array([name == part for name in candidates.parts])
         node = int(np.argmax(np.where(own, overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
-            x, y = everywhere.points[node]
+            x, y = candidates.points[node]
             found.append(
                 f"Supports push part {part!r} {overlap[node]:.3g} m into its obstacle at ({x:.6g}, {y:.6g}), where "
                 "contact cannot act: let them move with the obstacle, or leave a free element between them."

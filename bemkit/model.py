@@ -8,6 +8,7 @@ it is.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import zip_longest
 
 import numpy as np
@@ -53,8 +54,8 @@ class Model:
     elastic : SteklovPoincare
         Dimensionless.
     body : CondensedBody
-    contact : ContactData
-        Of the contact nodes of the body.
+    candidates : ContactData
+        Of all nodes that may touch, whatever supports hold them.
     problem : ContactProblem
         Where supports hold contact nodes along the tangent its law is frictionless; see
         `bemkit.held_friction.with_held_friction`.
@@ -65,13 +66,18 @@ class Model:
     units: Units
     elastic: SteklovPoincare
     body: CondensedBody
-    contact: ContactData
+    candidates: ContactData
     problem: ContactProblem
 
     @property
     def nodes(self) -> ContactNodes:
         """The contact nodes of the body."""
         return self.body.nodes
+
+    @cached_property
+    def contact(self) -> ContactData:
+        """What the scene says of these nodes."""
+        return self.candidates.of(self.nodes)
 
     def under(self, scene: Scene) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
@@ -93,16 +99,15 @@ class Model:
         space = self.elastic.displacement_space
         supports = supports_on(scene, self.mesh, self.units, space)
         force = nodal_forces(scene, self.mesh, space, self.units)
-        contact = find_contact(scene, self.mesh, space)
-        stays = contact.of(self.nodes)
+        candidates = find_contact(scene, self.mesh, space)
+        stays = candidates.of(self.nodes)
         is_new_friction = self.nodes.is_frictionless & ~stays.nodes.is_frictionless
         if stays.has_same_directions(self.contact) and not is_new_friction.any():
-            body, contact = self.body.under(supported(space, supports).displacement, force), stays
+            body = self.body.under(supported(space, supports).displacement, force)
         else:
-            body = condense(self.elastic, supports, contact.nodes, force)
-            contact = contact.of(body.nodes)
-        problem = _problem(scene, self.units, body, contact)
-        return replace(self, scene=scene, body=body, contact=contact, problem=problem)
+            body = condense(self.elastic, supports, candidates.nodes, force)
+        problem = _problem(scene, self.units, body, candidates.of(body.nodes))
+        return replace(self, scene=scene, body=body, candidates=candidates, problem=problem)
 
     @property
     def work(self) -> Work:
@@ -175,10 +180,10 @@ def build_model(scene: Scene, mesh: BoundaryMesh, units: Units | None = None, pl
     elastic = elastic_map(plan.decisions, mesh.unit, scene.material.scaled(units.modulus))
     force = nodal_forces(scene, mesh, elastic.displacement_space, units)
     supports = supports_on(scene, mesh, units, elastic.displacement_space)
-    contact = find_contact(scene, mesh, elastic.displacement_space)
-    body = condense(elastic, supports, contact.nodes, force)
-    contact = contact.of(body.nodes)
-    return Model(scene, mesh, units, elastic, body, contact, _problem(scene, units, body, contact))
+    candidates = find_contact(scene, mesh, elastic.displacement_space)
+    body = condense(elastic, supports, candidates.nodes, force)
+    problem = _problem(scene, units, body, candidates.of(body.nodes))
+    return Model(scene, mesh, units, elastic, body, candidates, problem)
 
 
 def check_position(mesh: BoundaryMesh) -> None:
