@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.errors import InputError
-from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial
+from bemkit.solvers.active_sets import ActiveSets, ProjectedConditions, Trial, coheres
 from bemkit.solvers.floating import floating_response
 
 _SPRING = 1e-3
@@ -112,6 +112,6 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
         raise InputError("start contains entries that are not finite; give finite displacements and tractions")
     rho = problem.body.stiffness_scale
     conditions = ProjectedConditions(problem, rho, rho)
-    trial = conditions.evaluate(guess)
+    trial = conditions.evaluate(guess, coheres(problem, guess))
     response = respond(conditions, trial, trial.sets)
     return response.state, response.linear_solves
