@@ -148,32 +148,27 @@ class CondensedBody:
         is that of the terms whose differences they are, small ones in thin bodies and in those that move far.
         """
         displacement, force = self.recover(state)
-        round_off = round_off_of(displacement, self.condensed.sensitivity)
-        noise = self._noise(displacement, round_off)
+        reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
+        round_off = max(of_forces, np.finfo(float).eps * reach * float(np.abs(self.dense.stiffness).sum()))
+        noise = NOISE * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
         of_contact = self.dense.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
-        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, round_off))
+        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces))
 
     def _in_frames(self, force: FloatArray) -> FloatArray:
         """Return forces (n_nodes, 2) in the frames of the nodes."""
         return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, force))
 
-    def _noise(self, displacement: FloatArray, round_off: float) -> float:
-        """Return the largest forces [N/m] that may be what is left of terms which cancel."""
-        terms = np.finfo(float).eps * float(np.abs(displacement).max()) * float(np.abs(self.dense.stiffness).sum())
-        return NOISE * max(terms, round_off)
-
     def _only_moves(self, displacement: FloatArray) -> bool:
         """Whether the body has moved rigidly."""
-        reach = float(np.abs(displacement).max())
         motions = rigid_motions(self.points, self.points.mean(axis=0), float(np.ptp(self.points, axis=0).max()))
         motions = motions.reshape(-1, 3)
         rigid = motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
         # nearly incompressible bodies recover a rigid motion to 1e-8
-        return bool(np.abs(displacement.ravel() - rigid).max() <= 1e-6 * reach)
+        return bool(np.abs(displacement.ravel() - rigid).max() <= 1e-6 * np.abs(displacement).max())
 
 
 def condense(

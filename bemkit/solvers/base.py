@@ -291,7 +291,8 @@ class _Run:
         """Return the response without any contact, if the body floats and its load balances."""
         body = self.problem.body
         most = float(body.weights @ np.abs(self.problem.glued_state.traction).sum(axis=1))
-        if np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2))):
+        is_pushed = np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2)))
+        if is_pushed and not self.problem.is_unloaded:
             return None  # far from balanced, which is not worth a linear solve
         return floating_response(body, separated(body.n_contact))
 

@@ -7,10 +7,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.contact.problem import ContactState, LinearBody, SingularResponse
-
-_BALANCED = 1e-12
-"""Imbalance, beyond what round-off may leave, below which nothing is left that could move a body. A certificate asks
-for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+from bemkit.operators.balance import BALANCED
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +81,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
-    return FloatingResponse(state, free) if body.imbalance(state).is_below(_BALANCED) else None
+    return FloatingResponse(state, free) if body.imbalance(state).is_below(BALANCED) else None
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:
