@@ -30,6 +30,7 @@ from bemkit.scene import NoContactError, Scene
 from bemkit.solution import BoundaryFields, ContactTable, Solution, Transition, find_transitions
 from bemkit.solution_warnings import find_warnings
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
+from bemkit.solvers.floating import unheld_response
 from bemkit.solvers.probe import probe
 from bemkit.totals import with_totals
 from bemkit.warm_start import state_on
@@ -297,7 +298,7 @@ def _probed(scene: Scene, mesh: BoundaryMesh, plan: Plan, n_starts: int, clock: 
         model = build_model(scene, mesh, plan=plan)
     clock = clock.closed_build(assembly)
     escape = find_unsolvable_load(model.problem)
-    if escape is not None:
+    if escape is not None and unheld_response(model.body) is None:
         raise UnsolvableSceneError(describe_escape(model, escape))
     clock = clock.closed(Stage.CONDENSE)
     found = [with_energy_checked(model, result) for result in probe(model.problem, scene.solver, n_starts=n_starts)]

@@ -74,7 +74,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     test never condemns a load that can be held; what it misses the driver's status still reports.
     """
     motions = problem.body.rigid_motions()
-    if not len(motions) or problem.is_unloaded:
+    if not len(motions):
         return None
     unit = np.abs(motions).reshape(len(motions), -1).max(axis=1)
     motions, load = motions / unit[:, None, None], problem.body.rigid_load() / unit

@@ -12,7 +12,6 @@ from bemkit.contact.dense import DenseBody
 from bemkit.contact.laws import FrictionLaw, LawError
 from bemkit.contact.partwise import law_name
 from bemkit.errors import InputError
-from bemkit.operators.balance import BALANCED
 
 __all__ = ["ContactProblem", "ContactState", "DenseBody", "LawError", "LinearBody", "SingularResponse"]
 
@@ -84,13 +83,6 @@ class ContactProblem:
         eliminated the tangent.
         """
         return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
-
-    @cached_property
-    def is_unloaded(self) -> bool:
-        """Whether all that holds the glued body is round-off, as of one that supports carry along without straining."""
-        glued = self.glued_state
-        released = ContactState(glued.displacement, np.zeros_like(glued.traction))
-        return self.body.imbalance(released).is_below(BALANCED)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response of the body; where it has eliminated the tangent, ``sigma_t = 0`` whatever is asked.

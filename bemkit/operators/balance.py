@@ -15,9 +15,6 @@ estimate is 1e-12 in all but thin or nearly incompressible bodies; a strip of 10
 estimate of 1e-6. More than that no check of the result would let pass."""
 
 
-BALANCED = 1e-12
-"""Imbalance, beyond what round-off may leave, below which nothing is left that could move a body. A certificate asks
-for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
 NOISE = 64.0
 """Forces below this many times the round-off of their terms are none: sums of hundreds of terms leave some eps of their
 sizes, and loads that strain a body by less are lost in them."""
@@ -103,8 +100,9 @@ class Unbalanced:
         largest = max(float(np.abs(self.contact).max()), float(np.abs(given).max(initial=0.0)), reaction)
         total = loads + float(np.abs(self.contact).sum())
         of_sums = max(self.motions_round_off, round_off)
-        if loads == 0.0 and max(largest, total) <= NOISE * of_sums:
-            largest = total = max(self.terms, round_off / np.finfo(float).eps)
+        terms = max(self.terms, round_off / np.finfo(float).eps)
+        noise = NOISE * of_sums if loads == 0.0 else 0.0
+        largest, total = (max(size, terms) if size <= noise else size for size in (largest, total))
         at_nodes, on_motions = (
             Imbalance(0.0, 0.0) if size == 0.0 else Imbalance(missing / size, 0.0, left / size)
             for missing, left, size in (

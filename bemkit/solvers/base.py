@@ -10,11 +10,10 @@ import numpy as np
 from bemkit.arrays import IntArray
 from bemkit.contact.admissibility import find_long_travel, find_unsolvable_load
 from bemkit.contact.certificate import Certificate, certify
-from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
-from bemkit.solvers.floating import FloatingResponse, floating_response
+from bemkit.solvers.floating import FloatingResponse, unheld_response
 from bemkit.solvers.newton import consistent_state
 
 
@@ -255,10 +254,9 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                escape = find_unsolvable_load(self.problem)
-                if escape is not None:
+                unheld = unheld_response(self.problem.body)
+                if unheld is None and (escape := find_unsolvable_load(self.problem)) is not None:
                     return self._nothing_done(Status.UNSOLVABLE_LOAD, escape.description)
-                unheld = self._unheld()
                 first = self._first(start)
                 spent = first.linear_solves + (unheld is not None)
                 iterate = self._freed(replace(first, linear_solves=spent), unheld)
@@ -274,7 +272,8 @@ class _Run:
                 history.append(self._record(following, iterate, step=len(history)))
                 iterate = following
             # a certificate measures by the travel where that hides the deformation
-            if status is not Status.MAX_STEPS and (travel := find_long_travel(self.problem)) is not None:
+            may_travel = unheld is None and status is not Status.MAX_STEPS
+            if may_travel and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
         return self._solution(iterate, status, history)
@@ -286,15 +285,6 @@ class _Run:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
         return replace(iterate, linear_solves=iterate.linear_solves + linear_solves)
-
-    def _unheld(self) -> FloatingResponse | None:
-        """Return the response without any contact, if the body floats and its load balances."""
-        body = self.problem.body
-        most = float(body.weights @ np.abs(self.problem.glued_state.traction).sum(axis=1))
-        is_pushed = np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2)))
-        if is_pushed and not self.problem.is_unloaded:
-            return None  # far from balanced, which is not worth a linear solve
-        return floating_response(body, separated(body.n_contact))
 
     def _freed(self, iterate: Iterate, unheld: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.

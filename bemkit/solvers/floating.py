@@ -5,9 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactState, LinearBody, SingularResponse
-from bemkit.operators.balance import BALANCED
+
+_BALANCED = 1e-12
+"""Imbalance, beyond what round-off may leave, below which nothing is left that could move a body. A certificate asks
+for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,14 @@ class FloatingResponse:
         way = (displacement - self.state.displacement).ravel()
         shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
         return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
+
+
+def unheld_response(body: LinearBody) -> FloatingResponse | None:
+    """Return the response without any contact, if the body floats and the load on it balances.
+
+    Then no load pushes it anywhere, whatever round-off supports leave that carry it along.
+    """
+    return floating_response(body, separated(body.n_contact))
 
 
 def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:
@@ -81,7 +92,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         rest = conditions.value[node, row] - other[node, row] * traction[node, 1 - row]
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
-    return FloatingResponse(state, free) if body.imbalance(state).is_below(BALANCED) else None
+    return FloatingResponse(state, free) if body.imbalance(state).is_below(_BALANCED) else None
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:
