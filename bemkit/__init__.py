@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import Gap as Gap
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
-    from bemkit.contact.obstacle import PolygonalObstacle as PolygonalObstacle
+    from bemkit.contact.polygon import PolygonalObstacle as PolygonalObstacle
     from bemkit.errors import BemkitError as BemkitError
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
@@ -113,8 +113,8 @@ _HOME = {
         "Gap",
         "HalfPlane",
         "Obstacle",
-        "PolygonalObstacle",
     ),
+    "contact.polygon": ("PolygonalObstacle",),
     "errors": (
         "BemkitError",
         "InputError",

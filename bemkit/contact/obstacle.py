@@ -12,15 +12,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 FACING = 1e-12
 """Cosine of the angle between the body's normal and the contact direction below which a point does not face the
 obstacle: round-off of a side that runs along it."""
-_TOUCHING = 1e-12
-"""Distance from a polygon, relative to the coordinates, that may be their round-off."""
 
 
 class Obstacle(Protocol):
@@ -111,8 +109,8 @@ class HalfPlane:
     normal: tuple[float, float] = (0.0, 1.0)
 
     def __post_init__(self) -> None:
-        _check_pair("point", self.point)
-        _check_pair("normal", self.normal)
+        check_pair("point", self.point)
+        check_pair("normal", self.normal)
         if math.hypot(*self.normal) == 0.0:
             raise InputError("normal is (0, 0): give the direction from the obstacle towards the body, such as (0, 1)")
 
@@ -135,7 +133,7 @@ class _Round:
     radius: float
 
     def __post_init__(self) -> None:
-        _check_pair("centre", self.centre)
+        check_pair("centre", self.centre)
         if not (math.isfinite(self.radius) and self.radius > 0.0):
             raise InputError(f"radius is {self.radius}: give a positive, finite length")
 
@@ -164,7 +162,7 @@ class Circle(_Round):
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction towards the centre; see `DirectedObstacle.approach`."""
-        return _unit_vectors(-self._from_centre(points), normals)
+        return unit_vectors(-self._from_centre(points), normals)
 
 
 @dataclass(frozen=True)
@@ -177,82 +175,7 @@ class Cavity(_Round):
 
     def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Return the direction away from the centre; see `DirectedObstacle.approach`."""
-        return _unit_vectors(self._from_centre(points), normals)
-
-
-@dataclass(frozen=True)
-class PolygonalObstacle:
-    """The obstacle fills a polygon; the body lies outside it.
-
-    Parameters
-    ----------
-    vertices : sequence of (x, y) [m]
-        In order around the polygon, either way, without crossing itself.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer than three vertices, two neighbours coincide, or a coordinate is not finite.
-
-    Notes
-    -----
-    At a corner that a point is nearest to, contact acts along the line from the point to the corner; a point inside is
-    pushed out through the nearest side.
-    """
-
-    vertices: tuple[tuple[float, float], ...]
-
-    def __post_init__(self) -> None:
-        if len(self.vertices) < 3:
-            raise InputError(f"vertices has {len(self.vertices)} points: give at least three")
-        for number, vertex in enumerate(self.vertices):
-            _check_pair(f"vertices[{number}]", vertex)
-            if tuple(vertex) == tuple(self.vertices[number - 1]):
-                raise InputError(f"vertices[{number}] is {vertex}, as is the one before it: leave one of them out")
-
-    def gap(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Measure the distance from the nearest side or corner; see `Obstacle.gap`."""
-        towards, _, _ = self._nearest(points)
-        distance = np.hypot(*towards.T)
-        return np.asarray(np.where(self._holds(points), -distance, distance))
-
-    def approach(self, points: FloatArray, normals: FloatArray) -> FloatArray:
-        """Return the direction to the nearest point, out of it where the polygon holds the point."""
-        towards, inward, is_corner = self._nearest(points)
-        away = np.where(self._holds(points)[:, None], -towards, towards)
-        # of a point on the polygon itself the vector is round-off: its side knows better, and at a corner the body
-        touches = np.hypot(*towards.T) <= _TOUCHING * np.abs(np.concatenate([self.vertices, points])).max()
-        at_corner = np.where(touches[:, None], normals, _unit_vectors(away, normals))
-        return np.where(is_corner[:, None], at_corner, inward)
-
-    def _sides(self) -> tuple[FloatArray, FloatArray]:
-        """Return start (n_sides, 2) and vector to the end (n_sides, 2) of each side, anticlockwise."""
-        start = np.array(self.vertices, dtype=float)
-        x, y = (start - start[0]).T
-        if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
-            start = start[::-1]
-        return start, np.roll(start, -1, axis=0) - start
-
-    def _nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Return the vectors (n, 2) to the nearest points, the inward normals (n, 2) there, and which are corners."""
-        start, along = self._sides()
-        offset = start - points[:, None, :]
-        share = np.clip(-np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
-        to_side = offset + share[:, :, None] * along
-        rows, nearest = np.arange(len(points)), np.argmin(np.sum(to_side**2, axis=2), axis=1)
-        unit = along[nearest] / np.hypot(*along[nearest].T)[:, None]
-        chosen = share[rows, nearest]
-        return to_side[rows, nearest], np.stack([-unit[:, 1], unit[:, 0]], axis=1), (chosen == 0.0) | (chosen == 1.0)
-
-    def _holds(self, points: FloatArray) -> BoolArray:
-        """Return (n,) bool: points inside, by the number of sides that a ray to the right crosses."""
-        start, along = self._sides()
-        x, y = points[:, :1], points[:, 1:]
-        end = np.roll(start, -1, axis=0)  # to the last digit the start of the next side
-        spans = (start[:, 1] > y) != (end[:, 1] > y)
-        rise = np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
-        crossings = spans & (x < start[:, 0] + along[:, 0] * (y - start[:, 1]) / rise)
-        return np.asarray(crossings.sum(axis=1) % 2 == 1)
+        return unit_vectors(self._from_centre(points), normals)
 
 
 @dataclass(frozen=True)
@@ -299,7 +222,7 @@ class Gap:
         return np.asarray(towards / length[:, None])
 
 
-def _unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
+def unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
     """Return unit vectors (n, 2), those of `otherwise` where a vector is zero."""
     largest = np.abs(vectors).max(axis=1, initial=0.0)[:, None]
     is_known = largest > 0.0
@@ -307,6 +230,7 @@ def _unit_vectors(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:
     return np.where(is_known, scaled / np.where(is_known, np.hypot(*scaled.T)[:, None], 1.0), otherwise)
 
 
-def _check_pair(name: str, pair: tuple[float, float]) -> None:
+def check_pair(name: str, pair: tuple[float, float]) -> None:
+    """Refuse a pair that is not two finite numbers."""
     if len(pair) != 2 or not all(math.isfinite(component) for component in pair):
         raise InputError(f"{name} is {pair}: give two finite numbers")

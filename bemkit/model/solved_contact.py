@@ -91,15 +91,14 @@ def _oblique(model: Model, node_status: IntArray) -> list[str]:
 
 
 def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
-    everywhere = model.prepared.candidates
-    nodes = everywhere.nodes
-    overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - everywhere.gap
+    candidates, nodes = model.prepared.candidates, model.prepared.candidates.nodes
+    overlap = np.sum(displacement[nodes.nodes] * nodes.directions, axis=1) - candidates.gap
     overlap[np.isin(nodes.nodes, model.nodes.nodes)] = -math.inf
     found = []
-    for part in dict.fromkeys(everywhere.parts):
-        node = int(np.argmax(np.where(np.equal(everywhere.parts, part), overlap, -math.inf)))
+    for part in dict.fromkeys(candidates.parts):
+        node = int(np.argmax(np.where(np.equal(candidates.parts, part), overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
-            x, y = everywhere.points[node]
+            x, y = candidates.points[node]
             found.append(
                 f"Supports push part {part!r} {overlap[node]:.3g} m into its obstacle at ({x:.6g}, {y:.6g}), where "
                 "contact cannot act: let them move with the obstacle, or leave a free element between them."

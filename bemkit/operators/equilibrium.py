@@ -15,6 +15,11 @@ estimate is 1e-12 in all but thin or nearly incompressible bodies; a strip of 10
 estimate of 1e-6. More than that no check of the result would let pass."""
 
 
+NOISE = 64.0
+"""Forces below this many times the round-off of their terms are none: sums of hundreds of terms leave some eps of their
+sizes, and loads that strain a body by less are lost in them."""
+
+
 @dataclass(frozen=True)
 class Imbalance:
     """How far forces are from equilibrium, relative to their sizes.
@@ -47,6 +52,65 @@ class Imbalance:
         """Return the larger of each of the numbers of two measurements."""
         mine, others = ((of.force, of.moment, of.round_off) for of in (self, other))
         return Imbalance(*np.maximum(mine, others).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class Unbalanced:
+    """What a state of contact leaves of the balance of forces [N/m].
+
+    Parameters
+    ----------
+    contact : (n,) array
+        Forces of the obstacle at the nodes.
+    at_nodes, on_motions : float
+        Largest force that is missing at a node, and largest work of all forces on a rigid motion of unit size.
+    nodes_round_off, motions_round_off : float
+        How much of that round-off alone may leave.
+    terms : float
+        Largest of the terms whose differences the forces are: those of the stiffness on each displacement.
+    """
+
+    contact: FloatArray
+    at_nodes: float
+    on_motions: float
+    nodes_round_off: float
+    motions_round_off: float
+    terms: float
+
+    def beside(self, given: FloatArray, reaction: float = 0.0, round_off: float = 0.0) -> Imbalance:
+        """Return it relative to the forces at hand.
+
+        Parameters
+        ----------
+        given : array [N/m]
+            What else acts on the nodes of the body, in directions that no support holds.
+        reaction : float [N/m]
+            Largest force of a support; these do no work on the motions that are free.
+        round_off : float [N/m]
+            What may be left of a sum of forces on the whole body.
+
+        Returns
+        -------
+        Imbalance
+            What is missing at a node by the largest force, the work by the sum of the forces that could do any. If
+            nothing is given, and no other force is more than round-off, the body has only been moved: then by the
+            terms. They do not excuse what is missing of a load, or a body on its way to infinity would balance any.
+        """
+        loads = float(np.abs(given).sum())
+        largest = max(float(np.abs(self.contact).max()), float(np.abs(given).max(initial=0.0)), reaction)
+        total = loads + float(np.abs(self.contact).sum())
+        of_sums = max(self.motions_round_off, round_off)
+        terms = max(self.terms, round_off / np.finfo(float).eps)
+        noise = NOISE * of_sums if loads == 0.0 else 0.0
+        largest, total = (max(size, terms) if size <= noise else size for size in (largest, total))
+        at_nodes, on_motions = (
+            Imbalance(0.0, 0.0) if size == 0.0 else Imbalance(missing / size, 0.0, left / size)
+            for missing, left, size in (
+                (self.at_nodes, self.nodes_round_off, largest),
+                (self.on_motions, of_sums, total),
+            )
+        )
+        return at_nodes.joined(Imbalance(0.0, on_motions.force, on_motions.round_off))
 
 
 def round_off_of(displacement: FloatArray, sensitivity: FloatArray | None) -> float:

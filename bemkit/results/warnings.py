@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
+from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.error_indicators import blind_elements
 from bemkit.results.solution import ContactTable, Solution, are_neighbours
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
@@ -34,7 +36,8 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     """
     if not solution.is_certified:
         return solution.plan.warnings
-    return (*solution.plan.warnings, *_error(solution), *_coarse_curves(solution.mesh), *_narrow_zones(solution))
+    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _narrow_zones(solution)
+    return (*solution.plan.warnings, *chain(*doubts))
 
 
 def _error(solution: Solution) -> Iterator[str]:
@@ -69,6 +72,22 @@ def _share_alone(mesh: BoundaryMesh) -> float:
     whole = mesh.whole
     is_alone = break_nodes(whole)[whole.elements].all(axis=1)
     return float(whole.lengths[is_alone].sum() / whole.lengths.sum())
+
+
+def _turned(solution: Solution) -> Iterator[str]:
+    """Doubt constant elements without slopes, which take rotation for strain, where the body turns more than that."""
+    discretisation, mesh = solution.scene.discretisation, solution.mesh
+    if discretisation.keeps_rotations:
+        return
+    points, displacement = solution.boundary.points, solution.boundary.displacement
+    strained = without_motion(mesh, points, displacement)
+    motion = displacement - strained
+    turn = np.hypot(*(motion - motion.mean(axis=0)).T).max() / np.hypot(*(points - points.mean(axis=0)).T).max()
+    if turn * mesh.lengths.max() > np.abs(strained).max():
+        yield (
+            f"The body turns by {turn:.2g}, which moves the ends of constant elements without slopes by more than it "
+            "is strained, and is taken for strain: use slopes, or linear elements."
+        )
 
 
 def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:

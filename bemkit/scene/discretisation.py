@@ -43,6 +43,11 @@ class Discretisation(Protocol):
         return False
 
     @property
+    def keeps_rotations(self) -> bool:
+        """Whether rotations leave no strain."""
+        return True
+
+    @property
     def estimates_error(self) -> bool:
         """Whether jumps of strains and steps of tractions estimate its error, so that meshes can follow an accuracy.
 
@@ -160,6 +165,11 @@ class ConstantCollocation(Discretisation):
     def method(self) -> str:
         """Collocation."""
         return "collocation"
+
+    @property
+    def keeps_rotations(self) -> bool:
+        """With slopes alone."""
+        return self.slopes
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the constants on elements; their nodes are the centres."""

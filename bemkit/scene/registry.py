@@ -127,7 +127,7 @@ OBSTACLES = Registry(
             "half-plane": "bemkit.contact.obstacle:HalfPlane",
             "circle": "bemkit.contact.obstacle:Circle",
             "cavity": "bemkit.contact.obstacle:Cavity",
-            "polygon": "bemkit.contact.obstacle:PolygonalObstacle",
+            "polygon": "bemkit.contact.polygon:PolygonalObstacle",
             "gap": "bemkit.contact.obstacle:Gap",
         }
     ),

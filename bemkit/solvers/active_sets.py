@@ -114,13 +114,22 @@ class ProjectionEquations:
     given_bound: FloatArray | None = None
     friction_share: float = 1.0
 
-    def evaluate(self, state: ContactState) -> Residual:
-        """Return sets and residual at `state`."""
+    def evaluate(self, state: ContactState, touches: BoolArray | None = None) -> Residual:
+        """Return sets and residual at `state`.
+
+        Parameters
+        ----------
+        state : ContactState
+        touches : (n_contact,) bool array, optional
+            Nodes that count as closed at a tie, where neither pressure nor clearance says so.
+        """
         problem = self.problem
         multiplier = state.traction if self.multiplier is None else self.multiplier
         towards_obstacle = self.rho_n * (state.u_n - problem.gap) - multiplier[:, 0]
         along_obstacle = self.rho_t * (state.u_t - problem.slip_origin) - multiplier[:, 1]
         is_closed = positive_part_derivative(towards_obstacle) > 0.0
+        if touches is not None:
+            is_closed |= touches
         predicted_sigma_n = -positive_part(towards_obstacle)
         if self.given_bound is None:
             bound = self.friction_share * problem.friction_bound(predicted_sigma_n, is_closed)
@@ -167,8 +176,21 @@ def contact_sets(problem: ContactProblem, state: ContactState) -> ActiveSets:
     """Return the active sets of a state under the exact conditions, rho being the stiffness scale of the body.
 
     Nothing makes a node without any friction stick: where it does not move, that is chance, and it counts as slipping.
+    A node without pressure touches if cohesion holds it, which ends when a node opens.
     """
     rho = problem.body.stiffness_scale
-    residual = ProjectionEquations(problem, rho, rho).evaluate(state)
+    residual = ProjectionEquations(problem, rho, rho).evaluate(state, coheres(problem, state))
     direction = np.where(residual.is_free & (residual.sets.direction == 0), 1, residual.sets.direction)
     return ActiveSets(residual.sets.is_closed, direction)
+
+
+def coheres(problem: ContactProblem, state: ContactState) -> BoolArray:
+    """Return (n_contact,) bool: where friction that needs contact but no pressure acts, as cohesion does.
+
+    As in a certificate a node with less shear than would close its clearance is open.
+    """
+    has_cohesion = (problem.friction_bound(np.zeros(problem.n_contact)) > 0.0) & ~np.asarray(
+        problem.law.acts_across_gap
+    )
+    clearance = problem.body.stiffness_scale * np.abs(problem.gap - state.u_n)
+    return np.asarray(has_cohesion & (np.abs(state.sigma_t) > clearance))

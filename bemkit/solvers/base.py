@@ -9,12 +9,11 @@ import numpy as np
 
 from bemkit.arrays import IntArray
 from bemkit.contact.certificate import Certificate, certify
-from bemkit.contact.conditions import separated
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
-from bemkit.solvers.newton import FloatingResponse, consistent_state, floating_response
+from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response
 
 
 class Status(Enum):
@@ -258,10 +257,9 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                unsolvable = find_unsolvable_load(self.problem)
-                if unsolvable is not None:
+                untouched = untouched_response(self.problem.body)
+                if untouched is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
                     return self._nothing_done(Status.UNSOLVABLE_LOAD, unsolvable.description)
-                untouched = self._untouched_response()
                 iterate = self._without_contact(self._first(start, spent=int(untouched is not None)), untouched)
             except SingularResponse as error:
                 return self._nothing_done(Status.SINGULAR, str(error))
@@ -278,7 +276,8 @@ class _Run:
                 history.append(self._record(following, new_sets, len(history), change, new_sets.n_changed(sets)))
                 iterate, sets = following, new_sets
             # a certificate measures by the travel where that hides the deformation
-            if status is not Status.MAX_STEPS and (travel := find_long_travel(self.problem)) is not None:
+            may_travel = untouched is None and status is not Status.MAX_STEPS
+            if may_travel and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
         return self._solution(iterate, status, sets, history)
@@ -290,14 +289,6 @@ class _Run:
             state, linear_solves = consistent_state(self.problem, start)
         iterate = self.solver.init(self.problem, state)
         return replace(iterate, linear_solves=iterate.linear_solves + linear_solves + spent)
-
-    def _untouched_response(self) -> FloatingResponse | None:
-        """Return the response without any contact, if the body floats and its load balances."""
-        body = self.problem.body
-        most = float(body.weights @ np.abs(self.problem.sticking_state.traction).sum(axis=1))
-        if np.any(np.abs(body.rigid_load()) > 1e-6 * most * np.abs(body.rigid_motions()).max(axis=(1, 2))):
-            return None  # far from balanced, which is not worth a linear solve
-        return floating_response(body, separated(body.n_contact))
 
     def _without_contact(self, iterate: Iterate, untouched: FloatingResponse | None) -> Iterate:
         """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.

@@ -6,10 +6,10 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.certificate import certificate_scales
-from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
 from bemkit.errors import InputError
-from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
+from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
 _SPRING = 1e-3
 """Springs that hold an unheld body, in units of its stiffness scale. Small: each further step reduces what the
@@ -100,7 +100,7 @@ def consistent_state(problem: ContactProblem, guess: ContactState) -> tuple[Cont
         raise InputError("start contains entries that are not finite; give finite displacements and tractions")
     rho = problem.body.stiffness_scale
     equations = ProjectionEquations(problem, rho, rho)
-    residual = equations.evaluate(guess)
+    residual = equations.evaluate(guess, coheres(problem, guess))
     response = respond(equations, residual, residual.sets)
     return response.state, response.linear_solves
 
@@ -131,6 +131,14 @@ class FloatingResponse:
         way = (displacement - self.state.displacement).ravel()
         shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
         return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
+
+
+def untouched_response(body: LinearBody) -> FloatingResponse | None:
+    """Return the response without any contact, if the body floats and the load on it balances.
+
+    Then no load pushes it anywhere, whatever round-off supports leave that carry it along.
+    """
+    return floating_response(body, separated(body.n_contact))
 
 
 def floating_response(body: LinearBody, conditions: LinearConditions) -> FloatingResponse | None:

@@ -16,9 +16,9 @@ from bemkit.contact.obstacle import (
     Gap,
     HalfPlane,
     Obstacle,
-    PolygonalObstacle,
     measure_contact,
 )
+from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import Expression
 
 coordinates = st.floats(-10.0, 10.0)
@@ -158,6 +158,17 @@ def test_a_body_that_rests_on_a_corner_touches_along_its_own_normal() -> None:
     )
     assert gap[0] == 0.0
     np.testing.assert_array_equal(direction, normals)
+
+
+@given(st.integers(0, 3), angles, angles, st.integers(-8, 8), st.integers(-8, 8))
+def test_round_off_does_not_choose_a_side_at_a_corner(number: int, turn: float, facing: float, x: int, y: int) -> None:
+    cosine, sine = math.cos(turn), math.sin(turn)
+    vertices = np.array(DART) @ np.array([[cosine, sine], [-sine, cosine]]) + [3.0, -7.0]
+    at = vertices[number] + np.spacing(vertices[number]) * [x, y]
+    normals = np.array([[math.cos(facing), math.sin(facing)]])
+    obstacle = PolygonalObstacle(tuple(map(tuple, vertices.tolist())))
+    np.testing.assert_array_equal(obstacle.approach(at[None], normals), normals)
+    assert abs(obstacle.gap(at[None], normals)[0]) < 1e-13  # the last digits of coordinates of about ten
 
 
 def test_a_point_on_the_side_of_a_polygon_is_pushed_against_its_normal() -> None:

@@ -64,13 +64,22 @@ def test_the_second_of_two_runs_into_one_file_is_refused_before_it_computes(
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
-def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Signals) -> None:
-    elements = ("--elements", "1200,1400,1600", "--meshes", "uniform", "--solver", "semismooth-newton")
-    study = start(tmp_path, "study", "paper-1", *elements, "--discretisation", "linear", "--jobs", "2", "-q")
+@pytest.mark.parametrize("is_at_work", [False, True], ids=["starting", "at work"])
+def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Signals, *, is_at_work: bool) -> None:
+    """Workers look for work in a queue of which they hold both ends: they would wait for more for ever."""
+    sizes = ("--elements", "40,60,1600,1800" if is_at_work else "1600,1800", "--meshes", "uniform")
+    choice = ("--solver", "semismooth-newton", "--discretisation", "linear", "--jobs", "2")
+    study = start(tmp_path, "study", "paper-1", *sizes, *choice, "-q", "-o", "rows.h5")
     try:
         wait_until(lambda: len(children_of(study.pid)) >= 3)  # two workers and the tracker of their resources
+        wait_until(lambda: not is_at_work or (tmp_path / "rows.h5").exists())
         workers = children_of(study.pid)
     finally:
         study.send_signal(end)
         study.wait()
-    wait_until(lambda: not any(map(is_alive, workers)), 30.0)
+    assert len(workers) >= 3
+    try:
+        wait_until(lambda: not any(map(is_alive, workers)), 30.0)
+    finally:
+        for worker in filter(is_alive, workers):
+            os.kill(worker, signal.SIGKILL)

@@ -200,3 +200,22 @@ def test_elements_that_stand_alone_have_no_estimate(elements: int, is_doubted: b
         mesh=bk.MeshOptions(elements=elements),
     )
     assert any("On 100 % of the boundary single" in warning for warning in bk.run(scene).warnings) == is_doubted
+
+
+@pytest.mark.parametrize(("slopes", "turn", "warns"), [(False, 1e-3, True), (False, 1e-5, False), (True, 1e-3, False)])
+def test_rotation_that_plain_constant_elements_take_for_strain(*, slopes: bool, turn: float, warns: bool) -> None:
+    """A block of E = 1, pulled by 1e-4 while its top turns."""
+    motion = PrescribedDisplacement(x=Expression(f"-{turn} * y"), y=Expression(f"{turn} * x"))
+    floor, top = Part("floor", Contact(Gap(1e-2)), sides=("bottom",)), Part("top", motion, sides=("top",))
+    scene = Scene(
+        title="turned",
+        shape=Rectangle(1.0, 1.0),
+        material=Material(1.0, 0.3),
+        parts=(floor, top, Part("pull", Traction(x=1e-4), sides=("right",))),
+        law=Frictionless(),
+        mesh=MeshOptions(40),
+        discretisation=bk.ConstantCollocation(slopes=slopes),
+    )
+    doubts = [words for words in find_warnings(run(scene)) if "taken for strain" in words]
+    assert len(doubts) == warns
+    assert not warns or doubts[0].startswith("The body turns by 0.001")

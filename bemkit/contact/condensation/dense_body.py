@@ -10,7 +10,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
-from bemkit.operators.equilibrium import Imbalance
+from bemkit.operators.equilibrium import Imbalance, Unbalanced
 
 _SMALLEST_RCOND = 1e-13
 """Below this reciprocal condition number of a row-scaled system its matrix counts as singular. A condensed stiffness
@@ -173,33 +173,37 @@ class DenseBody(LinearBody):
         return self._motions @ self.load
 
     def imbalance(self, state: ContactState) -> Imbalance:
+        """Return how far the state is from equilibrium, relative to load and contact forces; see `unbalanced`."""
+        return self.unbalanced(state).beside(self.load)
+
+    def unbalanced(self, state: ContactState) -> Unbalanced:
         """Return the largest nodal force out of balance, and the work of load and tractions on rigid motions.
 
         Notes
         -----
         The first number is the residual of ``weights * t = stiffness @ u - load`` (and of eliminated tangents that do
-        not follow), so it also detects states that are no response of this body. It is relative to the largest nodal
-        force (term of the sums), the second one to the largest load or contact force. Round-off is what the stiffness
-        makes of the rigid part of the displacements, and that of the sums.
+        not follow), so it also detects states that are no response of this body. Round-off is what the stiffness makes
+        of the rigid part of the displacements, and that of the sums.
         """
-        forces = (self.weights[:, None] * state.traction).ravel()[self.unknown_dofs]
-        unknowns = state.displacement.ravel()[self.unknown_dofs]
-        stray = self._stray_forces(state, unknowns)
-        largest_term, all_terms = self._column_sizes * np.abs(unknowns)
-        largest = max(np.abs(forces).max(), np.abs(self.load).max(), largest_term.max(), stray)
-        if largest == 0.0:
-            return Imbalance(0.0, 0.0)
+        contact = (self.weights[:, None] * state.traction).ravel()
+        forces, unknowns = contact[self.unknown_dofs], state.displacement.ravel()[self.unknown_dofs]
         missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
         motions, basis = self._motions, self._orthonormal_motions
-        left_by_motions = np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0)
-        residual = Imbalance(float(np.maximum(missing, stray) / largest), 0.0, float(left_by_motions / largest))
-        if not len(motions):
-            return residual
-        # Not relative to the stiffness terms: a body on its way to infinity would balance any load by comparison.
-        given = max(np.abs(forces).max(), np.abs(self.load).max()) or largest
-        round_off = self._motion_defect @ np.abs(unknowns) + np.finfo(float).eps * all_terms.sum()
-        work = np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max()
-        return residual.joined(Imbalance(0.0, float(work / given), float(round_off / given)))
+        left_by_motions = float(np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0))
+        largest_terms, all_terms = self._column_sizes * np.abs(unknowns)
+        eps = np.finfo(float).eps
+        work, defect = 0.0, 0.0
+        if len(motions):
+            work = float(np.abs(motions @ (self.load + forces)).max() / np.abs(motions).max())
+            defect = float(self._motion_defect @ np.abs(unknowns))
+        return Unbalanced(
+            contact=contact,
+            at_nodes=float(np.maximum(missing, self._stray_forces(state, unknowns))),
+            on_motions=work,
+            nodes_round_off=left_by_motions + float(eps * largest_terms.sum()),
+            motions_round_off=defect + float(eps * all_terms.sum()),
+            terms=float(largest_terms.max()),
+        )
 
     @cached_property
     def _column_sizes(self) -> FloatArray:

@@ -15,7 +15,7 @@ from bemkit.contact.condensation.nodes import contact_conditions, find_tangents,
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import Work
-from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
+from bemkit.operators.equilibrium import NOISE, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import possible_motions, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
@@ -108,6 +108,8 @@ class CondensedBody(DenseBody):
         The displacements of the contact nodes among these.
     points : (n_nodes, 2) array [m]
         Where the nodal forces act.
+    force : (n_nodes, 2) array [N/m]
+        Given nodal forces, in x and y.
     conditions : NodalConditions
         Of the displacement nodes; the contact nodes are retained.
     nodes : ContactNodes
@@ -125,6 +127,7 @@ class CondensedBody(DenseBody):
     condensed: CondensedMap
     unknowns: Unknowns
     points: FloatArray
+    force: FloatArray
     conditions: NodalConditions
     nodes: ContactNodes
     balanced: tuple[int, ...] = (0, 1, 2)
@@ -168,6 +171,7 @@ class CondensedBody(DenseBody):
             eliminated_tangents=unknowns.tangents(condensed, conditions, self.nodes),
             condensed=condensed,
             unknowns=unknowns,
+            force=force,
             conditions=conditions,
         )
 
@@ -178,31 +182,35 @@ class CondensedBody(DenseBody):
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body (loads, contact, reactions) are from equilibrium of forces and moments.
 
-        The first number also covers the residual of the contact nodes themselves; see `DenseBody.imbalance`. Its
-        round-off is that of the forces, which in thin bodies are small differences of large terms.
+        The numbers also cover the contact nodes themselves; see `DenseBody.unbalanced`. Prescribed displacements would
+        cause any forces on a clamped body, so that its condensed load is no measure: those at hand are. Their round-off
+        is that of the terms whose differences they are, small ones in thin bodies and in those that move far.
         """
         displacement, force = self.recover(state)
-        of_contact = super().imbalance(state)
-        total = float(np.abs(force).sum())
-        if not self.balanced or self._only_moves(displacement, total):
+        reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
+        round_off = max(of_forces, np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum()))
+        noise = NOISE * round_off
+        reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
+        given = self._in_frames(self.force)[~self.conditions.is_fixed]
+        inside = self.condensed.volume_force
+        if inside is not None:
+            given = np.append(given, inside[:2])
+        of_contact = self.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
+        if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
-        round_off = round_off_of(displacement, self.condensed.sensitivity)
-        return of_contact.joined(
-            resultant_imbalance(self.points, force, self.balanced, round_off, self.condensed.volume_force)
-        )
+        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, inside))
 
-    def _only_moves(self, displacement: FloatArray, total: float) -> bool:
-        """Whether the body has moved rigidly, so that its forces are what is left of terms which cancel."""
-        reach = float(np.abs(displacement).max())
-        terms = np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum())
-        # sums of hundreds of terms leave some eps of their sizes; loads that strain a body by less are lost in them
-        if total > 64.0 * max(terms, round_off_of(displacement, self.condensed.sensitivity)):
-            return False
+    def _in_frames(self, force: FloatArray) -> FloatArray:
+        """Return forces (n_nodes, 2) in the frames of the nodes."""
+        return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, force))
+
+    def _only_moves(self, displacement: FloatArray) -> bool:
+        """Whether the body has moved rigidly."""
         motions = rigid_motions(self.points, self.points.mean(axis=0), float(np.ptp(self.points, axis=0).max()))
         motions = motions.reshape(-1, 3)
         rigid = motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
         # nearly incompressible bodies recover a rigid motion to 1e-8
-        return bool(np.abs(displacement.ravel() - rigid).max() <= 1e-6 * reach)
+        return bool(np.abs(displacement.ravel() - rigid).max() <= 1e-6 * np.abs(displacement).max())
 
 
 def condense(
@@ -257,6 +265,7 @@ def condensed_body(
         condensed=condensed,
         unknowns=unknowns,
         points=dof_points(space),
+        force=force,
         conditions=conditions,
         nodes=contact,
         balanced=possible_motions(space.mesh),

@@ -12,7 +12,7 @@ from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.studies.stability.independent_check.boundary import Boundary
 from bemkit.studies.stability.independent_check.nodes import Nodes
-from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT, Scales
+from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT, Scales, scales_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +53,8 @@ def measured_contact(solution: Solution, before: Solution | None, nodes: Nodes, 
     slip = motion[:, 1]
     if before is not None:
         slip = slip - nodes.components(before.boundary.displacement[nodes.nodes])[:, 1]
+        turned = scales.turned + scales_of(before).turned  # after a large motion more than all there is of a small one
+        slip = np.sign(slip) * np.maximum(np.abs(slip) - turned, 0.0)
     clearance = np.where(np.isfinite(table.gap), table.gap - motion[:, 0], np.inf) / scales.length
     pressure, shear = -table.sigma_n / scales.stress, table.sigma_t / scales.stress
     acts_across_gap = np.broadcast_to(np.asarray(law.acts_across_gap), pressure.shape)

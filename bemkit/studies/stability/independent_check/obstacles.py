@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.obstacle import Cavity, Circle, DirectedObstacle, Gap, HalfPlane, Obstacle, PolygonalObstacle
+from bemkit.contact.obstacle import Cavity, Circle, DirectedObstacle, Gap, HalfPlane, Obstacle
+from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import evaluate_field
 
 _ROUND_OFF = 1e-12
@@ -74,7 +75,8 @@ def _to_polygon(vertices: FloatArray, points: FloatArray, normals: FloatArray) -
         sign = np.where(is_inside, -1.0, 1.0)[:, None]
         towards = sign * (start - points) / np.where(to_start > 0.0, to_start, 1.0)[:, None]
         _keep_nearer(nearest, direction, to_start, towards, to_start > 0.0)
-    is_corner = np.hypot(*np.moveaxis(to_corners, -1, 0)).min(axis=1) <= _ROUND_OFF * np.abs(points).max(initial=0.0)
+    round_off = _ROUND_OFF * np.abs(np.concatenate([vertices, points])).max()
+    is_corner = np.hypot(*np.moveaxis(to_corners, -1, 0)).min(axis=1) <= round_off
     return np.where(is_inside, -nearest, nearest), np.where(is_corner[:, None], normals, direction)
 
 

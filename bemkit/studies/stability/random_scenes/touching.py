@@ -9,7 +9,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle, PolygonalObstacle
+from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
+from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.scene import Contact, Part
