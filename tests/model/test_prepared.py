@@ -12,7 +12,7 @@ import bemkit as bk
 import bemkit.model.prepared
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare, prepare_steps
-from bemkit.operators.steklov_poincare import CollocationMap
+from bemkit.operators.steklov_poincare import CollocationElasticity
 from bemkit.scene.load_history import load_steps
 
 ONCE = ("find_units", "find_contact", "contact_conditions", "supports_on", "nodal_forces", "check_symmetry")
@@ -45,8 +45,8 @@ def test_load_steps_share_the_units_of_the_largest_load() -> None:
 
 
 def test_a_node_that_loses_its_friction_keeps_the_condensed_body(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls, condense = [], CollocationMap.condense
-    monkeypatch.setattr(CollocationMap, "condense", lambda self, *a: calls.append(1) or condense(self, *a))
+    calls, condense = [], CollocationElasticity.condense
+    monkeypatch.setattr(CollocationElasticity, "condense", lambda self, *a: calls.append(1) or condense(self, *a))
     scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40))
     smooth = dataclasses.replace(scene, law=bk.Frictionless())
     model = build_model(prepare(scene, scene.build_mesh()))

@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity
 from bemkit.runs.run import UnsolvableSceneError, run_history
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 
@@ -123,7 +123,7 @@ def test_the_body_is_assembled_once_and_loads_are_exact(
     discretisation: bk.Discretisation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = []
-    for kind in (GalerkinMap, CollocationMap):
+    for kind in (GalerkinElasticity, CollocationElasticity):
         original = kind.condense
         monkeypatch.setattr(kind, "condense", lambda self, *a, original=original: calls.append(1) or original(self, *a))
     first = cylinder(0.03, (1.0,), elements=120)

@@ -9,7 +9,7 @@ from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.stability.scenes import FLOOR, block
+from tests.scenes import FLOOR, block
 
 COHESION = 0.1
 STATES = {

@@ -9,6 +9,7 @@ import bemkit as bk
 from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.problem import ContactProblem, DenseBody
 from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
 from bemkit.operators.equilibrium import Imbalance
 from bemkit.testing import CheckFailed, check_body
 from tests.contact.test_free_tangents import SCENES
@@ -33,7 +34,7 @@ def test_a_body_with_another_load():
 @pytest.mark.parametrize("discretisation", [bk.LinearGalerkin(), bk.ConstantCollocation()], ids=["linear", "constant"])
 def test_bodies_of_scenes(name, discretisation):
     scene = replace(SCENES[name](), discretisation=discretisation)
-    model = build_model(scene, scene.build_mesh())
+    model = build_model(prepare(scene, scene.build_mesh()))
     nodes, space = model.body.conditions.displacement, model.elastic.displacement_space
     reloaded = model.body.under(0.5 * nodes, np.ones((space.n_dofs // 2, 2)))
     check_body(model.body, is_symmetric=isinstance(discretisation, bk.LinearGalerkin), reloaded=reloaded)

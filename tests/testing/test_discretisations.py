@@ -15,8 +15,10 @@ from bemkit.arrays import FloatArray
 from bemkit.cli.main import main
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.registry import DISCRETISATIONS
 from bemkit.testing import CheckFailed, check_discretisation
@@ -144,11 +146,12 @@ class NotSymmetric(bk.ConstantCollocation):
 
 
 class Distorted(CollocationMap):
-    """Adds springs to the matrix."""
+    """Adds springs to the stiffness."""
 
-    def matrix(self) -> FloatArray:
-        """Return the matrix with forces on translations."""
-        return super().matrix() + 1e-3 * np.eye(self.displacement_space.n_dofs)
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Return a map with forces on translations."""
+        condensed = super().condense(conditions, force)
+        return replace(condensed, stiffness=condensed.stiffness + 1e-3 * np.eye(len(condensed.stiffness)))
 
 
 @dataclass(frozen=True)
