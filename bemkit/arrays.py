@@ -26,6 +26,8 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
 
     A list in no particular order is one run whose indices are an array.
     """
+    if not indices.size:
+        return []
     breaks = np.flatnonzero(np.diff(indices) != 1) + 1
     if breaks.size > 8:
         return [(slice(0, indices.size), indices)]

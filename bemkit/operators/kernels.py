@@ -32,7 +32,9 @@ from bemkit.arrays import ComplexArray, FloatArray
 
 LOST = 30.0
 """Factor of round-off that the upward recurrence may lose before the downward one takes over."""
-BANDS = (1.6, 3.0, 1.0e2, math.inf)
+FAR = 12.0
+"""Size r of the ellipse from which the power series takes fewer operations than the continued fraction."""
+BANDS = (1.6, 3.0, FAR, 1.0e2, math.inf)
 """Upper ends of the bands of r whose points go downward together, in as many steps as the lower end needs."""
 DIGITS = 17.0
 
@@ -66,19 +68,26 @@ def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> list[Comple
     """
     inverse = 1.0 / zeta
     w = inverse * inverse
-    power = inverse
-    for _ in range(highest - 1):
-        power = power * inverse
-    below, top = (_series(k, w, n_terms) for k in (highest - 1, highest))
-    below *= power
-    top *= power
-    top *= inverse
-    integrals = [top, below]
-    for k in range(highest - 1, 0, -1):
+    # the two highest as power series, the others by the recurrence downward, the last one from C_1 = zeta C_0 - 2
+    integrals = [_series(highest, w, n_terms)]
+    if highest == 1:
+        integrals[0] *= w
+    else:
+        power = inverse
+        for _ in range(highest - 1):
+            power = power * inverse
+        integrals[0] *= power
+        integrals[0] *= inverse
+        integrals.append(_series(highest - 1, w, n_terms))
+        integrals[1] *= power
+    for k in range(highest - 1, 1, -1):
         lower = ((2 * k + 1) / k) * zeta
         lower *= integrals[-1]
         lower -= ((k + 1) / k) * integrals[-2]
         integrals.append(lower)
+    first = integrals[-1] + 2.0
+    first *= inverse
+    integrals.append(first)
     return integrals[::-1]
 
 
@@ -123,40 +132,59 @@ def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tup
     log_product : (n,) array
         log|zeta**2 - 1|.
     """
+    logarithm, log_product = _logarithm(plus, minus)
+    integrals = [logarithm]
+    if highest:
+        zeta = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
+        integrals.append(zeta * logarithm - 2.0)
+        for k in range(1, highest):
+            integrals.append(((2 * k + 1) * zeta * integrals[k] - k * integrals[k - 1]) / (k + 1))
+        _replace_far(integrals, zeta, _sum_of_half_axes(plus, minus))
+    return integrals, log_product
+
+
+def _logarithm(plus: ComplexArray, minus: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Return log((zeta + 1) / (zeta - 1)) and log|zeta**2 - 1|."""
     abs_plus, abs_minus = np.abs(plus), np.abs(minus)
-    log_plus, log_minus = np.log(abs_plus), np.log(abs_minus)
     near_start = abs_plus < abs_minus
     eta = np.where(near_start, plus.imag, minus.imag)
-    zeta = np.where(near_start, plus - 1.0, minus + 1.0)
-    xi = zeta.real
+    xi = np.where(near_start, plus.real - 1.0, minus.real + 1.0)
+    result = np.empty(plus.shape, complex)
+    # the angle under which the element is seen
+    np.negative(np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta), out=result.imag)
     # |zeta + 1|^2 - |zeta - 1|^2 = 4 xi: log1p keeps the digits of the difference of two nearly equal logarithms
-    ratio = np.divide(
-        4.0 * xi, abs_minus * abs_minus, out=np.zeros_like(xi), where=np.abs(xi) < abs_minus * abs_minus / 8.0
-    )
-    lam = np.where(ratio != 0.0, 0.5 * np.log1p(ratio), log_plus - log_minus)
-    theta = np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta)
-    integrals: list[ComplexArray] = [lam - 1j * theta]
-    if highest:
-        integrals.append(zeta * integrals[0] - 2.0)
-    for k in range(1, highest):
-        integrals.append(((2 * k + 1) * zeta * integrals[k] - k * integrals[k - 1]) / (k + 1))
-    if highest:
-        # half the sum of the distances to the foci is one half axis of the ellipse through the point
-        axis = 0.5 * (abs_plus + abs_minus)
-        _replace_far(integrals, zeta, axis + np.sqrt(np.maximum((axis - 1.0) * (axis + 1.0), 0.0)))
-    return integrals, log_minus + log_plus
+    squared = abs_minus * abs_minus
+    ratio = np.divide(4.0 * xi, squared, out=np.zeros_like(xi), where=np.abs(xi) < squared / 8.0)
+    log_plus, log_minus = np.log(abs_plus, out=abs_plus), np.log(abs_minus, out=abs_minus)
+    result.real = np.where(ratio != 0.0, 0.5 * np.log1p(ratio), log_plus - log_minus)
+    return result, log_plus + log_minus
+
+
+def _sum_of_half_axes(plus: ComplexArray, minus: ComplexArray) -> FloatArray:
+    """Return r; half the sum of the distances to the foci is one half axis."""
+    axis = np.abs(plus)
+    axis += np.abs(minus)
+    axis *= 0.5
+    other = np.sqrt(np.maximum((axis - 1.0) * (axis + 1.0), 0.0))
+    other += axis
+    return other
 
 
 def _replace_far(integrals: list[ComplexArray], zeta: ComplexArray, size: FloatArray) -> None:
-    """Put in the downward recurrence where the upward one loses digits; `size` is r."""
+    """Put in what loses no digits where the upward recurrence does; `size` is r."""
     highest = len(integrals) - 1
     lower = LOST ** (0.5 / highest)
     for upper in BANDS:
         chosen = np.flatnonzero((size > lower) & (size <= upper))
-        if chosen.size:
+        if chosen.size and lower < FAR:
             steps = math.ceil(DIGITS / (2.0 * math.log10(lower)))
             for k, ratio in enumerate(_ratios(zeta[chosen], highest, steps), start=1):
                 integrals[k][chosen] = ratio * integrals[k - 1][chosen]
+        elif chosen.size:
+            # |zeta| is at least half the difference of r and 1 / r
+            n_terms = terms_needed(0.5 * (lower - 1.0 / lower))
+            for integral, values in zip(integrals, far_integrals(zeta[chosen], highest, n_terms), strict=True):
+                integral[chosen] = values
         lower = max(lower, upper)
 
 
@@ -165,9 +193,12 @@ def _ratios(zeta: ComplexArray, highest: int, steps: int) -> list[ComplexArray]:
     ratio = np.zeros_like(zeta)
     ratios = []
     for k in range(highest + steps, 0, -1):
-        ratio = k / ((2 * k + 1) * zeta - (k + 1) * ratio)
-        ratios.append(ratio)
-    return ratios[: steps - 1 : -1] if steps else ratios[::-1]
+        ratio *= -(k + 1)
+        ratio += (2 * k + 1) * zeta
+        np.divide(k, ratio, out=ratio)
+        if k <= highest:
+            ratios.append(ratio.copy())
+    return ratios[::-1]
 
 
 def log_integral(k: int, integrals: Sequence[ComplexArray], log_product: FloatArray) -> FloatArray:

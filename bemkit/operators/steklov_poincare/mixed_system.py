@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.assembly import sweep_rows, write_columns
 from bemkit.operators.collocation.collocation_points import Coefficients
@@ -134,6 +134,9 @@ class MixedSystem:
         loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
         number = np.zeros(n_rows, np.intp)
         number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
+        open_runs, unknown_at = consecutive_runs(self._open), consecutive_runs(unknown)
+        # the columns of consecutive unknowns are consecutive among those of the single layer, too
+        unknown_runs = [(dofs, consecutive_runs(number[unknown[positions]])[0][1]) for positions, dofs in unknown_at]
         known = np.zeros((2, n))
 
         def store(rows: slice, block: Coefficients) -> None:
@@ -149,8 +152,10 @@ class MixedSystem:
             _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
             known[:, rows] -= _product(double[:, :, moved], displacement)
             if right is not None:
-                right[:, rows] = double[:, :, self._open]
-                double[:, :, unknown] = -single[:, :, number[unknown]]
+                for positions, dofs in open_runs:
+                    right[:, rows, positions] = double[:, :, dofs]
+                for dofs, in_single in unknown_runs:
+                    double[:, :, dofs] = -single[:, :, in_single]
 
         needs_double, needs_single = matrix is not None or moved.size > 0, np.zeros(n, bool)
         needs_single[loaded_elements] = True
