@@ -23,7 +23,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.integrals.panels import Panels
-from bemkit.operators.kernels import legendre_of_monomials
+from bemkit.operators.kernels import legendre_of_monomials, legendre_values
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
 from bemkit.operators.somigliana.moments import (
@@ -169,8 +169,8 @@ class InteriorFields:
         location = self._locator.locate(points)
         _require_inside(location, points)
         relative = points - self.mesh.centre
-        powers = location.xi[:, None] ** np.arange(self._displacement.shape[2])
-        reference = np.sum(self._displacement[CENTRE, location.element] * powers, axis=1)
+        polynomials = legendre_values(self._displacement.shape[2] - 1, location.xi)
+        reference = np.einsum("nk,kn->n", self._displacement[CENTRE, location.element], polynomials)
         step = max(1, CHUNK_PAIRS // self.mesh.n_elements)
         for first in range(0, len(points), step):
             rows = slice(first, min(first + step, len(points)))
@@ -254,7 +254,10 @@ def _require_inside(location: Location, points: FloatArray) -> None:
 
 
 def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatArray, name: str) -> ComplexArray:
-    """Return the (3, n_elements, degree + 1) complex coefficients of a boundary field about centre, start and end."""
+    """Return a boundary field as (3, n_elements, degree + 1) complex coefficients.
+
+    Those of Legendre polynomials, and of powers of the local coordinate about start and end.
+    """
     if space.mesh is not mesh:
         raise GeometryError(f"{name}_space lives on another mesh: build it on the BoundaryMesh object given as mesh")
     dofs = np.asarray(dofs, dtype=np.float64)
@@ -265,15 +268,14 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
             f"give {shape} finite numbers, one row for each scalar dof"
         )
     values: ComplexArray = dofs[:, 0] + 1j * dofs[:, 1]
-    about_centre: ComplexArray = (
-        values[space.element_dofs] @ local_coefficients(space) @ np.linalg.inv(legendre_of_monomials(space.degree))
-    )
-    powers = range(space.degree + 1)
-    result = np.zeros((3, *about_centre.shape), complex)
-    for origin, e in ((CENTRE, 0.0), (START, -1.0), (END, 1.0)):
-        for k in powers:
+    coefficients: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
+    in_powers = coefficients @ np.linalg.inv(legendre_of_monomials(space.degree))
+    result = np.zeros((3, *coefficients.shape), complex)
+    result[CENTRE] = coefficients
+    for origin, e in ((START, -1.0), (END, 1.0)):
+        for k in range(space.degree + 1):
             for j in range(k + 1):
-                result[origin, :, j] += comb(k, j) * e ** (k - j) * about_centre[:, k]
+                result[origin, :, j] += comb(k, j) * e ** (k - j) * in_powers[:, k]
     # the very value at the node, so that two elements agree there to the last bit
     result[[START, END], :, 0] = (values[space.element_dofs] @ space.basis(np.array([-1.0, 1.0]))).T
     return result

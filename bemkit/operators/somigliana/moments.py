@@ -1,16 +1,16 @@
 r"""Integrals over single elements, seen from points off the boundary, that fields inside a body are made of.
 
-With rho = x - y, rho* its conjugate, tau the unit tangent at y and t the local coordinate of the element, for the
-powers k = 0, 1, ...:
+With rho = x - y, rho* its conjugate, tau the unit tangent at y, t the local coordinate of the element and p the
+Legendre polynomials P_0, P_1, ... of t, or close to an end e of the element the powers of t - e:
 
-    log          int t^k log|rho| ds        quotient     int t^k rho / rho* ds
-    cauchy       int t^k tau / rho ds       turn         int t^k (rho tau* / rho*^2 - tau / rho*) ds
-    reciprocal   int t^k / rho ds           spread       int t^k rho / rho*^2 ds
-    hyper        int t^k tau / rho^2 ds     twist        int t^k (tau / rho*^2 - 2 rho tau* / rho*^3) ds
+    log          int p log|rho| ds          quotient     int p rho / rho* ds
+    cauchy       int p tau / rho ds         turn         int p (rho tau* / rho*^2 - tau / rho*) ds
+    reciprocal   int p / rho ds             spread       int p rho / rho*^2 ds
+    hyper        int p tau / rho^2 ds       twist        int p (tau / rho*^2 - 2 rho tau* / rho*^3) ds
 
 Straight elements have them in closed form: with the local coordinate zeta = xi + i eta of x, they are combinations of
 
-    T_k = int t^k / (zeta - t) dt,  G_k = int t^k / (zeta - t)^2 dt,  H_k = int t^k / (zeta - t)^3 dt
+    C_k = int P_k / (zeta - t) dt,  G_k = int P_k / (zeta - t)^2 dt,  H_k = int P_k / (zeta - t)^3 dt
 
 Curved elements are bisected until each piece is well away from the point, and every piece takes one Gauss rule.
 """
@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 
@@ -34,15 +33,13 @@ from bemkit.operators.integrals.splitting import SEPARATION, split_until
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
 CENTRE, START, END = 0, 1, 2
-FAR = 6.0
-"""Local distance |zeta| beyond which a series replaces the upward recursion of G and H."""
 AT_END = 0.5
 """Points closer to an end of an element than this, in half lengths, see its densities expanded about that end."""
 
 
 @dataclass(frozen=True, eq=False)
 class DisplacementMoments:
-    """What displacements need; every array is (n_powers, n_pairs), `measure` the integral of t^k ds."""
+    """What displacements need; every array is (n_polynomials, n_pairs), `measure` the integral of P_k ds."""
 
     log: FloatArray
     measure: FloatArray
@@ -53,10 +50,11 @@ class DisplacementMoments:
 
 @dataclass(frozen=True, eq=False)
 class GradientMoments:
-    """What displacement gradients and stresses need; every array is (n_powers, n_pairs).
+    """What displacement gradients and stresses need; every array is (n_polynomials, n_pairs).
 
-    Powers are those of t - e, with e = 0, -1, 1 (`CENTRE`, `START`, `END`) as `origin` (n_pairs,) says: close to an end
-    of an element the densities are expanded about it, or the two elements that meet there would cancel.
+    Densities are sums of Legendre polynomials, or of powers of t - e with e = -1, 1, as `origin` (n_pairs,) says
+    (`CENTRE`, `START`, `END`): close to an end of an element they are expanded about it, or the two elements that meet
+    there would cancel.
     """
 
     origin: IntArray
@@ -67,47 +65,33 @@ class GradientMoments:
 
 
 def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_orders: int) -> list[list[ComplexArray]]:
-    """Return T_k, G_k, H_k (the first `n_orders` of them) for k = 0 ... highest, at any distance from the element.
+    """Return C_k, G_k, H_k (the first `n_orders` of them) for k = 0 ... highest, at any distance from the element.
 
     Parameters
     ----------
     plus, minus : complex arrays
         zeta + 1 and zeta - 1, each formed from the distance to its own end point.
     highest : int
-        Highest power.
+        Highest degree.
     n_orders : int
-        1 for T alone, 2 for T and G, 3 for T, G and H.
+        1 for C alone, 2 for C and G, 3 for C, G and H.
+
+    Notes
+    -----
+    G_k = -C_k' and H_k = C_k'' / 2 follow from (zeta^2 - 1) C_k' = k (zeta C_k - C_{k-1}) and from the differential
+    equation of the C_k, which is that of the Legendre polynomials [DLMF, 14.10.5 and 14.2.1]; nothing cancels.
     """
     integrals, _ = kernels.near_integrals(plus, minus, highest)
-    # the Legendre coefficients of powers are positive: nothing cancels
-    result = [list(np.tensordot(kernels.legendre_of_monomials(highest), np.stack(integrals), 1))]
+    result = [integrals]
     zeta = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
     product = plus * minus
-    first = (2.0 / product, 2.0 * zeta / (product * product))
-    far = np.minimum(np.abs(plus), np.abs(minus)) > FAR
-    for order in range(1, n_orders):
-        row = [first[order - 1]]
-        for k in range(1, highest + 1):
-            row.append(zeta * row[-1] - result[order - 1][k - 1])
-        if far.any():
-            _replace_far(row, result[order - 1], zeta, far, order)
-        result.append(row)
+    if n_orders > 1:
+        pairs = zip(range(1, highest + 1), integrals[1:], integrals, strict=False)
+        result.append([2.0 / product, *(k * (below - zeta * own) / product for k, own, below in pairs)])
+    if n_orders > 2:
+        pairs = zip(range(highest + 1), integrals, result[1], strict=True)
+        result.append([(zeta * slope + 0.5 * k * (k + 1) * own) / product for k, own, slope in pairs])
     return result
-
-
-def _replace_far(
-    row: list[ComplexArray], below: list[ComplexArray], zeta: ComplexArray, far: BoolArray, order: int
-) -> None:
-    """Put in the series at far points, where the upward recursion would lose digits like |zeta|^(2k)."""
-    inverse = 1.0 / zeta[far]
-    highest = len(row) - 1
-    first = highest % 2  # terms with j + highest odd vanish
-    series = np.zeros_like(inverse)
-    for j in range(first + 2 * (kernels.terms_needed(FAR - 1.0) + 2), first - 1, -2):
-        series = series * inverse * inverse + 2.0 * comb(j + order, order) / (j + highest + 1)
-    row[highest][far] = series * inverse ** (first + order + 1)
-    for k in range(highest - 1, -1, -1):
-        row[k][far] = (row[k + 1][far] + below[k][far]) * inverse
 
 
 def straight_displacement_moments(
@@ -122,28 +106,27 @@ def straight_displacement_moments(
         Points, none on its element.
     elements : (n_pairs,) int array
     highest : int
-        Highest power.
+        Highest degree.
     length : float [m]
         Unit of length r0 of the logarithm.
     """
     plus, minus, eta = _local(panels, x, elements)
     half, square = panels.half[elements], panels.tangent[elements] ** 2
-    t, g = local_moments(plus, minus, highest + 1, 2)
+    c, g = local_moments(plus, minus, highest + 1, 2)
     log_product = np.log(np.abs(plus)) + np.log(np.abs(minus))
-    powers = range(highest + 1)
-    constants = [2.0 / (k + 1) if k % 2 == 0 else 0.0 for k in powers]
+    degrees = range(highest + 1)
+    constants = [kernels.interval_moment(k) for k in degrees]
     return DisplacementMoments(
         log=np.stack(
             [
-                half
-                * (m * np.log(half / length) + (log_product if m else -t[0].real) / (k + 1) + t[k + 1].real / (k + 1))
+                half * (m * np.log(half / length) + kernels.log_integral(k, c, log_product))
                 for k, m in enumerate(constants)
             ]
         ),
         measure=np.stack([half * m for m in constants]),
-        quotient=np.stack([half * square * (2j * eta * t[k].conj() + m) for k, m in enumerate(constants)]),
-        cauchy=np.stack(t[: highest + 1]),
-        turn=np.stack([2j * eta * square * g[k].conj() for k in powers]),
+        quotient=np.stack([half * square * kernels.quotient_integral(k, c, eta) for k in degrees]),
+        cauchy=np.stack(c[: highest + 1]),
+        turn=np.stack([2j * eta * square * g[k].conj() for k in degrees]),
     )
 
 
@@ -167,7 +150,7 @@ def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArra
 
 
 def _expand_about_end(orders: list[list[ComplexArray]], zeta: ComplexArray, chosen: IntArray, end: int) -> None:
-    """Replace the powers of t by those of t - e at some points; `zeta` is their coordinate from that end."""
+    """Replace the Legendre polynomials by the powers of t - e at some points, `zeta` from that end."""
     for k in range(1, len(orders[0])):
         # the integral of (t - e)**(k - 1) over [-1, 1]
         moment = 2.0**k / k if end == START else -((-2.0) ** k) / k
@@ -256,19 +239,18 @@ class CurvedElements:
         highest: int,
         integrands: Callable[[ComplexArray, ComplexArray], list[ComplexArray]],
     ) -> list[ComplexArray]:
-        """Integrate t^k times each integrand: a list of (highest + 1, n) arrays."""
+        """Integrate the Legendre polynomials times each integrand: a list of (highest + 1, n) arrays."""
         pair, low, high = self._split(x, elements)
-        reference, weights = gauss_legendre(N_POINTS)
+        reference, weights = gauss_legendre(N_POINTS + highest // 2)
         xi = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * reference
         y, slope = self.place(elements[pair], xi)
         speed = np.abs(slope)
         measure = 0.5 * (high - low)[:, None] * weights * speed
         values = integrands(x[pair, None] - y, slope / speed)
         sums = [np.zeros((highest + 1, x.size), complex) for _ in values]
-        for k in range(highest + 1):
+        for k, polynomial in enumerate(kernels.legendre_values(highest, xi)):
             for total, value in zip(sums, values, strict=True):
-                np.add.at(total[k], pair, np.sum(value * measure, axis=1))
-            measure = measure * xi
+                np.add.at(total[k], pair, np.sum(value * measure * polynomial, axis=1))
         return sums
 
     def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
