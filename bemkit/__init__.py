@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.shapes import Ring as Ring
     from bemkit.geometry.shapes import Sector as Sector
     from bemkit.geometry.spaces import ConstantSpace as ConstantSpace
+    from bemkit.geometry.spaces import LagrangeSpace as LagrangeSpace
     from bemkit.geometry.spaces import LinearSpace as LinearSpace
     from bemkit.geometry.spaces import QuadraticSpace as QuadraticSpace
     from bemkit.geometry.spaces import corner_nodes as corner_nodes
@@ -79,6 +80,7 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Clamped as Clamped
     from bemkit.scene.scene import ConstantCollocation as ConstantCollocation
     from bemkit.scene.scene import Contact as Contact
+    from bemkit.scene.scene import Galerkin as Galerkin
     from bemkit.scene.scene import LinearGalerkin as LinearGalerkin
     from bemkit.scene.scene import MeshOptions as MeshOptions
     from bemkit.scene.scene import Part as Part
@@ -140,6 +142,7 @@ _HOME = {
     ),
     "geometry.spaces": (
         "ConstantSpace",
+        "LagrangeSpace",
         "LinearSpace",
         "QuadraticSpace",
         "corner_nodes",
@@ -191,6 +194,7 @@ _HOME = {
         "Clamped",
         "ConstantCollocation",
         "Contact",
+        "Galerkin",
         "LinearGalerkin",
         "MeshOptions",
         "Part",

@@ -170,6 +170,8 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
     discretisation = _word(DISCRETISATIONS, solution.scene.discretisation)
+    if isinstance(degree := getattr(solution.scene.discretisation, "degree", None), int) and degree > 2:
+        discretisation += f", degree {degree}"
     rows = [
         ("status", status),
         ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),

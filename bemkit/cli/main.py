@@ -82,6 +82,7 @@ def commands() -> None:
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
 @click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
+@click.option("--degree", type=int, metavar="P", help="Galerkin elements of degree P, instead of the scene's.")
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
@@ -96,6 +97,7 @@ def run(
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
+    degree: int | None,
     solver: str | None,
     rho: float | None,
     cascade: bool,
@@ -108,7 +110,7 @@ def run(
 
     wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
     click.get_current_context().with_resource(reserved(wanted.check()))
-    chosen = _load(scene, elements, discretisation, solver, rho, accuracy)
+    chosen = _load(scene, elements, discretisation, degree, solver, rho, accuracy)
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):
         if explain:
@@ -175,13 +177,14 @@ def scenes() -> None:
 @click.argument("scene")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
+@click.option("--degree", type=int, metavar="P", help="Galerkin elements of degree P, instead of the scene's.")
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
-def plan(scene: str, elements: int | None, discretisation: str | None, is_json: bool) -> None:
+def plan(scene: str, elements: int | None, discretisation: str | None, degree: int | None, is_json: bool) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
     from bemkit.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
 
-    chosen = _load(scene, elements, discretisation)
+    chosen = _load(scene, elements, discretisation, degree)
     with concerning(scene):
         check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None
@@ -204,6 +207,7 @@ def _load(
     source: str,
     elements: int | None,
     discretisation: str | None,
+    degree: int | None,
     solver: str | None = None,
     rho: float | None = None,
     accuracy: float | None = None,
@@ -212,7 +216,13 @@ def _load(
 
     scene = load_scene(source)
     return with_overrides(
-        scene, elements=elements, accuracy=accuracy, discretisation=discretisation, solver=solver, rho=rho
+        scene,
+        elements=elements,
+        accuracy=accuracy,
+        discretisation=discretisation,
+        degree=degree,
+        solver=solver,
+        rho=rho,
     )
 
 

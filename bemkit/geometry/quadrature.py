@@ -29,6 +29,27 @@ def gauss_legendre(n_points: int) -> tuple[FloatArray, FloatArray]:
     return points, weights
 
 
+@lru_cache(maxsize=16)
+def gauss_lobatto(degree: int) -> FloatArray:
+    """Return the Gauss-Lobatto points on [-1, 1], the best nodes of polynomials whose ends are nodes.
+
+    Parameters
+    ----------
+    degree : int
+        At least 1.
+
+    Returns
+    -------
+    (degree + 1,) array
+        The ends and the places where P_degree has no slope; symmetric to the last bit, and read-only.
+    """
+    inside = np.polynomial.legendre.legroots(np.polynomial.legendre.legder(np.eye(degree + 1)[degree]))
+    points = np.concatenate([[-1.0], np.sort(inside.real), [1.0]])
+    symmetric: FloatArray = 0.5 * (points - points[::-1])
+    read_only(symmetric)
+    return symmetric
+
+
 @lru_cache(maxsize=64)
 def gauss_graded(n_points: int, power: int = 4) -> tuple[FloatArray, FloatArray]:
     """Return a rule on [0, 1] for functions like u log(u), singular at 0.

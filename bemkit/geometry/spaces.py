@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Protocol
 
@@ -11,7 +11,10 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
+
+LARGEST_DEGREE = 12
+"""Highest polynomial degree of an element; integrals are exact to round-off up to it."""
 
 
 class BoundarySpace(Protocol):
@@ -181,13 +184,29 @@ class ElementwiseSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class _NodalSpace:
-    """Polynomials with a dof at each end of an element, shared with the neighbour unless the node is broken."""
+class LagrangeSpace:
+    """Piecewise polynomials of any degree, continuous except at the nodes named in `broken`.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    broken : (n_nodes,) bool array, optional
+        Nodes where the function may jump (tractions jump at corners). `corner_nodes(mesh)` finds the corners.
+    degree : int
+        From 1 to `LARGEST_DEGREE`. The dofs of an element are the values at its Gauss-Lobatto points.
+
+    Raises
+    ------
+    GeometryError
+        If the degree is out of range, or `broken` does not have one flag for each node.
+    """
 
     mesh: BoundaryMesh
     broken: BoolArray | None = None
+    degree: int = field(kw_only=True)
 
     def __post_init__(self) -> None:
+        check_degree(self.degree)
         if self.broken is not None and self.broken.shape != (self.mesh.n_nodes,):
             raise GeometryError(
                 f"broken has the shape {self.broken.shape}: give one flag for each of the {self.mesh.n_nodes} nodes"
@@ -203,10 +222,17 @@ class _NodalSpace:
         """Number of vector dofs."""
         return 2 * (int(self.element_dofs.max()) + 1)
 
+    @property
+    def local_nodes(self) -> FloatArray:
+        """(degree + 1,) array: the Gauss-Lobatto points."""
+        return gauss_lobatto(self.degree)
+
     @cached_property
     def element_dofs(self) -> IntArray:
-        """(n_elements, n_local) array of scalar dofs."""
-        return self._end_dofs
+        """(n_elements, degree + 1) array of scalar dofs: start, inner nodes, end; those of mesh nodes come first."""
+        ends, n_inner = self._end_dofs, self.degree - 1
+        inner = int(ends.max()) + 1 + np.arange(self.mesh.n_elements * n_inner).reshape(self.mesh.n_elements, n_inner)
+        return np.column_stack([ends[:, 0], inner, ends[:, 1]])
 
     @cached_property
     def _end_dofs(self) -> IntArray:
@@ -221,60 +247,34 @@ class _NodalSpace:
             dofs[:, 1] = np.where(is_shared[end], own[end], end)
         return dofs
 
-
-@dataclass(frozen=True, eq=False)
-class LinearSpace(_NodalSpace):
-    """Piecewise linear functions, continuous except at the nodes named in `broken`.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    broken : (n_nodes,) bool array, optional
-        Nodes where the function may jump (tractions jump at corners). `corner_nodes(mesh)` finds the corners.
-
-    Raises
-    ------
-    GeometryError
-        If `broken` does not have one flag for each node.
-    """
-
-    degree: ClassVar[int] = 1
-    local_nodes: ClassVar[FloatArray] = _fixed(-1.0, 1.0)
-
     def basis(self, xi: FloatArray) -> FloatArray:
-        """Evaluate the two hat functions."""
-        return np.stack([0.5 * (1.0 - xi), 0.5 * (1.0 + xi)])
+        """Evaluate the Lagrange polynomials, each one at its own node and zero at the others."""
+        nodes = self.local_nodes
+        values = np.ones((nodes.size, xi.size))
+        for own, value in zip(nodes, values, strict=True):
+            for other in nodes[nodes != own]:
+                value *= (xi - other) / (own - other)
+        return values
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticSpace(_NodalSpace):
-    """Piecewise quadratic functions, continuous except at the nodes named in `broken`.
+class LinearSpace(LagrangeSpace):
+    """Piecewise linear functions; see `LagrangeSpace`."""
 
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    broken : (n_nodes,) bool array, optional
-        Nodes where the function may jump.
+    degree: int = field(default=1, init=False)
 
-    Raises
-    ------
-    GeometryError
-        If `broken` does not have one flag for each node.
-    """
 
-    degree: ClassVar[int] = 2
-    local_nodes: ClassVar[FloatArray] = _fixed(-1.0, 0.0, 1.0)
+@dataclass(frozen=True, eq=False)
+class QuadraticSpace(LagrangeSpace):
+    """Piecewise quadratic functions; see `LagrangeSpace`."""
 
-    @cached_property
-    def element_dofs(self) -> IntArray:
-        """(n_elements, 3) array of scalar dofs: start, middle, end."""
-        ends = self._end_dofs
-        middle = int(ends.max()) + 1 + np.arange(self.mesh.n_elements)
-        return np.column_stack([ends[:, 0], middle, ends[:, 1]])
+    degree: int = field(default=2, init=False)
 
-    def basis(self, xi: FloatArray) -> FloatArray:
-        """Evaluate the three Lagrange polynomials."""
-        return np.stack([0.5 * xi * (xi - 1.0), (1.0 - xi) * (1.0 + xi), 0.5 * xi * (xi + 1.0)])
+
+def check_degree(degree: int) -> None:
+    """Refuse a degree that no space has."""
+    if isinstance(degree, bool) or not isinstance(degree, int) or not 1 <= degree <= LARGEST_DEGREE:
+        raise GeometryError(f"degree is {degree!r}: give a whole number from 1 to {LARGEST_DEGREE}")
 
 
 def break_nodes(mesh: BoundaryMesh) -> BoolArray:

@@ -29,8 +29,8 @@ from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.scene.conditions import Contact, Pressure, Traction
 from bemkit.scene.scene import Scene
 
-_N_POINTS = 5
-"""Gauss points of an element at which given loads are evaluated."""
+_MORE_POINTS = 4
+"""Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ class Model:
 
     def _insert_loads(self, traction: FloatArray) -> None:
         """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero."""
-        xi, weights = gauss_legendre(_N_POINTS)
+        xi, weights = gauss_legendre(self.elastic.traction_space.degree + 1 + _MORE_POINTS)
         projector = _projector(self.elastic.traction_space, xi, weights)
         is_free = np.ones(self.mesh.n_elements, bool)
         for part, elements, _ in parts_on(self.scene, self.mesh):

@@ -152,7 +152,7 @@ def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
     if not space.is_continuous:
         msg = (
             f"{operator} needs a continuous {role} space, but {type(space).__name__} may jump: "
-            "take LinearSpace(mesh) or QuadraticSpace(mesh) without broken nodes"
+            "take LagrangeSpace(mesh, degree=p), LinearSpace(mesh) or QuadraticSpace(mesh) without broken nodes"
         )
         raise GeometryError(msg)
 

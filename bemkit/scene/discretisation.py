@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, break_nodes
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, break_nodes, check_degree
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
@@ -28,7 +28,7 @@ _ROWS = 256
 class Discretisation(Protocol):
     """Spaces of displacements and tractions, and the map between them; a frozen dataclass without a mesh.
 
-    A discretisation of one's own derives from this class, or from `Galerkin`, and writes the members without a
+    A discretisation of one's own derives from this class, or from `SymmetricGalerkin`, and writes the members without a
     default; `bemkit.testing.check_discretisation` proves its promises.
     """
 
@@ -80,8 +80,8 @@ class Discretisation(Protocol):
         return BodyNeeds()
 
 
-class Galerkin(Discretisation, Protocol):
-    """Symmetric Galerkin; one of one's own writes its two spaces.
+class SymmetricGalerkin(Discretisation, Protocol):
+    """The symmetric Galerkin method; a discretisation of one's own writes its two spaces.
 
     Displacements are continuous; tractions may jump where boundary parts end and the boundary has corners, at least.
     """
@@ -108,43 +108,57 @@ class Galerkin(Discretisation, Protocol):
 
 
 @dataclass(frozen=True)
-class LinearGalerkin(Galerkin):
-    """Symmetric Galerkin: displacements continuous and linear, tractions constant on each element."""
+class Galerkin(SymmetricGalerkin):
+    """Symmetric Galerkin: displacements continuous and of degree p, tractions of degree p - 1 on each element.
+
+    Tractions are constant on each element for p = 1, else continuous except at corners and at ends of boundary parts.
+    Contact conditions hold at the nodes of the displacements, the Gauss-Lobatto points of each element.
+
+    Parameters
+    ----------
+    degree : int
+        p, from 1 to 12. High degrees pay on smooth fields, and on meshes whose elements become shorter towards corners
+        and towards places where contact changes; 1 and 2 estimate their error.
+
+    Raises
+    ------
+    GeometryError
+        If the degree is no whole number from 1 to 12.
+    """
+
+    degree: int
+
+    def __post_init__(self) -> None:
+        check_degree(self.degree)
 
     @property
     def estimates_error(self) -> bool:
-        """True."""
-        return True
+        """Up to degree 2."""
+        return self.degree <= 2
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the continuous linear functions; their nodes are those of the mesh."""
-        return LinearSpace(mesh)
+        """Return the continuous functions of the degree; the nodes of the mesh are their first dofs."""
+        return LagrangeSpace(mesh, degree=self.degree)
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the constants on elements."""
-        return ConstantSpace(mesh)
+        """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
+        if self.degree == 1:
+            return ConstantSpace(mesh)
+        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.degree - 1)
+
+
+@dataclass(frozen=True)
+class LinearGalerkin(Galerkin):
+    """Symmetric Galerkin of degree 1: displacements continuous and linear, tractions constant on each element."""
+
+    degree: int = field(default=1, init=False, repr=False)
 
 
 @dataclass(frozen=True)
 class QuadraticGalerkin(Galerkin):
-    """Symmetric Galerkin: displacements continuous and quadratic, tractions linear on each element.
+    """Symmetric Galerkin of degree 2: displacements continuous and quadratic, tractions linear on each element."""
 
-    Tractions are continuous except at corners and at ends of boundary parts. Contact conditions hold at the ends and
-    the middles of elements.
-    """
-
-    @property
-    def estimates_error(self) -> bool:
-        """True."""
-        return True
-
-    def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the continuous quadratic functions; the nodes of the mesh are their first dofs."""
-        return QuadraticSpace(mesh)
-
-    def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the linear functions that may jump at corners and at ends of parts."""
-        return LinearSpace(mesh, break_nodes(mesh))
+    degree: int = field(default=2, init=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -151,6 +151,7 @@ DISCRETISATIONS = Registry(
     "discretisation",
     MappingProxyType(
         {
+            "galerkin": "bemkit.scene.discretisation:Galerkin",
             "linear": "bemkit.scene.discretisation:LinearGalerkin",
             "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
             "constant": "bemkit.scene.discretisation:ConstantCollocation",

@@ -35,6 +35,7 @@ from bemkit.scene.conditions import Roller as Roller
 from bemkit.scene.conditions import Traction as Traction
 from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
 from bemkit.scene.discretisation import Discretisation as Discretisation
+from bemkit.scene.discretisation import Galerkin as Galerkin
 from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
 from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions as MeshOptions

@@ -16,7 +16,7 @@ from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
-from bemkit.scene.scene import Discretisation, Scene
+from bemkit.scene.scene import Discretisation, Galerkin, Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 
@@ -151,6 +151,7 @@ def with_overrides(
     elements: int | None = None,
     accuracy: float | None = None,
     discretisation: str | None = None,
+    degree: int | None = None,
     solver: str | None = None,
     rho: float | None = None,
 ) -> Scene:
@@ -164,6 +165,8 @@ def with_overrides(
         Instead of a number of elements.
     discretisation, solver : str, optional
         Words as in scene files.
+    degree : int, optional
+        Of Galerkin elements, instead of a discretisation.
     rho : float, optional
         Penalty of the solver in units of E'/L; sets all penalties it has.
 
@@ -178,12 +181,16 @@ def with_overrides(
     """
     if elements is not None and accuracy is not None:
         raise SceneError(f"elements is {elements} and accuracy is {accuracy}: give one of them, the other follows")
+    if degree is not None and discretisation is not None:
+        raise SceneError(f"degree is {degree} and discretisation is {discretisation}: give one of them")
     try:
         if elements is not None:
             options = MeshOptions() if scene.mesh.elements is None else scene.mesh
             scene = replace(scene, mesh=replace(options, elements=elements))
         if discretisation is not None:
             scene = replace(scene, discretisation=structure(discretisation, cast(Any, Discretisation)))
+        if degree is not None:
+            scene = replace(scene, discretisation=Galerkin(degree))
         if accuracy is not None:
             scene = replace(scene, mesh=MeshOptions(accuracy=accuracy))
         if solver is not None:

@@ -19,7 +19,7 @@ from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
-from bemkit.scene.discretisation import Discretisation, Galerkin
+from bemkit.scene.discretisation import Discretisation, SymmetricGalerkin
 from bemkit.scene.registry import DISCRETISATIONS
 from bemkit.testing import CheckFailed, check_discretisation
 
@@ -27,10 +27,10 @@ PLUGIN = """
 from dataclasses import dataclass
 import numpy as np
 import bemkit as bk
-from bemkit.scene.discretisation import Galerkin
+from bemkit.scene.discretisation import SymmetricGalerkin
 
 @dataclass(frozen=True)
-class Jumping(Galerkin):
+class Jumping(SymmetricGalerkin):
     everywhere: bool = True
 
     def displacement_space(self, mesh):
@@ -56,7 +56,7 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.parametrize("kind", DISCRETISATIONS.built_in)
 def test_built_in_discretisations_keep_their_promises(kind: str) -> None:
-    check_discretisation(DISCRETISATIONS.find(kind)())
+    check_discretisation(bk.Galerkin(4) if kind == "galerkin" else DISCRETISATIONS.find(kind)())
 
 
 def test_the_papers_collocation_keeps_its_promises() -> None:
@@ -89,7 +89,7 @@ def test_one_without_a_word_is_shown_by_its_name(capsys: pytest.CaptureFixture[s
 
 
 @dataclass(frozen=True)
-class Own(Galerkin):
+class Own(SymmetricGalerkin):
     """Quadratic displacements with linear tractions that may jump at every node."""
 
     def displacement_space(self, mesh: bk.BoundaryMesh) -> BoundarySpace:
@@ -101,12 +101,12 @@ class Own(Galerkin):
         return bk.LinearSpace(mesh, np.ones(mesh.n_nodes, bool))
 
 
-class NoDataclass(Galerkin):
+class NoDataclass(SymmetricGalerkin):
     displacement_space, traction_space = Own.displacement_space, Own.traction_space
 
 
 @dataclass(frozen=True, eq=False)
-class UnlikeItsCopy(Galerkin):
+class UnlikeItsCopy(SymmetricGalerkin):
     displacement_space, traction_space = Own.displacement_space, Own.traction_space
 
 

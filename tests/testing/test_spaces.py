@@ -13,7 +13,14 @@ import pytest
 from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curves, discretise, spaces
 from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace, LinearSpace, QuadraticSpace, corner_nodes
+from bemkit.geometry.spaces import (
+    ConstantSpace,
+    ElementwiseSpace,
+    LagrangeSpace,
+    LinearSpace,
+    QuadraticSpace,
+    corner_nodes,
+)
 from bemkit.testing import CheckFailed, check_curve, check_space
 
 MESHES = [
@@ -38,6 +45,8 @@ def spaces_on(mesh: BoundaryMesh) -> list[Any]:
         QuadraticSpace(mesh, corners),
         QuadraticSpace(mesh, np.zeros(mesh.n_nodes, bool)),
         ElementwiseSpace(QuadraticSpace(mesh)),
+        *(LagrangeSpace(mesh, degree=degree) for degree in (3, 8, 12)),
+        LagrangeSpace(mesh, corners, degree=5),
     ]
 
 
