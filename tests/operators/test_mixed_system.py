@@ -157,6 +157,24 @@ def test_columns_give_what_whole_matrices_give(make: type, seed: int) -> None:
     np.testing.assert_allclose(f, exact_f, rtol=0.0, atol=1e-10 * np.abs(exact_f).max())
 
 
+@pytest.mark.parametrize("loaded", [[], [7], [3, 7, 22], list(range(2, 40, 4))])
+def test_supports_and_loads_in_patches_give_what_whole_matrices_give(loaded: list[int]) -> None:
+    mesh = MESHES["ring"]()
+    n = mesh.n_elements
+    kind = np.repeat(np.arange(n) // 2 % 2, 2).reshape(n, 2)  # two elements held, two free, and so on
+    kind[5] = 2
+    frame, at_rest = np.broadcast_to(np.eye(2), (n, 2, 2)), np.zeros((n, 2))
+    conditions = NodalConditions(frame, kind == 0, at_rest, kind == 2)
+    force = at_rest.copy()
+    force[loaded] = np.where(conditions.is_free[loaded], (0.3, -1.0), 0.0)
+    opened = np.array([0.2, -0.1])
+    u, f = CollocationMap(mesh, MATERIAL).condense(conditions, force).recover(opened)
+    exact_u, exact_f = whole_equations(mesh, conditions, force, opened)
+    # as above
+    np.testing.assert_allclose(u, exact_u, rtol=0.0, atol=1e-10 * np.abs(exact_u).max())
+    np.testing.assert_allclose(f, exact_f, rtol=0.0, atol=1e-10 * np.abs(exact_f).max())
+
+
 def test_stiffness_and_load_are_those_of_the_open_directions() -> None:
     mesh = MESHES["square"]()
     conditions = any_conditions(mesh, 3)

@@ -134,9 +134,12 @@ class MixedSystem:
         loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
         number = np.zeros(n_rows, np.intp)
         number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
-        open_runs, unknown_at = consecutive_runs(self._open), consecutive_runs(unknown)
+        open_runs = consecutive_runs(self._open)
         # the columns of consecutive unknowns are consecutive among those of the single layer, too
-        unknown_runs = [(dofs, consecutive_runs(number[unknown[positions]])[0][1]) for positions, dofs in unknown_at]
+        unknown_runs = [
+            (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1) if isinstance(dofs, slice) else number[dofs])
+            for _, dofs in consecutive_runs(unknown)
+        ]
         known = np.zeros((2, n))
 
         def store(rows: slice, block: Coefficients) -> None:
