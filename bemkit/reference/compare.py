@@ -128,6 +128,7 @@ def _along(solution: Solution, places: Places) -> FloatArray:
 def _gauss_places(solution: Solution, part: str) -> Places:
     mesh = solution.mesh
     lengths = mesh.lengths[along_boundary(mesh, mesh.part(part))]
-    xi, weights = gauss_legendre(4)
+    space = solution.scene.discretisation.displacement_space(mesh)
+    xi, weights = gauss_legendre(max(4, space.degree + 1))
     half = 0.5 * lengths[:, None]
     return Places(part, (np.cumsum(lengths)[:, None] + half * (xi - 1.0)).ravel(), (half * weights).ravel())

@@ -132,6 +132,11 @@ class Galerkin(SymmetricGalerkin):
         check_degree(self.degree)
 
     @property
+    def method(self) -> str:
+        """Galerkin, and from degree 3 on which."""
+        return "Galerkin" if self.degree <= 2 else f"Galerkin of degree {self.degree}"
+
+    @property
     def estimates_error(self) -> bool:
         """Up to degree 2."""
         return self.degree <= 2
