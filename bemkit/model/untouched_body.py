@@ -12,7 +12,7 @@ from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
 from bemkit.contact.conditions import LinearConditions
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import possible_motions
 from bemkit.operators.steklov_poincare import CondensedMap
@@ -53,7 +53,7 @@ class UntouchedBody(LinearBody):
         return np.zeros(0, bool)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
         return self.condensed.work
 

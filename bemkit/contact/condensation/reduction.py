@@ -14,7 +14,7 @@ from bemkit.contact.condensation.nodes import ContactNodes as ContactNodes
 from bemkit.contact.condensation.nodes import contact_conditions, find_tangents, free_motions, held_nodes
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import possible_motions, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -143,9 +143,9 @@ class CondensedBody(DenseBody):
         return held_nodes(self.conditions, self.nodes)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
-        return self.condensed.work + Work(contact_unknowns=self.n_unknowns)
+        return self.condensed.work + OperationCounts(contact_unknowns=self.n_unknowns)
 
     def under(self, displacement: FloatArray, force: FloatArray) -> CondensedBody:
         """Return the same body under another load, without another factorisation.

@@ -14,7 +14,7 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverWish
@@ -44,14 +44,14 @@ class GalerkinFactors:
         V = L L^T.
     whitened_trace : (n_traction_dofs, n_dofs) array
         L^-1 (1/2 M + K), less the part whose tractions exert a resultant.
-    work : Work
+    work : OperationCounts
         What they took; nothing if they come from a cache.
     """
 
     matrix: FloatArray
     single_layer: Cholesky
     whitened_trace: FloatArray
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
 
 
 class GalerkinElasticity:
@@ -106,7 +106,7 @@ class GalerkinElasticity:
         """What the map is made of when S is formed, computed on first use."""
         layers = self.__dict__.get("layers") or self._assemble()
         whitened_trace = layers.whitened_trace()
-        work = layers.work + Work(right_hand_sides=whitened_trace.shape[1])
+        work = layers.work + OperationCounts(right_hand_sides=whitened_trace.shape[1])
         return GalerkinFactors(
             _symmetric_sum(layers.hypersingular, whitened_trace), layers.single_layer, whitened_trace, work
         )

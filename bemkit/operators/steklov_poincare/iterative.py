@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Factor
 from bemkit.operators.rigid_modes import resting_motions
@@ -84,14 +84,14 @@ class IterativeCondensation:
             total += np.abs(hyper[begin : begin + _ROWS]).sum(axis=0)
         return total.reshape(-1, 2)
 
-    def condense(self, force: FloatArray, work: Work) -> CondensedMap:
+    def condense(self, force: FloatArray, work: OperationCounts) -> CondensedMap:
         """Solve for all open directions and for the given data in one block.
 
         Parameters
         ----------
         force : (n_nodes, 2) array
             Given nodal forces.
-        work : Work
+        work : OperationCounts
             Done before.
 
         Returns
@@ -102,7 +102,7 @@ class IterativeCondensation:
         unit[self._open, np.arange(self._open.size)] = 1.0
         moved, known = self._given(force, self.stiffness.conditions.displacement)
         solved = self._solved(np.column_stack([unit, moved]), known)
-        own = Work(right_hand_sides=self._open.size + 1 + self.volume.change.shape[1])
+        own = OperationCounts(right_hand_sides=self._open.size + 1 + self.volume.change.shape[1])
         return self._map(solved.columns(slice(None, -1)), solved.columns(-1), force, work + own)
 
     def _given(self, force: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -120,7 +120,7 @@ class IterativeCondensation:
         displacements[free], pressures = self._held.solve(right, -self.volume.change.T @ moved)
         return _Fields(displacements, self.stiffness.forces(displacements) + self.volume.change @ pressures)
 
-    def _map(self, response: _Fields, at_rest: _Fields, force: FloatArray, work: Work) -> CondensedMap:
+    def _map(self, response: _Fields, at_rest: _Fields, force: FloatArray, work: OperationCounts) -> CondensedMap:
         given = self.stiffness.to_frames(force.reshape(-1, 1))[:, 0]
         # the pressure of an incompressible body does no work on displacements that keep the volume
         stiffness = response.displacements.T @ response.forces
@@ -137,7 +137,7 @@ class IterativeCondensation:
         def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
             moved, known = self._given(force, displacement)
             solved = self._solved(moved[:, None], known)
-            return self._map(response, solved.columns(0), force, Work(right_hand_sides=1))
+            return self._map(response, solved.columns(0), force, OperationCounts(right_hand_sides=1))
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             return response.displacements[directions], at_rest.displacements[directions]

@@ -10,7 +10,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
-from bemkit.operators.counts import Entries, Work
+from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.forms import (
     DoubleLayerForm,
     HypersingularForm,
@@ -37,7 +37,7 @@ class Layers:
         B = 1/2 M + K.
     hypersingular : (n_dofs, n_dofs) array
         W.
-    work : Work
+    work : OperationCounts
         What they took.
     """
 
@@ -45,7 +45,7 @@ class Layers:
     resultant: FloatArray
     trace_operator: FloatArray
     hypersingular: FloatArray
-    work: Work
+    work: OperationCounts
 
     def whitened_trace(self, displacement: FloatArray | None = None) -> FloatArray:
         """Return L^-1 B u less its projection on `resultant`.
@@ -94,7 +94,7 @@ def assemble_layers(
     u, t, mesh = displacements, tractions, displacements.mesh
     single = SingleLayerForm(t, t, material)
     (v, k, w), n_pairs = assemble_together([single, DoubleLayerForm(u, t, material), HypersingularForm(u, u, material)])
-    work = Work(
+    work = OperationCounts(
         element_pairs=n_pairs,
         single_layer=Entries.full(t.n_dofs, t.n_dofs),
         double_layer=Entries.full(t.n_dofs, u.n_dofs),
@@ -117,7 +117,7 @@ def assemble_layers(
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     idle = np.column_stack([resultants, annihilated, trace @ dilatation])
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
-    work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
+    work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
     return Layers(factor, resultant, trace, hyper, work)
 
 

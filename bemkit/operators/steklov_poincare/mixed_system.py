@@ -11,7 +11,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.assembly import sweep_rows, write_columns
 from bemkit.operators.collocation.collocation_points import Coefficients
 from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.counts import Entries, Work
+from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
@@ -93,7 +93,7 @@ class MixedSystem:
 
         self._factor = DenseLU(matrix, name)
         self._response = -self._factor.solve(right)[:n_rows]
-        work += Work(
+        work += OperationCounts(
             single_layer=Entries.full(n_rows, n_rows - self._free.size),
             double_layer=Entries.full(n_rows, self._free.size + self._open.size),
             factorisations=(self._factor.factorisation,),
@@ -120,7 +120,7 @@ class MixedSystem:
 
     def _sweep(
         self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
-    ) -> tuple[FloatArray, Work]:
+    ) -> tuple[FloatArray, OperationCounts]:
         """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
 
         The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_open) those of open
@@ -168,7 +168,7 @@ class MixedSystem:
             takes_slopes=self._slopes,
         )
         of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
-        return known.ravel(), Work(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
+        return known.ravel(), OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
         """Return the unknowns (n_dofs,), the open displacements at rest."""
@@ -176,7 +176,9 @@ class MixedSystem:
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
 
-    def _condensed(self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: Work) -> CondensedMap:
+    def _condensed(
+        self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
+    ) -> CondensedMap:
         """Return the condensed map under data that are a multiple of others, for which the equations are solved."""
         at_rest = factor * base.at_rest
         conditions, weights, response = self._conditions, self._weights, self._response
@@ -198,10 +200,10 @@ class MixedSystem:
             other = GivenData.of(conditions, force, displacement)
             factor = other.factor_of(base.data)
             if factor is not None:  # the usual case of load factors
-                return self._condensed(force, other, base, factor, Work())
+                return self._condensed(force, other, base, factor, OperationCounts())
             known, work = self._sweep(other)
             solved = _Solved(other, self._solution(other, known))
-            return self._condensed(force, other, solved, 1.0, work + Work(right_hand_sides=1))
+            return self._condensed(force, other, solved, 1.0, work + OperationCounts(right_hand_sides=1))
 
         own = weights[self._open]
         load = own * (traction[self._open] - at_rest[self._open])

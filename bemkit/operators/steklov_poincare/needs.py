@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.counts import Entries, Factorisation, FactorKind, Work
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.integrals.sweep import CHUNK_PAIRS
 from bemkit.operators.linear.choice import krylov_cost
 from bemkit.operators.linear.solvers import Choice, Krylov
@@ -98,7 +98,7 @@ class BodyNeeds:
     Parameters
     ----------
     items : tuple of PlanItem
-    work : Work
+    work : OperationCounts
         What `CondensedMap.work` will count after the last load step.
     memory : int [bytes]
         Largest sum of what exists at the same time.
@@ -113,7 +113,7 @@ class BodyNeeds:
     """
 
     items: tuple[PlanItem, ...] = ()
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
     memory: int = 0
     kept: int = 0
     evaluations: float = 0.0
@@ -154,7 +154,7 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         largest = t * t + max(3 * t * u + u * u, t * u + 3 * u * u if is_curved else 0)
         largest, kept = max(largest, iterating), assembled + f * f + 3 * u * (o + 1)
         flops = krylov_cost(u, o).flops
-    work = Work(
+    work = OperationCounts(
         element_pairs=mesh.n_elements * mesh.whole.n_elements,
         single_layer=Entries.full(t, t),
         double_layer=Entries.full(t, u),
@@ -220,7 +220,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     n_elements = mesh.n_elements  # all of them for the first data, later those with tractions if these suffice
     for later in sweeps[1:]:
         n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
-    work = Work(
+    work = OperationCounts(
         element_pairs=n_elements * mesh.whole.n_elements,
         single_layer=Entries.full(u, n_single) + Entries(u * n_loaded),
         double_layer=Entries.full(u, n_double) + Entries(u * n_moved),

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import Iterations
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
@@ -39,7 +39,7 @@ class CondensedMap:
     iterations : tuple of Iterations
         What each solution for free displacements so far took that was found by iteration; see
         `bemkit.operators.linear.solvers.Krylov`.
-    work : Work
+    work : OperationCounts
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     volume_force : (3,) array, optional
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
@@ -52,7 +52,7 @@ class CondensedMap:
     follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
     iterations: tuple[Iterations, ...] = ()
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
 
 

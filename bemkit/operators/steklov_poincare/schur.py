@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
@@ -61,10 +61,10 @@ class SchurCondensation:
         self._sensitivity = np.abs(self.matrix).sum(axis=0).reshape(-1, 2)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What the elimination took."""
         n_columns = self._open.size + self._volume.shape[1]
-        return Work(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
+        return OperationCounts(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
@@ -88,5 +88,5 @@ class SchurCondensation:
             rows = np.searchsorted(free, directions)
             return response[rows], at_rest[rows]
 
-        work = Work(right_hand_sides=1)
+        work = OperationCounts(right_hand_sides=1)
         return CondensedMap(self._stiffness, load, recover, self.under, follow, self._sensitivity, work=work)
