@@ -186,7 +186,7 @@ class Prepared:
     space : BoundarySpace
         Of the displacements, on the unit mesh.
     conditions : NodalConditions
-        Supports, and the directions that are open to contact.
+        Supports, and the directions that are retained for contact.
     candidates : ContactData
         The nodes on contact parts, whatever supports hold them.
     contact : ContactData
@@ -223,8 +223,8 @@ class Prepared:
             return Choice(direct, "the map has a linear solver of its own")
         if isinstance(requested, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
             requested = DenseCholesky()  # iteration would be too inexact
-        n_open = int(np.count_nonzero(self.conditions.is_open))
-        return choose_linear_solver(requested, self.space.n_dofs, n_open, physical_memory())
+        n_retained = int(np.count_nonzero(self.conditions.is_retained))
+        return choose_linear_solver(requested, self.space.n_dofs, n_retained, physical_memory())
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.

@@ -36,7 +36,7 @@ class UntouchedBody(LinearBody):
     force : (n_nodes, 2) array [N/m]
         Given nodal forces.
     condensed : CondensedMap
-        Without open directions: all that is unknown has been solved for.
+        Without retained directions: all that is unknown has been solved for.
     """
 
     space: BoundarySpace

@@ -70,7 +70,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_tractions=tractions.n_dofs,
         n_fixed=int(np.count_nonzero(conditions.is_fixed)),
         n_free=int(np.count_nonzero(conditions.is_free)),
-        n_open=int(np.count_nonzero(conditions.is_open)),
+        n_open=int(np.count_nonzero(conditions.is_retained)),
         n_contact=n_contact,
         n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
         n_motions=len(possible_motions(mesh)),
@@ -146,7 +146,7 @@ def _spaces(scene: Scene, sizes: Sizes) -> PlanItem:
     )
     reason = (
         f"{scene.discretisation.method}: {sizes.n_displacements} displacements and {sizes.n_tractions} tractions, "
-        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} open to contact"
+        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
     )
     return PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
 

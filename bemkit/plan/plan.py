@@ -115,9 +115,9 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
 
 def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
     """Return the largest memory: of the body while it is made, or of body and contact system together [bytes]."""
-    o, c = sizes.n_open, sizes.n_contact_unknowns
+    r, c = sizes.n_open, sizes.n_contact_unknowns
     rows = 2 * sizes.n_contact * c  # the contact system before tangents without friction are taken out
-    return max(needs.memory, needs.kept + int(_BYTES * (o * o + o * c + 4.2 * rows)))
+    return max(needs.memory, needs.kept + int(_BYTES * (r * r + r * c + 4.2 * rows)))
 
 
 def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:

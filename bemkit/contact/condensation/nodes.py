@@ -104,7 +104,7 @@ def contact_along_normals(space: BoundarySpace, elements: IntArray, *, is_fricti
 def contact_conditions(
     space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes
 ) -> tuple[NodalConditions, ContactNodes]:
-    """Find what is known at every node of a space: held by a support, open to contact, or free.
+    """Find what is known at every node of a space: held by a support, retained for contact, or free.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def contact_conditions(
     Returns
     -------
     conditions : NodalConditions
-        Their open directions are the unknowns of the contact system, but for tangents that supports hold.
+        Their retained directions are the unknowns of the contact system, but for tangents that supports hold.
     contact : ContactNodes
         The candidates that can touch. The others are left to their supports, which let them move neither towards the
         obstacle nor away from it.
@@ -144,12 +144,12 @@ def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
 
 def _opened(conditions: NodalConditions, contact: ContactNodes, has_tangent: BoolArray) -> NodalConditions:
     """Open the directions of contact of the contact nodes, and the tangential ones of some, that no support fixes."""
-    frame, is_open = conditions.frame.copy(), conditions.is_open.copy()
+    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
     unsupported = ~held_nodes(conditions, contact)
     frame[contact.nodes[unsupported]] = contact.frame[unsupported]
-    is_open[contact.nodes] = ~conditions.is_fixed[contact.nodes]
-    is_open[contact.nodes[unsupported & ~has_tangent], 1] = False
-    return replace(conditions, frame=frame, is_open=is_open)
+    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
+    is_retained[contact.nodes[unsupported & ~has_tangent], 1] = False
+    return replace(conditions, frame=frame, is_retained=is_retained)
 
 
 def free_motions(conditions: NodalConditions, contact: ContactNodes, space: BoundarySpace) -> FloatArray:
@@ -169,7 +169,7 @@ def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArr
     That is at nodes without friction, but for the few that are retained, and wherever a support holds the node: what
     acts there along the tangent cannot be told from the reaction of the support.
     """
-    return np.asarray(~np.all(conditions.is_open[contact.nodes], axis=1))
+    return np.asarray(~np.all(conditions.is_retained[contact.nodes], axis=1))
 
 
 def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_supported: BoolArray) -> BoolArray:

@@ -46,9 +46,9 @@ class Unknowns:
     @classmethod
     def of(cls, conditions: NodalConditions, contact: ContactNodes) -> Unknowns:
         """Return the unknowns under the conditions of all displacement nodes, ascending by contact node."""
-        row, component = np.nonzero(conditions.is_open[contact.nodes])
+        row, component = np.nonzero(conditions.is_retained[contact.nodes])
         node, is_held = contact.nodes[row], held_nodes(conditions, contact)[row]
-        position = np.cumsum(conditions.is_open).reshape(-1, 2) - 1
+        position = np.cumsum(conditions.is_retained).reshape(-1, 2) - 1
         along = np.einsum("nkc,nc->nk", conditions.frame[node], contact.directions[row])
         each = np.arange(row.size)
         factor = 1.0 / np.where(is_held, along[each, component], 1.0)
@@ -86,10 +86,10 @@ class Unknowns:
         held = np.flatnonzero(is_held)
         node = nodes[held]
         along = np.einsum("nkc,njc->nkj", conditions.frame[node], contact.frame[chosen[held]])
-        free = np.argmax(conditions.is_open[node], axis=1)
+        free = np.argmax(conditions.is_retained[node], axis=1)
         moving, fixed = along[np.arange(held.size), free], along[np.arange(held.size), 1 - free]
         slope = moving[:, 1] / moving[:, 0]
-        n_before = np.cumsum(np.count_nonzero(conditions.is_open[contact.nodes], axis=1)) - 1
+        n_before = np.cumsum(np.count_nonzero(conditions.is_retained[contact.nodes], axis=1)) - 1
         response[held, n_before[chosen[held]]] = slope
         given = conditions.displacement[node, 1 - free]
         at_rest[held] = (fixed[:, 1] - slope * fixed[:, 0]) * given

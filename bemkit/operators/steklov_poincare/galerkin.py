@@ -184,7 +184,7 @@ class GalerkinElasticity:
         self.__dict__["factors"] = factors  # where cached_property keeps its value
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not open by a Schur complement, with the linear solver of the map."""
+        """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""
         condense = self._condense_matrix if self.linear_solver.forms_matrix else self._condense_products
         return condense(self.linear_solver, conditions, force)
 

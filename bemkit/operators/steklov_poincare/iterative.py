@@ -17,12 +17,12 @@ from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
 
 _HELD = 1e-9
-"""A rigid motion that moves the held and open directions by less than this, relative to its size, is free of them."""
+"""A rigid motion that moves the held and retained directions by less, relative to its size, is free of them."""
 _ROWS = 256
 
 
 def check_is_held(stiffness: FreeStiffness, points: FloatArray, name: str) -> None:
-    """Raise if the held and open directions leave the body a rigid motion.
+    """Raise if the held and retained directions leave the body a rigid motion.
 
     A factorisation would meet a pivot of zero; an iteration does not notice.
 
@@ -42,7 +42,7 @@ def check_is_held(stiffness: FreeStiffness, points: FloatArray, name: str) -> No
 
 @dataclass(frozen=True, eq=False)
 class IterativeCondensation:
-    """A body reduced to its open directions, in the frames of the nodes.
+    """A body reduced to its retained directions, in the frames of the nodes.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ class IterativeCondensation:
 
     Notes
     -----
-    Let E hold the displacements of all directions for a unit displacement of each open one, and u0 those under the
-    given data with the open ones at zero, both with free directions as the iteration left them. Then E^T S E is the
+    Let E hold the displacements of all directions for a unit displacement of each retained one, and u0 those under the
+    given data with the retained ones at zero, both with free directions as the iteration left them. Then E^T S E is the
     stiffness and E^T (f - S u0) the load: their errors are products of two errors of the iteration, and the stiffness
     is symmetric and positive semidefinite whatever these are.
     """
@@ -64,8 +64,8 @@ class IterativeCondensation:
     volume: Volume
 
     @cached_property
-    def _open(self) -> IntArray:
-        return np.flatnonzero(self.stiffness.conditions.is_open)
+    def _retained(self) -> IntArray:
+        return np.flatnonzero(self.stiffness.conditions.is_retained)
 
     @cached_property
     def _fixed(self) -> IntArray:
@@ -85,7 +85,7 @@ class IterativeCondensation:
         return total.reshape(-1, 2)
 
     def condense(self, force: FloatArray, work: OperationCounts) -> CondensedMap:
-        """Solve for all open directions and for the given data in one block.
+        """Solve for all retained directions and for the given data in one block.
 
         Parameters
         ----------
@@ -98,11 +98,11 @@ class IterativeCondensation:
         -------
         CondensedMap
         """
-        unit = np.zeros((self.stiffness.space.n_dofs, self._open.size))
-        unit[self._open, np.arange(self._open.size)] = 1.0
+        unit = np.zeros((self.stiffness.space.n_dofs, self._retained.size))
+        unit[self._retained, np.arange(self._retained.size)] = 1.0
         moved, known = self._given(force, self.stiffness.conditions.displacement)
         solved = self._solved(np.column_stack([unit, moved]), known)
-        own = OperationCounts(right_hand_sides=self._open.size + 1 + self.volume.change.shape[1])
+        own = OperationCounts(right_hand_sides=self._retained.size + 1 + self.volume.change.shape[1])
         return self._map(solved.columns(slice(None, -1)), solved.columns(-1), force, work + own)
 
     def _given(self, force: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -126,10 +126,10 @@ class IterativeCondensation:
         stiffness = response.displacements.T @ response.forces
         load = response.displacements.T @ (given - at_rest.forces)
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
             local = [
-                at_rest.displacements + response.displacements @ open_displacement,
-                at_rest.forces + response.forces @ open_displacement,
+                at_rest.displacements + response.displacements @ retained_displacement,
+                at_rest.forces + response.forces @ retained_displacement,
             ]
             both = self.stiffness.to_xy(np.column_stack(local))
             return both[:, 0].reshape(-1, 2), both[:, 1].reshape(-1, 2)

@@ -127,7 +127,7 @@ class CollocationMap(CollocationElasticity, _SteklovPoincareMap):
     def _form(self) -> FloatArray:
         n = self.mesh.n_elements
         frame = np.broadcast_to(np.eye(2), (n, 2, 2))
-        everything_open = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
+        everything_retained = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
         name = "the single layer operator"
-        system = MixedSystem(self.mesh, self.material, everything_open, name, np.zeros((n, 2)), slopes=self.slopes)
+        system = MixedSystem(self.mesh, self.material, everything_retained, name, np.zeros((n, 2)), slopes=self.slopes)
         return system.condensed().stiffness

@@ -21,14 +21,14 @@ from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Given data, and the unknowns (n_dofs,) under them with the open displacements at rest."""
+    """Given data, and the unknowns (n_dofs,) under them with the retained displacements at rest."""
 
     data: GivenData
     at_rest: FloatArray
 
 
 class MixedSystem:
-    """(1/2 + T) u = U t solved for every unknown but the open displacements.
+    """(1/2 + T) u = U t solved for every unknown but the retained displacements.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class MixedSystem:
     Raises
     ------
     SingularMatrixError
-        If the supports, and the open directions held fast, leave the body free.
+        If the supports, and the retained directions held fast, leave the body free.
 
     Notes
     -----
@@ -73,8 +73,8 @@ class MixedSystem:
     ) -> None:
         self._mesh, self._material, self._conditions, self._slopes = mesh, material, conditions, slopes
         self._weights, self._force = np.repeat(mesh.lengths, 2), force
-        self._free, self._fixed, self._open = (
-            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_open)
+        self._free, self._fixed, self._retained = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
         motions, reciprocity = resting_motions(mesh, mesh.centres), Reciprocity.of(mesh, material, takes_slopes=slopes)
         self._find_balances(motions, reciprocity)
@@ -82,22 +82,22 @@ class MixedSystem:
         # the displacement equations with the columns of their errors, and the balances below them
         errors = np.column_stack([motions, reciprocity.fields])
         n_rows, order = self._weights.size, self._weights.size + errors.shape[1]
-        matrix, right = np.zeros((order, order)), np.zeros((order, self._open.size), order="F")
+        matrix, right = np.zeros((order, order)), np.zeros((order, self._retained.size), order="F")
         data = GivenData.of(conditions, force, conditions.displacement)
         n_elements = mesh.n_elements
         equations = matrix[:n_rows, :n_rows].reshape(2, n_elements, n_rows)
-        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._open.size))
+        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._retained.size))
         matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
         matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
-        right[n_rows:] = self._on_displacement[:, self._open]
+        right[n_rows:] = self._on_displacement[:, self._retained]
 
         self._factor = DenseLU(matrix, name)
         self._response = -self._factor.solve(right)[:n_rows]
         work += OperationCounts(
             single_layer=Entries.full(n_rows, n_rows - self._free.size),
-            double_layer=Entries.full(n_rows, self._free.size + self._open.size),
+            double_layer=Entries.full(n_rows, self._free.size + self._retained.size),
             factorisations=(self._factor.factorisation,),
-            right_hand_sides=self._open.size + 1,
+            right_hand_sides=self._retained.size + 1,
         )
         self._work, self._base = work, _Solved(data, self._solution(data, known))
 
@@ -123,8 +123,8 @@ class MixedSystem:
     ) -> tuple[FloatArray, OperationCounts]:
         """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
 
-        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_open) those of open
-        displacements.
+        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_retained) those of
+        the retained displacements.
         """
         n, n_rows, frame = self._mesh.n_elements, self._weights.size, self._conditions.frame
         loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
@@ -134,7 +134,7 @@ class MixedSystem:
         loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
         number = np.zeros(n_rows, np.intp)
         number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
-        open_runs, unknown_at = consecutive_runs(self._open), consecutive_runs(unknown)
+        retained_runs, unknown_at = consecutive_runs(self._retained), consecutive_runs(unknown)
         # the columns of consecutive unknowns are consecutive among those of the single layer, too
         unknown_runs = [(dofs, consecutive_runs(number[unknown[positions]])[0][1]) for positions, dofs in unknown_at]
         known = np.zeros((2, n))
@@ -152,7 +152,7 @@ class MixedSystem:
             _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
             known[:, rows] -= _product(double[:, :, moved], displacement)
             if right is not None:
-                for positions, dofs in open_runs:
+                for positions, dofs in retained_runs:
                     right[:, rows, positions] = double[:, :, dofs]
                 for dofs, in_single in unknown_runs:
                     double[:, :, dofs] = -single[:, :, in_single]
@@ -171,7 +171,7 @@ class MixedSystem:
         return known.ravel(), OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
-        """Return the unknowns (n_dofs,), the open displacements at rest."""
+        """Return the unknowns (n_dofs,), the retained displacements at rest."""
         traction, displacement = data.force.ravel() / self._weights, data.displacement.ravel()
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
@@ -185,10 +185,10 @@ class MixedSystem:
         traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / weights
         is_free, given = conditions.is_free.ravel(), data.displacement.ravel()
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            unknowns = at_rest + response @ open_displacement
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            unknowns = at_rest + response @ retained_displacement
             local = np.where(is_free, unknowns, given)
-            local[self._open] = open_displacement
+            local[self._retained] = retained_displacement
             local_force = weights * np.where(is_free, traction, unknowns)
             displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(-1, 2))
             return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(-1, 2))
@@ -205,9 +205,9 @@ class MixedSystem:
             solved = _Solved(other, self._solution(other, known))
             return self._condensed(force, other, solved, 1.0, work + OperationCounts(right_hand_sides=1))
 
-        own = weights[self._open]
-        load = own * (traction[self._open] - at_rest[self._open])
-        return CondensedMap(own[:, None] * response[self._open], load, recover, under, follow, work=work)
+        own = weights[self._retained]
+        load = own * (traction[self._retained] - at_rest[self._retained])
+        return CondensedMap(own[:, None] * response[self._retained], load, recover, under, follow, work=work)
 
 
 def _dofs(elements: IntArray) -> IntArray:

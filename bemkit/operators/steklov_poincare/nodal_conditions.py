@@ -1,4 +1,4 @@
-"""What is known at the displacement nodes of a body: fixed, free or open directions, forces and displacements."""
+"""What is known at the displacement nodes of a body: fixed, free or retained directions, forces and displacements."""
 
 from __future__ import annotations
 
@@ -70,19 +70,19 @@ class NodalConditions:
         Directions whose displacement is prescribed.
     displacement : (n_nodes, 2) array [m]
         The prescribed values, zero elsewhere.
-    is_open : (n_nodes, 2) bool array
+    is_retained : (n_nodes, 2) bool array
         Directions that are kept as unknowns (contact); everything else is free: its force is known.
     """
 
     frame: FloatArray
     is_fixed: BoolArray
     displacement: FloatArray
-    is_open: BoolArray
+    is_retained: BoolArray
 
     @property
     def is_free(self) -> BoolArray:
         """Directions whose force is known, (n_nodes, 2)."""
-        free: BoolArray = ~(self.is_fixed | self.is_open)
+        free: BoolArray = ~(self.is_fixed | self.is_retained)
         return free
 
 
