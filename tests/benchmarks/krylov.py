@@ -4,7 +4,8 @@
 
 The body is an L with `n_retained` directions retained for contact in the middle of its lower side. For each number of
 elements N (default 500 1000 2000) and some n_retained it prints the medians of three runs of everything after assembly,
-as ratios to the direct solver, and the peaks of all arrays as ratios. Before that, steps to rtol 1e-9 over N and shapes.
+as ratios to the direct solver, and the peaks of all arrays as ratios. Before that, steps to rtol 1e-9 over N and
+shapes.
 """
 
 from __future__ import annotations
