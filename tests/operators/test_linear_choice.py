@@ -52,9 +52,9 @@ def test_what_does_not_fit_is_iterated() -> None:
 
 
 def test_what_was_asked_for_is_taken() -> None:
-    wish = bk.Krylov(rtol=1e-6)
-    choice = choose_linear_solver(wish, 100, 100)
-    assert choice.solver is wish
+    requested = bk.Krylov(rtol=1e-6)
+    choice = choose_linear_solver(requested, 100, 100)
+    assert choice.solver is requested
     assert choice.reason == "asked for"
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemkit.operators.linear.solvers import Automatic, Choice, DenseCholesky, Krylov, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov, LinearSolverChoice
 
 _BYTES = 8
 _STEPS = 20.0
@@ -65,12 +65,14 @@ def krylov_cost(n_dofs: int, n_retained: int) -> LinearCost:
     return LinearCost(2.0 / 3.0 * n**3 + _STEPS * step, int(_BYTES * (5.0 * n * n + 8.0 * n * (m + 1.0))))
 
 
-def choose_linear_solver(wish: LinearSolverWish, n_dofs: int, n_retained: int, memory: float = float("inf")) -> Choice:
+def choose_linear_solver(
+    requested: LinearSolverChoice, n_dofs: int, n_retained: int, memory: float = float("inf")
+) -> ChosenLinearSolver:
     """Choose the linear solver of a body whose Steklov-Poincare map is symmetric.
 
     Parameters
     ----------
-    wish : LinearSolver or Automatic
+    requested : LinearSolver or Automatic
     n_dofs : int
         Displacements, about as many as tractions.
     n_retained : int
@@ -80,18 +82,20 @@ def choose_linear_solver(wish: LinearSolverWish, n_dofs: int, n_retained: int, m
 
     Returns
     -------
-    Choice
+    ChosenLinearSolver
         A linear solver that was asked for, or the faster one of those that fit.
     """
-    if not isinstance(wish, Automatic):
-        return Choice(wish, "asked for")
+    if not isinstance(requested, Automatic):
+        return ChosenLinearSolver(requested, "asked for")
     direct, krylov = direct_cost(n_dofs, n_retained), krylov_cost(n_dofs, n_retained)
     share = krylov.flops / direct.flops
     sizes = f"{n_retained} of {n_dofs} displacements are retained for contact"
     if krylov.peak <= memory < direct.peak:
         reason = f"a factorisation needs about {direct.peak / 1e9:.3g} GB, this computer has {memory / 1e9:.3g} GB"
-        return Choice(Krylov(), f"conjugate gradients, because {reason}")
+        return ChosenLinearSolver(Krylov(), f"conjugate gradients, because {reason}")
     if share < _GAIN:
-        return Choice(Krylov(), f"conjugate gradients, because only {sizes}: about {share:.2f} of the time of Cholesky")
+        return ChosenLinearSolver(
+            Krylov(), f"conjugate gradients, because only {sizes}: about {share:.2f} of the time of Cholesky"
+        )
     reason = f"Cholesky, because {sizes}: conjugate gradients would take {share:.2g} times as long"
-    return Choice(DenseCholesky(), reason)
+    return ChosenLinearSolver(DenseCholesky(), reason)

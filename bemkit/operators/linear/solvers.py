@@ -226,11 +226,11 @@ class Automatic:
     """Factorisation or iteration, whichever takes less time and fits into memory; see `choose_linear_solver`."""
 
 
-LinearSolverWish: TypeAlias = Automatic | LinearSolver
+LinearSolverChoice: TypeAlias = Automatic | LinearSolver
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenLinearSolver:
     """A linear solver and why it was taken.
 
     Parameters

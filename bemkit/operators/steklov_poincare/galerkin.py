@@ -17,7 +17,7 @@ from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import resting_motions
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
@@ -88,7 +88,7 @@ class GalerkinElasticity:
         material: Material,
         displacement_space: BoundarySpace | None = None,
         traction_space: BoundarySpace | None = None,
-        linear_solver: LinearSolverWish = _DIRECT,
+        linear_solver: LinearSolverChoice = _DIRECT,
     ) -> None:
         self.mesh = mesh
         self.material = material

@@ -14,7 +14,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.integrals.sweep import CHUNK_PAIRS
 from bemkit.operators.linear.choice import krylov_cost
-from bemkit.operators.linear.solvers import Choice, Krylov
+from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import possible_motions
@@ -55,7 +55,7 @@ class BodyCase:
         Those of contact are retained.
     loads : tuple of GivenData
         Given forces and displacements of each load step.
-    linear_solver : Choice
+    linear_solver : ChosenLinearSolver
         Taken for a symmetric map.
     """
 
@@ -63,7 +63,7 @@ class BodyCase:
     material: Material
     conditions: NodalConditions
     loads: tuple[GivenData, ...]
-    linear_solver: Choice
+    linear_solver: ChosenLinearSolver
 
     @property
     def n_displacements(self) -> int:
