@@ -16,13 +16,13 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported, unsupported_motions
 
-CAN_TOUCH = 1e-3
+APPROACH_TOLERANCE = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
 which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
-WEAK = 0.03
+LEAST_RETAINED_SHARE = 0.03
 """A rigid motion whose share in the retained directions is less than this is held too weakly by them: eliminating the
 rest then loses the square of it in digits."""
-SMALLEST = 1e-9
+RANK_TOLERANCE = 1e-9
 """A combination of motions that moves the contact nodes by less than this share of the others moves none of them."""
 
 
@@ -129,8 +129,8 @@ def contact_conditions(
     """
     conditions = supported(space, supports)
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
-    can_touch: BoolArray = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1) > CAN_TOUCH
-    contact = candidates.take(can_touch)
+    approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
+    contact = candidates.take(approach > APPROACH_TOLERANCE)
     is_supported = held_nodes(conditions, contact)
     motions = free_motions(conditions, contact, space)
     has_tangent = retained_tangents(motions, contact.is_frictionless, is_supported)
@@ -187,11 +187,11 @@ def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_suppor
     _, singular, directions = np.linalg.svd(np.linalg.qr(held, mode="r"), full_matrices=True)
     sizes = np.zeros(len(motions))
     sizes[: singular.size] = singular
-    weak = directions[sizes < WEAK * np.sqrt(len(held))]
+    weak = directions[sizes < LEAST_RETAINED_SHARE * np.sqrt(len(held))]
     along = np.where((is_frictionless & ~is_supported)[:, None], tangential @ weak.T, 0.0)
     for _ in weak:  # the tangents that feel most of what is still free
         sizes = np.linalg.norm(along, axis=1)
-        if sizes.max(initial=0.0) < WEAK:
+        if sizes.max(initial=0.0) < LEAST_RETAINED_SHARE:
             break
         node = int(np.argmax(sizes))
         is_retained[node] = True
@@ -207,5 +207,5 @@ def _of_unit_size(motions: FloatArray) -> FloatArray:
     """
     columns = motions.reshape(len(motions), -1).T
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = basis[:, sizes > SMALLEST * sizes[0]]
+    basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
     return np.asarray(np.sqrt(motions.shape[1]) * basis.T.reshape(-1, *motions.shape[1:]))

@@ -15,7 +15,7 @@ from bemkit.contact.condensation.nodes import contact_conditions, find_tangents,
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.equilibrium import NOISE, Imbalance, resultant_imbalance, round_off_of
+from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import possible_motions, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
@@ -189,7 +189,7 @@ class CondensedBody(DenseBody):
         displacement, force = self.recover(state)
         reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
         round_off = max(of_forces, np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum()))
-        noise = NOISE * round_off
+        noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
         inside = self.condensed.volume_force

@@ -16,7 +16,7 @@ from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
 
-_HELD = 1e-9
+_FREE_MOTION_TOLERANCE = 1e-9
 """A rigid motion that moves the held and retained directions by less, relative to its size, is free of them."""
 _ROWS = 256
 
@@ -35,7 +35,8 @@ def check_is_held(stiffness: FreeStiffness, points: FloatArray, name: str) -> No
     held = motions[~stiffness.conditions.is_free.ravel()]
     sizes = np.linalg.svd(held, compute_uv=False) if held.size else np.zeros(0)
     if motions.shape[1] and (
-        sizes.size < motions.shape[1] or not sizes.min() > _HELD * np.linalg.norm(motions, axis=0).max()
+        sizes.size < motions.shape[1]
+        or not sizes.min() > _FREE_MOTION_TOLERANCE * np.linalg.norm(motions, axis=0).max()
     ):
         raise SingularMatrixError(f"{name} is not positive definite: check for supports that leave the body free")
 

@@ -14,16 +14,16 @@ from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import possible_motions, rigid_motions
 
-SMOOTH = 0.07
+SMOOTH_SIDE_RATIO = 0.07
 """Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
 their sum then differ by the factor tan(15 deg)^2."""
-CONFLICT = 1e-9
+CONFLICT_TOLERANCE = 1e-9
 """Relative difference of two prescribed displacements at one node that round-off may explain."""
-HELD = 1e-6
+FREE_MOTION_TOLERANCE = 1e-6
 """A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
 from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
 with a million times the load holds nothing."""
-_SAME = 4.0 * np.finfo(float).eps
+_FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
 """Relative difference of two loads that the product with a load factor may leave."""
 
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
@@ -124,7 +124,7 @@ class GivenData:
             return 0.0
         k = int(np.argmax(np.abs(other)))
         factor = float(own[k] / other[k]) if other[k] else 0.0
-        return factor if np.all(np.abs(own - factor * other) <= _SAME * np.abs(own)) else None
+        return factor if np.all(np.abs(own - factor * other) <= _FACTOR_TOLERANCE * np.abs(own)) else None
 
 
 def integrate_traction(space: BoundarySpace, elements: IntArray, field: TractionField) -> FloatArray:
@@ -227,7 +227,7 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
     for local, dofs in enumerate(space.element_dofs[support.elements].T):
         np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
     size, vectors = np.linalg.eigh(matrix)
-    keep = np.where(size > SMOOTH * size[:, 1:], 1.0, 0.0)
+    keep = np.where(size > SMOOTH_SIDE_RATIO * size[:, 1:], 1.0, 0.0)
     projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
     return projector
 
@@ -240,7 +240,7 @@ def _check_agreement(
         values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
         miss = np.abs(np.einsum("nij,nj->ni", own, values - displacement)).max(axis=1)
         worst = int(np.argmax(miss))
-        if miss[worst] > CONFLICT * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
+        if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
             x, y = points[worst]
             raise ConflictingSupportsError(
                 f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
@@ -268,6 +268,6 @@ def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> Fl
     fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
     if fixed.size:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
-        n_held = int(np.count_nonzero(sizes >= HELD * np.sqrt(len(fixed))))
+        n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
     return motions.transpose(2, 0, 1)
