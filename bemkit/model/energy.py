@@ -14,7 +14,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model
 from bemkit.operators.equilibrium import round_off_of
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.solvers.base import ContactSolution, Status
 
 _ROUND_OFF = 1e-10
@@ -40,7 +40,7 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, condensed.sensitivity):
         return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.prepared.space
-    motions = resting_motions(space.mesh, dof_points(space))
+    motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, condensed.sensitivity)
     return (
         _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result

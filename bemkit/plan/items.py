@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared
-from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import PlanItem
 from bemkit.scene.scene import Scene
 
@@ -73,7 +73,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_open=int(np.count_nonzero(conditions.is_retained)),
         n_contact=n_contact,
         n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
-        n_motions=len(possible_motions(mesh)),
+        n_motions=len(admissible_modes(mesh)),
         n_free_motions=len(prepared.free_motions),
     )
 

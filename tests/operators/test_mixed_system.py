@@ -14,7 +14,7 @@ from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.maps import CollocationMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from tests.operators.test_curved import composite
@@ -46,7 +46,7 @@ def whole_equations(
     """Solve the bordered equations with full matrices in x and y: unknown u, t and errors, all conditions as rows."""
     n = 2 * mesh.n_elements
     single, double = collocation_matrices(mesh, MATERIAL)[0], with_slopes(mesh)
-    motions = resting_motions(mesh, mesh.centres)
+    motions = traction_free_modes(mesh, mesh.centres)
     weights = np.repeat(mesh.lengths, 2)
     turn = np.zeros((n, n))
     for k, frame in enumerate(conditions.frame):
@@ -219,7 +219,7 @@ def test_later_loads_are_swept_unless_they_are_multiples() -> None:
 
 def left_on_rotation(mesh: BoundaryMesh, slopes: bool) -> float:
     matrix = CollocationMap(mesh, MATERIAL, slopes=slopes).matrix()
-    left = np.abs(matrix @ resting_motions(mesh, mesh.centres)).max(axis=0) / np.abs(matrix).max()
+    left = np.abs(matrix @ traction_free_modes(mesh, mesh.centres)).max(axis=0) / np.abs(matrix).max()
     assert left[:2].max() < 1e-12  # translations are exact up to round-off in any case
     return float(left[2])
 

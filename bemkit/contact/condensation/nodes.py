@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported, unsupported_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
 APPROACH_TOLERANCE = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
@@ -157,7 +157,7 @@ def free_motions(conditions: NodalConditions, contact: ContactNodes, space: Boun
 
     Tangential components that a support holds are zero. An exterior, at rest far away, has none of these motions.
     """
-    motions = unsupported_motions(space, conditions)[:, contact.nodes]
+    motions = free_modes(space, conditions)[:, contact.nodes]
     at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
     at_contact[:, held_nodes(conditions, contact), 1] = 0.0
     return at_contact

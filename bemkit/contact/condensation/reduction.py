@@ -16,7 +16,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
-from bemkit.operators.rigid_modes import possible_motions, rigid_motions
+from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
 
@@ -268,5 +268,5 @@ def condensed_body(
         force=force,
         conditions=conditions,
         nodes=contact,
-        balanced=possible_motions(space.mesh),
+        balanced=admissible_modes(space.mesh),
     )

@@ -19,7 +19,7 @@ from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverChoice
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
@@ -154,7 +154,7 @@ class GalerkinElasticity:
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, vanishing_dofs(self.displacement_space)] = 0.0
         # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
-        motions = resting_motions(self.mesh, dof_points(self.displacement_space))
+        motions = traction_free_modes(self.mesh, dof_points(self.displacement_space))
         return np.asarray(flux.T - motions @ np.linalg.lstsq(motions, flux.T, rcond=None)[0])
 
     @cached_property

@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Factor
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
@@ -31,7 +31,7 @@ def check_is_held(stiffness: FreeStiffness, points: FloatArray, name: str) -> No
     SingularMatrixError
         Naming what is not held.
     """
-    motions = stiffness.to_frames(resting_motions(stiffness.space.mesh, points))
+    motions = stiffness.to_frames(traction_free_modes(stiffness.space.mesh, points))
     held = motions[~stiffness.conditions.is_free.ravel()]
     sizes = np.linalg.svd(held, compute_uv=False) if held.size else np.zeros(0)
     if motions.shape[1] and (

@@ -20,7 +20,7 @@ from bemkit.operators.forms import (
 )
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def assemble_layers(
     kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator")
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
-    motions = resting_motions(mesh, dof_points(u))
+    motions = traction_free_modes(mesh, dof_points(u))
     resultants = mass_product(u, t, motions)
     values, rows, columns = mass_entries(u, t)
     np.add.at(k, (rows, columns), 0.5 * values)

@@ -14,7 +14,7 @@ from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
@@ -76,7 +76,10 @@ class MixedSystem:
         self._free, self._fixed, self._retained = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
-        motions, reciprocity = resting_motions(mesh, mesh.centres), Reciprocity.of(mesh, material, takes_slopes=slopes)
+        motions, reciprocity = (
+            traction_free_modes(mesh, mesh.centres),
+            Reciprocity.of(mesh, material, takes_slopes=slopes),
+        )
         self._find_balances(motions, reciprocity)
 
         # the displacement equations with the columns of their errors, and the balances below them

@@ -17,7 +17,7 @@ from bemkit.operators.linear.choice import krylov_cost
 from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 _BYTES = 8
@@ -138,7 +138,7 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     holds_volume = case.material.is_incompressible and not mesh.is_exterior
     n_pressures = len(mesh.loops) if holds_volume else int(not mesh.is_exterior)
     # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
-    n_columns = len(possible_motions(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads)
+    n_columns = len(admissible_modes(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads)
     factorisations = [Factorisation(FactorKind.CHOLESKY, t)]
     if solver.forms_matrix:
         n_columns += u
@@ -216,7 +216,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     n_single, n_double = case.n_fixed + r, case.n_free + r
     sweeps = _different_loads(case)
     n_loaded, n_moved = sum(each.n_loaded for each in sweeps), sum(each.n_moved for each in sweeps)
-    order = u + len(possible_motions(mesh)) + len(mesh.loops)
+    order = u + len(admissible_modes(mesh)) + len(mesh.loops)
     n_elements = mesh.n_elements  # all of them for the first data, later those with tractions if these suffice
     for later in sweeps[1:]:
         n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
@@ -228,7 +228,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
         right_hand_sides=r + len(sweeps),
     )
     # the system and its right-hand sides, and what LU copies of them
-    system = (u + len(possible_motions(mesh))) ** 2
+    system = (u + len(admissible_modes(mesh))) ** 2
     memory = _BYTES * (system + u * r) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * r))
     evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
     flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * r)

@@ -12,7 +12,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import vanishing_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.rigid_modes import possible_motions, rigid_motions
+from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
 SMOOTH_SIDE_RATIO = 0.07
 """Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
@@ -248,7 +248,7 @@ def _check_agreement(
             )
 
 
-def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
+def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
 
     Parameters
@@ -259,12 +259,12 @@ def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> Fl
     Returns
     -------
     (n_motions, n_nodes, 2) array
-        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `possible_motions`.
+        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `admissible_modes`.
     """
     points = dof_points(space)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
-    motions = motions[:, :, list(possible_motions(space.mesh))]
+    motions = motions[:, :, list(admissible_modes(space.mesh))]
     fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
     if fixed.size:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
