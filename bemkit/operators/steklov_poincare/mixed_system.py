@@ -76,10 +76,8 @@ class MixedSystem:
         self._free, self._fixed, self._retained = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
-        motions, reciprocity = (
-            traction_free_modes(mesh, mesh.centres),
-            Reciprocity.of(mesh, material, takes_slopes=slopes),
-        )
+        motions = traction_free_modes(mesh, mesh.centres)
+        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
         self._find_balances(motions, reciprocity)
 
         # the displacement equations with the columns of their errors, and the balances below them

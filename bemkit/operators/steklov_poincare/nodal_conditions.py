@@ -259,7 +259,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     Returns
     -------
     (n_motions, n_nodes, 2) array
-        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `admissible_modes`.
+        Linearly independent, of sizes about one; combinations of the `admissible_modes`.
     """
     points = dof_points(space)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))

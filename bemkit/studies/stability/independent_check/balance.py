@@ -67,8 +67,8 @@ def _loads(solution: Solution, boundary: Boundary, traction: FloatArray) -> Floa
 
 def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
     """Return (n_free, 3) coefficients of the rigid motions that no support resists."""
-    possible = admissible_modes_of(solution)
-    rows = [np.eye(3)[[motion for motion in range(3) if motion not in possible]], np.zeros((1, 3))]
+    admissible = admissible_modes_of(solution)
+    rows = [np.eye(3)[[mode for mode in range(3) if mode not in admissible]], np.zeros((1, 3))]
     for elements, directions, _ in held_directions(solution, boundary):
         motions = motions_at(solution, boundary.node_points[elements])
         rows.append(np.einsum("enc,encm->enm", directions, motions).reshape(-1, 3))
