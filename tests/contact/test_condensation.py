@@ -152,7 +152,7 @@ def test_contact_nodes_fixed_along_their_normal_are_left_to_the_support() -> Non
     assert not np.any(np.isclose(nodes.points[:, 0], 0.0))
 
 
-def test_a_body_that_glued_contact_cannot_hold_is_named() -> None:
+def test_a_body_that_tied_contact_cannot_hold_is_named() -> None:
     mesh = mesh_of(Rectangle(2.0, 1.0), 24, "bottom")
     elastic = GalerkinMap(mesh, MATERIAL)
     with pytest.raises(SingularMatrixError, match="the body held by its supports and its contact boundary"):

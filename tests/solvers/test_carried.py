@@ -96,11 +96,11 @@ def test_what_springs_leave_on_a_carried_body_is_no_equilibrium() -> None:
     """A force of 1e-8 on a body that is free to move: nothing beside the load of the clamped body, but all there is."""
     scene = carried_disc(0.3)
     problem = build_model(prepare(scene, scene.build_mesh())).problem
-    body, glued = problem.body, problem.sticking_state
-    assert body.imbalance(ContactState(glued.displacement, np.zeros_like(glued.traction))).is_below(1e-12)
-    left = np.zeros_like(glued.traction)
+    body, sticking = problem.body, problem.sticking_state
+    assert body.imbalance(ContactState(sticking.displacement, np.zeros_like(sticking.traction))).is_below(1e-12)
+    left = np.zeros_like(sticking.traction)
     left[3, 0] = -1e-8
-    off = body.imbalance(ContactState(glued.displacement, left))
+    off = body.imbalance(ContactState(sticking.displacement, left))
     assert off.force == pytest.approx(1.0)  # nothing else acts at the node
     assert off.moment > 0.1  # its share along x, where the body is free
 
