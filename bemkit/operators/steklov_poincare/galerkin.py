@@ -11,7 +11,7 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
@@ -152,7 +152,7 @@ class GalerkinElasticity:
             for elements in self._pressed
         ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
-        flux[:, vanishing_dofs(self.displacement_space)] = 0.0
+        flux[:, antisymmetric_dofs(self.displacement_space)] = 0.0
         # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
         motions = traction_free_modes(self.mesh, dof_points(self.displacement_space))
         return np.asarray(flux.T - motions @ np.linalg.lstsq(motions, flux.T, rcond=None)[0])

@@ -14,7 +14,7 @@ from bemkit.operators.linear.solvers import Factor
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
+from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
 
 _FREE_MOTION_TOLERANCE = 1e-9
 """A rigid motion that moves the held and retained directions by less, relative to its size, is free of them."""
@@ -73,8 +73,9 @@ class IterativeCondensation:
         return np.flatnonzero(self.stiffness.conditions.is_fixed)
 
     @cached_property
-    def _held(self) -> HeldVolume:
-        return HeldVolume(self.factor, room(self.volume.change)[self.stiffness.free], self.volume.yields)
+    def _held(self) -> VolumeConstraint:
+        change = without_round_off(self.volume.change)[self.stiffness.free]
+        return VolumeConstraint(self.factor, change, self.volume.yields)
 
     @cached_property
     def _sensitivity(self) -> FloatArray:

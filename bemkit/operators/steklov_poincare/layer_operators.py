@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
 from bemkit.operators.counts import Entries, OperationCounts
@@ -102,7 +102,7 @@ def assemble_layers(
     )
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
     annihilated = mass_product(t, t, pressures[:, : 0 if is_compressible else None])
-    kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
+    kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator")
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     motions = traction_free_modes(mesh, dof_points(u))
@@ -123,7 +123,7 @@ def assemble_layers(
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:
     """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
-    return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
+    return np.where(antisymmetric_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
@@ -213,7 +213,7 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 def _mirrors(space: BoundarySpace) -> list[Support]:
     """Return the supports that stand for symmetry lines: no displacement across them."""
-    held = vanishing_dofs(space).reshape(-1, 2)[space.element_dofs]
+    held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
     elements = np.flatnonzero(held.any(axis=(1, 2)))
     if not elements.size:
         return []

@@ -12,7 +12,7 @@ from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
+from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
 
 
 @dataclass(eq=False)
@@ -53,7 +53,7 @@ class SchurCondensation:
         self._coupling = matrix[np.ix_(self._free, self._retained)]
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change
-        self._held = HeldVolume(self.factor, room(volume)[self._free], self.volume.yields)
+        self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.yields)
         self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._retained].T)
         stiffness = matrix[np.ix_(self._retained, self._retained)] + multiply(self._coupling.T, self._response)
         stiffness += volume[self._retained] @ self._pressures
