@@ -96,7 +96,7 @@ def orders_table(rows: Sequence[ErrorRecord]) -> str:
 
 def choice_table(rows: Sequence[ErrorRecord]) -> str:
     """Return the fastest run that reaches each error of the normal traction, and of the energy."""
-    lines = ["| wished error | in the normal traction | in the energy |", "|---|---|---|"]
+    lines = ["| target error | in the normal traction | in the energy |", "|---|---|---|"]
     for target in TARGETS:
         cells = [fastest(rows, measure, target) for measure in ("sigma_n", "energy")]
         lines.append(f"| {target:.0e} | {' | '.join(cells)} |")

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
@@ -120,7 +120,7 @@ def _stages(solution: Solution, output_seconds: float) -> Table:
     return table
 
 
-def _counts(planned: Work, counted: Work) -> Table:
+def _counts(planned: OperationCounts, counted: OperationCounts) -> Table:
     table = plain_table(("what was computed",), gap=2)
     for name in ("planned", "counted"):
         table.add_column(name, justify="right", overflow="fold")
@@ -129,7 +129,7 @@ def _counts(planned: Work, counted: Work) -> Table:
     return table
 
 
-def _lines(work: Work) -> Iterator[tuple[str, str]]:
+def _lines(work: OperationCounts) -> Iterator[tuple[str, str]]:
     yield "element pairs integrated", f"{work.element_pairs:,}"
     for name, entries in (("V", work.single_layer), ("K", work.double_layer), ("W", work.hypersingular)):
         yield f"entries of {name} computed", f"{entries.computed:,}"

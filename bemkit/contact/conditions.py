@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
 
-_FREE = 1e-9
+_FREE_MOTION_TOLERANCE = 1e-9
 """A unit rigid motion that changes no condition by more than this is free of them. Normals leave about 1e-16; one held
 node out of a million gives 1e-3."""
 
@@ -92,7 +92,7 @@ class LinearConditions:
         rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
         felt = np.einsum("nrc,mnc->nrm", rows, basis).reshape(-1, len(basis))
         _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
-        return np.tensordot(directions[np.count_nonzero(singular > _FREE) :], basis, axes=1)
+        return np.tensordot(directions[np.count_nonzero(singular > _FREE_MOTION_TOLERANCE) :], basis, axes=1)
 
     def regularised(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
         """Return the conditions with weak springs added wherever only tractions are prescribed.

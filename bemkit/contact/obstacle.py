@@ -16,7 +16,7 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
 
-FACING = 1e-12
+FACING_TOLERANCE = 1e-12
 """Cosine of the angle between the body's normal and the contact direction below which a point does not face the
 obstacle: round-off of a side that runs along it."""
 
@@ -85,7 +85,7 @@ def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray)
     if not isinstance(obstacle, DirectedObstacle):
         return gap, normals
     direction = obstacle.approach(points, normals)
-    return np.where(np.sum(direction * normals, axis=1) > FACING, gap, np.inf), direction
+    return np.where(np.sum(direction * normals, axis=1) > FACING_TOLERANCE, gap, np.inf), direction
 
 
 @dataclass(frozen=True)

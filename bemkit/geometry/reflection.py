@@ -54,7 +54,7 @@ def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, In
         yield slice(g * n, g * n + n), signs, space.element_dofs[:, :: -1 if is_reversing(signs) else 1]
 
 
-def unfolded(space: BoundarySpace, whole: BoundarySpace, values: FloatArray) -> FloatArray:
+def reflected_to_whole(space: BoundarySpace, whole: BoundarySpace, values: FloatArray) -> FloatArray:
     """Return the dofs of a symmetric field on the whole boundary.
 
     Parameters
@@ -76,7 +76,7 @@ def unfolded(space: BoundarySpace, whole: BoundarySpace, values: FloatArray) -> 
     return result
 
 
-def vanishing_dofs(space: BoundarySpace) -> BoolArray:
+def antisymmetric_dofs(space: BoundarySpace) -> BoolArray:
     """Tell which vector dofs are zero, because the function goes over into its image on a symmetry line.
 
     Parameters

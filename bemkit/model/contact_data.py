@@ -15,9 +15,9 @@ from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
 from bemkit.scene.scene import Contact, Scene
 
-ALIKE = 0.866
+SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees: directions of contact at one node that differ by less belong to one smooth side."""
-SAME_GAP = 1e-9
+GAP_TOLERANCE = 1e-9
 """Difference of two gaps at one node, relative to the size of the body, that does not make one obstacle nearer."""
 
 
@@ -90,7 +90,7 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
             contact_along_normals(space, np.zeros(0, np.intp)), (), *(np.zeros(0),) * 3, np.zeros((0, 2))
         )
     sides = [_Side.of(obstacle, mesh.part(name), mesh, space) for name, obstacle in obstacles.items()]
-    owner = _owners(sides, space.n_dofs // 2, SAME_GAP * mesh.diameter)
+    owner = _owners(sides, space.n_dofs // 2, GAP_TOLERANCE * mesh.diameter)
     directions = np.zeros((owner.size, 2))
     for number, side in enumerate(sides):
         own = owner[side.nodes] == number
@@ -136,7 +136,7 @@ class _Side:
 
     def receivers(self, directions: FloatArray) -> IntArray:
         """Return the node (n,) to which the weight of each node goes: itself, or the next one on this side."""
-        is_own = np.sum(directions[self.nodes] * self.directions, axis=1) > ALIKE
+        is_own = np.sum(directions[self.nodes] * self.directions, axis=1) > SMOOTH_SIDE_COSINE
         position = np.arange(self.nodes.size)
         following, before = np.minimum(position + 1, position[-1]), np.maximum(position - 1, 0)
         return self.nodes[np.where(is_own, position, np.where(is_own[following], following, before))]

@@ -23,7 +23,7 @@ from bemkit.model.contact_data import ContactData
 from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.scene.conditions import Contact, Pressure, Traction
@@ -100,7 +100,7 @@ class Model:
         return Model(prepared, self.elastic, body, _problem(prepared, body))
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
         return self.body.work
 

@@ -14,13 +14,13 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model
 from bemkit.operators.equilibrium import round_off_of
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.solvers.base import ContactSolution, Status
 
 _ROUND_OFF = 1e-10
 """Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
 a ring whose thickness is a hundredth of its radius has 1e-7 of the largest stiffness."""
-_CARRIED = 64.0 * float(np.finfo(float).eps)
+_ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
 
 
@@ -40,7 +40,7 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, condensed.sensitivity):
         return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.prepared.space
-    motions = resting_motions(space.mesh, dof_points(space))
+    motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, condensed.sensitivity)
     return (
         _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
@@ -87,7 +87,7 @@ def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) 
     symmetric = 0.5 * (stiffness + stiffness.T)
     round_off = _ROUND_OFF * float(np.abs(symmetric).max(initial=0.0))
     if sensitivity is not None:
-        round_off += _CARRIED * float(np.abs(sensitivity).max(initial=0.0))
+        round_off += _ELIMINATION_TOLERANCE * float(np.abs(sensitivity).max(initial=0.0))
     symmetric[np.diag_indices_from(symmetric)] += round_off
     try:
         np.linalg.cholesky(symmetric)

@@ -11,7 +11,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.prepared import Prepared, Units
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import unsupported_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 
 _DIRECTIONS = (
     *("to the right", "up and to the right", "upward", "up and to the left"),
@@ -41,7 +41,7 @@ def check_held(prepared: Prepared) -> None:
     FreeBodyError
         Naming the modes.
     """
-    modes = unsupported_motions(prepared.space, prepared.conditions)
+    modes = free_modes(prepared.space, prepared.conditions)
     if not len(modes):
         return
     points = dof_points(prepared.space)

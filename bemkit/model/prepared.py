@@ -23,7 +23,7 @@ from bemkit.geometry.validity.magnitude import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import Automatic, Choice, DenseCholesky, Krylov
+from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
@@ -186,7 +186,7 @@ class Prepared:
     space : BoundarySpace
         Of the displacements, on the unit mesh.
     conditions : NodalConditions
-        Supports, and the directions that are open to contact.
+        Supports, and the directions that are retained for contact.
     candidates : ContactData
         The nodes on contact parts, whatever supports hold them.
     contact : ContactData
@@ -215,16 +215,16 @@ class Prepared:
         return free_motions(self.conditions, self.contact.nodes, self.space)
 
     @cached_property
-    def linear_solver(self) -> Choice:
+    def linear_solver(self) -> ChosenLinearSolver:
         """The linear solver that a symmetric map follows, and why it is taken."""
         scene, requested = self.scene, self.scene.linear_solver
         if not scene.discretisation.is_symmetric:
             direct = DenseCholesky() if isinstance(requested, Automatic) else requested
-            return Choice(direct, "the map has a linear solver of its own")
+            return ChosenLinearSolver(direct, "the map has a linear solver of its own")
         if isinstance(requested, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
             requested = DenseCholesky()  # iteration would be too inexact
-        n_open = int(np.count_nonzero(self.conditions.is_open))
-        return choose_linear_solver(requested, self.space.n_dofs, n_open, physical_memory())
+        n_retained = int(np.count_nonzero(self.conditions.is_retained))
+        return choose_linear_solver(requested, self.space.n_dofs, n_retained, physical_memory())
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.

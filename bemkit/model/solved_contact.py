@@ -17,7 +17,7 @@ from bemkit.contact.body import ContactState
 from bemkit.model.contact_model import Model
 from bemkit.solvers.active_sets import NodeStatus
 
-AT_REST = 1e-9
+SLIP_TOLERANCE = 1e-9
 """Slip below this share of the largest displacement is round-off of the frames of contact and support."""
 LARGEST_ANGLE = 30.0
 """Degrees between the body's normal and the direction of contact. A side lies down on its obstacle by turning through
@@ -50,7 +50,7 @@ def with_held_friction(model: Model, state: ContactState, node_status: IntArray)
     bound = np.where(is_closed | np.asarray(law.acts_across_gap), law.bound(sigma_n), 0.0)
     has_friction = held & ((bound > 0.0) | (law.bound_derivative(sigma_n) != 0.0))
     slip = state.u_t - model.problem.slip_origin
-    slip = np.where(np.abs(slip) > AT_REST * np.abs(state.displacement).max(), slip, 0.0)
+    slip = np.where(np.abs(slip) > SLIP_TOLERANCE * np.abs(state.displacement).max(), slip, 0.0)
     sigma_t = np.where(has_friction, -bound * np.sign(slip), state.sigma_t)
     status = np.select([slip > 0.0, slip < 0.0], [NodeStatus.SLIP_FORWARD, NodeStatus.SLIP_BACKWARD], NodeStatus.STICK)
     status = np.where(has_friction & is_closed, status, node_status)

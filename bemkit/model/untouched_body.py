@@ -12,9 +12,9 @@ from bemkit.contact.body import ContactState, LinearBody
 from bemkit.contact.certificate import Certificate
 from bemkit.contact.conditions import LinearConditions
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
-from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
@@ -36,7 +36,7 @@ class UntouchedBody(LinearBody):
     force : (n_nodes, 2) array [N/m]
         Given nodal forces.
     condensed : CondensedMap
-        Without open directions: all that is unknown has been solved for.
+        Without retained directions: all that is unknown has been solved for.
     """
 
     space: BoundarySpace
@@ -53,7 +53,7 @@ class UntouchedBody(LinearBody):
         return np.zeros(0, bool)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
         return self.condensed.work
 
@@ -81,7 +81,7 @@ class UntouchedBody(LinearBody):
         displacement, force = self.recover(state)
         if not np.isfinite(displacement).all():
             return Imbalance(np.nan, np.nan)
-        points, balanced = dof_points(self.space), possible_motions(self.space.mesh)
+        points, balanced = dof_points(self.space), admissible_modes(self.space.mesh)
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         total = float(np.abs(force).sum()) or 1.0
         missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]

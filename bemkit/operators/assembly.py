@@ -21,7 +21,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.reflection import element_images, vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators import kernels
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
@@ -222,8 +222,8 @@ class _Target:
     def dofs_matrix(self) -> FloatArray:
         """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
         if self._form.test.mesh.symmetry is not None:
-            self.matrix[vanishing_dofs(self._form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
-            self.matrix[:, :, vanishing_dofs(self._form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
+            self.matrix[antisymmetric_dofs(self._form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
+            self.matrix[:, :, antisymmetric_dofs(self._form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
     def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:

@@ -58,7 +58,7 @@ class Entries:
 
 
 @dataclass(frozen=True)
-class Work:
+class OperationCounts:
     """Counts of what a body took to compute.
 
     Parameters
@@ -83,9 +83,9 @@ class Work:
     right_hand_sides: int = 0
     contact_unknowns: int = 0
 
-    def __add__(self, other: Work) -> Work:
+    def __add__(self, other: OperationCounts) -> OperationCounts:
         """Return the work of both, one after the other."""
-        return Work(
+        return OperationCounts(
             self.element_pairs + other.element_pairs,
             self.single_layer + other.single_layer,
             self.double_layer + other.double_layer,

@@ -9,13 +9,13 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 
-MOST_ROUND_OFF = 1e-6
+ROUND_OFF_LIMIT = 1e-6
 """Share of the forces up to which an imbalance may be put down to round-off; beyond, too few digits are left. The
 estimate is 1e-12 in all but thin or nearly incompressible bodies; a strip of 1000 : 1 has an imbalance of 1e-7 and an
 estimate of 1e-6. More than that no check of the result would let pass."""
 
 
-NOISE = 64.0
+NOISE_FACTOR = 64.0
 """Forces below this many times the round-off of their terms are none: sums of hundreds of terms leave some eps of their
 sizes, and loads that strain a body by less are lost in them."""
 
@@ -29,7 +29,7 @@ class Imbalance:
     force, moment : float
         As measured.
     round_off : float
-        How much of that round-off alone may leave. It is cut off at `MOST_ROUND_OFF`.
+        How much of that round-off alone may leave. It is cut off at `ROUND_OFF_LIMIT`.
     """
 
     force: float
@@ -37,7 +37,7 @@ class Imbalance:
     round_off: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "round_off", min(self.round_off, MOST_ROUND_OFF))
+        object.__setattr__(self, "round_off", min(self.round_off, ROUND_OFF_LIMIT))
 
     @property
     def worst(self) -> float:
@@ -101,7 +101,7 @@ class Unbalanced:
         total = loads + float(np.abs(self.contact).sum())
         of_sums = max(self.motions_round_off, round_off)
         terms = max(self.terms, round_off / np.finfo(float).eps)
-        noise = NOISE * of_sums if loads == 0.0 else 0.0
+        noise = NOISE_FACTOR * of_sums if loads == 0.0 else 0.0
         largest, total = (max(size, terms) if size <= noise else size for size in (largest, total))
         at_nodes, on_motions = (
             Imbalance(0.0, 0.0) if size == 0.0 else Imbalance(missing / size, 0.0, left / size)

@@ -20,7 +20,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.assembly import Block, PairForm, Tag, Tensor, TrialTerm, require_one_mesh
 from bemkit.operators.integrals.pairs import Degrees
@@ -144,7 +144,7 @@ class HypersingularForm(PairForm):
 
 def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:
     """Return the tags of a symmetric operator that is positive but on dofs that are zero by symmetry."""
-    is_definite = is_positive and not vanishing_dofs(space).any()
+    is_definite = is_positive and not antisymmetric_dofs(space).any()
     return frozenset({Tag.SYMMETRIC, Tag.POSITIVE_DEFINITE if is_definite else Tag.POSITIVE_SEMIDEFINITE})
 
 
@@ -166,7 +166,7 @@ def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> tuple[FloatArray,
     component = np.arange(2)
     rows = 2 * test.element_dofs[:, :, None, None] + component + np.zeros_like(values, np.intp)
     columns = 2 * trial.element_dofs[:, None, :, None] + component + np.zeros_like(values, np.intp)
-    values[vanishing_dofs(test)[rows] | vanishing_dofs(trial)[columns]] = 0.0
+    values[antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns]] = 0.0
     return values.ravel(), rows.ravel(), columns.ravel()
 
 

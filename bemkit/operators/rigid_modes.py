@@ -31,7 +31,7 @@ def rigid_motions(points: FloatArray, centre: FloatArray, length: float) -> Floa
     return motions
 
 
-def possible_motions(mesh: BoundaryMesh) -> tuple[int, ...]:
+def admissible_modes(mesh: BoundaryMesh) -> tuple[int, ...]:
     """Return which of the two translations and the rotation a body can make.
 
     All of them, or those that its symmetry allows; none of an exterior, which is at rest at infinity. The forces on the
@@ -42,7 +42,7 @@ def possible_motions(mesh: BoundaryMesh) -> tuple[int, ...]:
     return (0, 1, 2) if mesh.symmetry is None else mesh.symmetry.rigid_motions
 
 
-def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
+def traction_free_modes(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
     """Return the motions of a body that cause no tractions at all.
 
     Parameters
@@ -53,11 +53,11 @@ def resting_motions(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
     Returns
     -------
     (2 n, n_motions) array
-        The rigid motions that are possible, component-wise; see `possible_motions`.
+        The admissible rigid motions, component-wise; see `admissible_modes`.
     """
-    possible = list(possible_motions(mesh))
-    motions = rigid_motions(points, mesh.centre, mesh.diameter)[:, :, possible]
-    return motions.reshape(2 * len(points), len(possible))
+    admissible = list(admissible_modes(mesh))
+    motions = rigid_motions(points, mesh.centre, mesh.diameter)[:, :, admissible]
+    return motions.reshape(2 * len(points), len(admissible))
 
 
 def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -71,9 +71,9 @@ def without_motion(mesh: BoundaryMesh, points: FloatArray, displacement: FloatAr
     Returns
     -------
     (n, 2) array [m]
-        Of an exterior the displacement itself, since any motion of its boundary strains it; see `possible_motions`.
+        Of an exterior the displacement itself, since any motion of its boundary strains it; see `admissible_modes`.
     """
-    motions = resting_motions(mesh, points)
+    motions = traction_free_modes(mesh, points)
     if not motions.shape[1]:
         return displacement
     nearest = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]

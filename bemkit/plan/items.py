@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared
-from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import PlanItem
 from bemkit.scene.scene import Scene
 
@@ -70,10 +70,10 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_tractions=tractions.n_dofs,
         n_fixed=int(np.count_nonzero(conditions.is_fixed)),
         n_free=int(np.count_nonzero(conditions.is_free)),
-        n_open=int(np.count_nonzero(conditions.is_open)),
+        n_open=int(np.count_nonzero(conditions.is_retained)),
         n_contact=n_contact,
         n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
-        n_motions=len(possible_motions(mesh)),
+        n_motions=len(admissible_modes(mesh)),
         n_free_motions=len(prepared.free_motions),
     )
 
@@ -146,7 +146,7 @@ def _spaces(scene: Scene, sizes: Sizes) -> PlanItem:
     )
     reason = (
         f"{scene.discretisation.method}: {sizes.n_displacements} displacements and {sizes.n_tractions} tractions, "
-        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} open to contact"
+        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
     )
     return PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
 

@@ -10,7 +10,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
@@ -45,7 +45,7 @@ class Plan:
     linear_solver : LinearSolver
         The one taken for a symmetric map.
     sizes : Sizes
-    work : Work
+    work : OperationCounts
         The counts that `Solution.work` will show if all load steps converge.
     memory : int [bytes]
         Largest sum of all arrays that exist at the same time.
@@ -59,7 +59,7 @@ class Plan:
 
     linear_solver: LinearSolver
     sizes: Sizes
-    work: Work
+    work: OperationCounts
     memory: int
     seconds: float
     items: tuple[PlanItem, ...]
@@ -105,7 +105,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     return Plan(
         linear_solver=first.linear_solver.solver,
         sizes=sizes,
-        work=needs.work + Work(contact_unknowns=sizes.n_contact_unknowns),
+        work=needs.work + OperationCounts(contact_unknowns=sizes.n_contact_unknowns),
         memory=_memory(sizes, needs),
         seconds=_seconds(sizes, needs, len(steps)),
         items=plan_items(first.scene, sizes, needs.items, len(steps), proposal),
@@ -115,9 +115,9 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
 
 def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
     """Return the largest memory: of the body while it is made, or of body and contact system together [bytes]."""
-    o, c = sizes.n_open, sizes.n_contact_unknowns
+    r, c = sizes.n_open, sizes.n_contact_unknowns
     rows = 2 * sizes.n_contact * c  # the contact system before tangents without friction are taken out
-    return max(needs.memory, needs.kept + int(_BYTES * (o * o + o * c + 4.2 * rows)))
+    return max(needs.memory, needs.kept + int(_BYTES * (r * r + r * c + 4.2 * rows)))
 
 
 def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:

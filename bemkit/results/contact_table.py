@@ -137,7 +137,7 @@ class Transition:
 _FIT = (2, 4, 6, 12)
 """Nodes from a transition on that tell its place (the first two) and the power of the distance (the last two). The
 values at the nodes before them are the least accurate."""
-_CLOSE = 0.1
+_POWER_LAW_RANGE = 0.1
 """Distance, relative to the size of the zone, up to which that power holds closely."""
 _POWERS = (1.3, 1.7)
 """The powers that sliding friction may make of 3/2."""
@@ -227,7 +227,7 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
 
 def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
     """Extrapolate powers of the distance from a zone's nodes at s = 0, s[1], ...; None if they do not fall to zero."""
-    is_fine = len(s) > _FIT[-1] and s[_FIT[-1]] < _CLOSE * s[-1]
+    is_fine = len(s) > _FIT[-1] and s[_FIT[-1]] < _POWER_LAW_RANGE * s[-1]
     near, far, *outer = _FIT if is_fine else (0, 1)
     power, distance = 1.5, 0.0
     values = field[[near, far, *outer]]

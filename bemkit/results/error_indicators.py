@@ -18,7 +18,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.reflection import unfolded
+from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, break_nodes, dof_points
 from bemkit.operators.rigid_modes import without_motion
 
@@ -59,8 +59,8 @@ def squared_errors(
         With those of the images that a symmetry adds they add up to the estimate of a(u - u_h, u - u_h).
     """
     half, whole = make_space(mesh), make_space(mesh.whole)
-    moved = unfolded(half, whole, displacement)
-    loaded = unfolded(ConstantSpace(mesh), ConstantSpace(mesh.whole), traction)
+    moved = reflected_to_whole(half, whole, displacement)
+    loaded = reflected_to_whole(ConstantSpace(mesh), ConstantSpace(mesh.whole), traction)
     errors = element_errors(whole, moved, plane_modulus)
     errors += traction_errors(mesh.whole, loaded, whole.degree - 1, plane_modulus)
     return errors[: mesh.n_elements]

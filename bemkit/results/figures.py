@@ -18,7 +18,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
-from bemkit.geometry.reflection import unfolded
+from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.results.boundary_figure import draw_boundary_traction
 from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, new_figure, panel_above_strip
@@ -216,7 +216,7 @@ def node_displacement(solution: Solution) -> FloatArray:
     """
     mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
     space = make_space(mesh)
-    displacement = unfolded(make_space(solution.mesh), space, solution.boundary.displacement)
+    displacement = reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement)
     at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
     before, after = mesh.node_elements.T
     share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bemkit.geometry.reflection import unfolded
+from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.results.solution import Solution
@@ -32,10 +32,10 @@ def interior_fields(solution: Solution) -> InteriorFields:
     mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.boundary
     has_dofs = len(boundary.traction_dofs) > mesh.n_elements
     space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
-    displacement = unfolded(half_space, space, boundary.displacement)
+    displacement = reflected_to_whole(half_space, space, boundary.displacement)
     tractions, half_tractions = (
         ElementwiseSpace(discretisation.traction_space(each) if has_dofs else ConstantSpace(each))
         for each in (mesh.whole, mesh)
     )
-    traction = unfolded(half_tractions, tractions, boundary.traction_dofs)
+    traction = reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
     return InteriorFields(mesh.whole, solution.scene.material, space, displacement, tractions, traction)

@@ -33,7 +33,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
@@ -237,7 +237,7 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         transitions=_read_transitions(reader),
         timings={name: float(value) for name, value in reader.attributes("timings").items()},
         plan=structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
-        work=structure(json.loads(reader.text("work", _MAX_PLAN)), Work),
+        work=structure(json.loads(reader.text("work", _MAX_PLAN)), OperationCounts),
         memory={name: int(value) for name, value in reader.attributes("memory").items()},
         message=str(summary["message"]),
         warnings=reader.texts("warnings"),

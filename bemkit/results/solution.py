@@ -17,7 +17,7 @@ from bemkit.arrays import FloatArray, read_only
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import STATUS_WORDS as STATUS_WORDS
 from bemkit.results.contact_table import ContactTable as ContactTable
@@ -97,7 +97,7 @@ class Solution:
     timings : mapping of str to float [s]
         Of each stage of the run, and of all.
     plan : Plan
-    work : Work
+    work : OperationCounts
         What was computed; equal to ``plan.work`` if all load steps converged.
     memory : mapping of str to int [bytes]
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
@@ -120,7 +120,7 @@ class Solution:
     transitions: tuple[Transition, ...]
     timings: Mapping[str, float]
     plan: Plan
-    work: Work
+    work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

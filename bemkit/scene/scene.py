@@ -22,7 +22,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import Clamped as Clamped
 from bemkit.scene.conditions import Condition as Condition
@@ -99,7 +99,7 @@ class Scene:
     load_factors: tuple[float, ...] = (1.0,)
     symmetry: Symmetry | None = None
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
-    linear_solver: LinearSolverWish = field(default_factory=Automatic)
+    linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
     description: str = ""

@@ -26,7 +26,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
-from bemkit.operators.linear.solvers import LinearSolver, LinearSolverWish
+from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
 from bemkit.scene.registry import (
     CONDITIONS,
     DISCRETISATIONS,
@@ -50,7 +50,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Obstacle, OBSTACLES),
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),
-    (LinearSolverWish, LINEAR_SOLVERS),
+    (LinearSolverChoice, LINEAR_SOLVERS),
     (LinearSolver, LINEAR_SOLVERS),
     (ContactSolver, SOLVERS),
 )

@@ -258,10 +258,10 @@ class _Path:
         rate = ContactState(shifted.displacement - origin.displacement, traction_rate)
 
         origin_slip = origin.u_t - problem.slip_origin
-        room = bound.slope * origin.sigma_n + bound.intercept
-        room_rate = bound.slope * rate.sigma_n + extras.friction
-        slack = [-origin.sigma_n, problem.gap - origin.u_n, room + origin.sigma_t, room - origin.sigma_t]
-        slack_rate = [-rate.sigma_n, extras.gap - rate.u_n, room_rate + rate.sigma_t, room_rate - rate.sigma_t]
+        limit = bound.slope * origin.sigma_n + bound.intercept
+        limit_rate = bound.slope * rate.sigma_n + extras.friction
+        slack = [-origin.sigma_n, problem.gap - origin.u_n, limit + origin.sigma_t, limit - origin.sigma_t]
+        slack_rate = [-rate.sigma_n, extras.gap - rate.u_n, limit_rate + rate.sigma_t, limit_rate - rate.sigma_t]
         return _Piece(
             origin,
             rate,

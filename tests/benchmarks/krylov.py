@@ -2,9 +2,10 @@
 
     python tests/benchmarks/krylov.py [N ...]
 
-The body is an L with `n_open` directions open to contact in the middle of its lower side. For each number of elements N
-(default 500 1000 2000) and some n_open it prints the medians of three runs of everything after assembly, as ratios to
-the direct solver, and the peaks of all arrays as ratios. Before that, steps to rtol 1e-9 over N and shapes.
+The body is an L with `n_retained` directions retained for contact in the middle of its lower side. For each number of
+elements N (default 500 1000 2000) and some n_retained it prints the medians of three runs of everything after assembly,
+as ratios to the direct solver, and the peaks of all arrays as ratios. Before that, steps to rtol 1e-9 over N and
+shapes.
 """
 
 from __future__ import annotations
@@ -49,11 +50,11 @@ def mesh_of(name: str, n_elements: int) -> bk.BoundaryMesh:
     return bk.discretise(shape.outline(), n_elements=n_elements, grading=grading)
 
 
-def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> tuple[CondensedMap, float]:
-    """Condense a body onto n_open / 2 nodes; return what is left and the time after assembly [s]."""
+def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_retained: int) -> tuple[CondensedMap, float]:
+    """Condense a body onto n_retained / 2 nodes; return what is left and the time after assembly [s]."""
     elastic = bk.GalerkinMap(mesh, bk.Material(1.0, 0.3), linear_solver=solver)
     lowest = np.array([mesh.nodes[:, 0].mean(), mesh.nodes[:, 1].min()])
-    contact = np.sort(np.argsort(np.abs(mesh.centres - lowest).sum(axis=1))[: n_open // 2 - 1])
+    contact = np.sort(np.argsort(np.abs(mesh.centres - lowest).sum(axis=1))[: n_retained // 2 - 1])
     force = np.zeros((mesh.n_nodes, 2))
     force[mesh.n_nodes // 2] = (0.3, -1.0)
     begin = time.perf_counter()
@@ -62,17 +63,17 @@ def condensed(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> tuple
     return body.condensed, time.perf_counter() - begin - assembly.seconds
 
 
-def peak_of(mesh: bk.BoundaryMesh, solver: LinearSolver, n_open: int) -> int:
+def peak_of(mesh: bk.BoundaryMesh, solver: LinearSolver, n_retained: int) -> int:
     """Largest memory of all arrays during assembly and condensation [bytes]."""
     tracemalloc.start()
-    condensed(mesh, solver, n_open)
+    condensed(mesh, solver, n_retained)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak
 
 
 def steps_table() -> Table:
-    """Steps with ten open directions."""
+    """Steps with ten retained directions."""
     table = Table(title="steps to 1e-9: preconditioner factored / multigrid")
     for column in ("body", *(f"N = {n}" for n in SIZES)):
         table.add_column(column, justify="right")
@@ -87,20 +88,20 @@ def steps_table() -> Table:
     return table
 
 
-def times_row(n_elements: int, n_open: int, repetitions: int = 3) -> list[str]:
+def times_row(n_elements: int, n_retained: int, repetitions: int = 3) -> list[str]:
     """Ratios of time and memory to the direct solver."""
     mesh = mesh_of("L", n_elements)
     solvers = (bk.DenseCholesky(), FACTORED, MULTIGRID)
     times: list[list[float]] = [[] for _ in solvers]
     for _ in range(repetitions):  # in turn, so that all see the same state of the computer
         for solver, taken in zip(solvers, times, strict=True):
-            taken.append(condensed(mesh, solver, n_open)[1])
+            taken.append(condensed(mesh, solver, n_retained)[1])
     direct, factored, multigrid = (statistics.median(taken) for taken in times)
-    peaks = [peak_of(mesh, solver, n_open) for solver in solvers]
+    peaks = [peak_of(mesh, solver, n_retained) for solver in solvers]
     order = 2 * mesh.n_nodes
-    predicted = krylov_cost(order, n_open).flops / direct_cost(order, n_open).flops
+    predicted = krylov_cost(order, n_retained).flops / direct_cost(order, n_retained).flops
     return [
-        *(str(n_elements), str(n_open), f"{direct:.2f}"),
+        *(str(n_elements), str(n_retained), f"{direct:.2f}"),
         *(f"{value:.2f}" for value in (factored / direct, predicted, multigrid / direct)),
         *(f"{peak / peaks[0]:.2f}" for peak in peaks[1:]),
         f"{peaks[0] / (8 * order**2):.1f}",
@@ -112,12 +113,12 @@ def main() -> None:
     console = Console(width=140)
     console.print(steps_table())
     table = Table(title="L: time after assembly and memory, as ratios to the direct solver")
-    columns = ("N", "n_open", "direct [s]", "factored", "predicted", "multigrid", "memory", "with multigrid")
+    columns = ("N", "n_retained", "direct [s]", "factored", "predicted", "multigrid", "memory", "with multigrid")
     for column in (*columns, "direct [n^2 numbers]"):
         table.add_column(column, justify="right")
     for n_elements in [int(word) for word in sys.argv[1:]] or [500, 1000, 2000]:
-        for n_open in (6, 10, 20, 40, 80):
-            table.add_row(*times_row(n_elements, n_open))
+        for n_retained in (6, 10, 20, 40, 80):
+            table.add_row(*times_row(n_elements, n_retained))
         console.print(f"N = {n_elements} done", style="dim")
     console.print(table)
 

@@ -78,8 +78,8 @@ def bemkit_told(example: int, n_elements: int) -> Outcome:
     first = scene.mesh.first_partition(outline, scene.selections, contact)
     places = [x / WIDTH[example] for x in reference_values(example)[1]]
     cuts = {outline.side_names.index("bottom"): places}
-    wish = np.ones(len(first.sides))
-    mesh = better_partition(first, wish, n_elements, cuts=cuts, spread_over=contact).mesh
+    density = np.ones(len(first.sides))
+    mesh = better_partition(first, density, n_elements, cuts=cuts, spread_over=contact).mesh
     solution = bk.run(scene, mesh=mesh)
     seconds = time.perf_counter() - begin
     return Outcome(measured_errors(solution, example) | {"transitions": float("inf")}, seconds)

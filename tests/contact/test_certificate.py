@@ -133,17 +133,17 @@ def test_open_nodes_carry_shear_only_under_friction_given_across_the_gap():
 
 
 def test_what_is_left_of_tractions_is_measured_by_itself_not_by_those_that_would_hold_the_body():
-    """A loose body lifted out of an overlap of one: 1e-9 of the glued tractions are no round-off."""
+    """A loose body lifted out of an overlap of one: 1e-9 of the tractions of the sticking state are no round-off."""
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Coulomb(0.5))
     lifted = -body.motions[0]
-    glued = np.abs(problem.sticking_state.traction).max()
+    sticking = np.abs(problem.sticking_state.traction).max()
     clean = ContactState(lifted, np.zeros_like(lifted))
     assert certify(problem, clean).worst < 1e-12
     left = clean.traction.copy()
-    left[4, 0] = 1e-9 * glued
+    left[4, 0] = 1e-9 * sticking
     assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-3)
-    left[4, 0] = 1e-14 * glued  # the round-off of sums of terms as large as the glued tractions
+    left[4, 0] = 1e-14 * sticking  # the round-off of sums of terms as large as the tractions of the sticking state
     assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-14)
 
 
@@ -159,9 +159,9 @@ def test_lengths_without_tractions_are_measured_by_the_displacement():
 def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_hold_the_body():
     body = block_body(press=0.0, push=0.0, is_held_sideways=False)
     problem = ContactProblem(body, np.full(body.n_contact, -1.0), Tresca(0.0))
-    glued = np.abs(problem.sticking_state.traction).max()
+    sticking = np.abs(problem.sticking_state.traction).max()
     slid = -2.0 * body.motions[0] + body.motions[1]
     state = ContactState(slid, np.zeros_like(slid))
     assert certify(problem, state).worst < 1e-12
-    resisted = problem.with_law(Tresca(1e-10 * glued))
+    resisted = problem.with_law(Tresca(1e-10 * sticking))
     assert certify(resisted, state).slip_opposition == pytest.approx(1e-3)

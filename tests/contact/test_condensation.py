@@ -152,7 +152,7 @@ def test_contact_nodes_fixed_along_their_normal_are_left_to_the_support() -> Non
     assert not np.any(np.isclose(nodes.points[:, 0], 0.0))
 
 
-def test_a_body_that_glued_contact_cannot_hold_is_named() -> None:
+def test_a_body_that_tied_contact_cannot_hold_is_named() -> None:
     mesh = mesh_of(Rectangle(2.0, 1.0), 24, "bottom")
     elastic = GalerkinMap(mesh, MATERIAL)
     with pytest.raises(SingularMatrixError, match="the body held by its supports and its contact boundary"):
@@ -201,17 +201,17 @@ class Heavy:
         own = np.einsum("nkc,nc->nk", conditions.frame, displacement)
         fixed = np.where(conditions.is_fixed, conditions.displacement - own, 0.0)
         light = self.light.condense(replace(conditions, displacement=fixed), force - forces)
-        opened = own[conditions.is_open]
+        shift = own[conditions.is_retained]
 
         def recover(retained: FloatArray) -> tuple[FloatArray, FloatArray]:
-            parts = light.recover(retained - opened)
+            parts = light.recover(retained - shift)
             return parts[0] + displacement, parts[1] + forces
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             response, at_rest = light.follow(directions)
-            return response, at_rest + own.ravel()[directions] - response @ opened
+            return response, at_rest + own.ravel()[directions] - response @ shift
 
-        load = light.load + light.stiffness @ opened
+        load = light.load + light.stiffness @ shift
         x, y = dof_points(self.displacement_space).T
         resultant = -np.array([*forces.sum(axis=0), np.sum(x * forces[:, 1] - y * forces[:, 0])])
         return replace(light, load=load, recover=recover, follow=follow, volume_force=resultant)

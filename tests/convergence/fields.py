@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 
@@ -36,7 +36,7 @@ def forces(elastic: SteklovPoincare, traction: Callable[[FloatArray, FloatArray]
 def neumann(elastic: GalerkinMap | CollocationMap, force: FloatArray) -> FloatArray:
     """Return the (n_nodes, 2) displacements under nodal forces; the least of those that differ by rigid motions."""
     mesh = elastic.displacement_space.mesh
-    held = resting_motions(mesh, dof_points(elastic.displacement_space))
+    held = traction_free_modes(mesh, dof_points(elastic.displacement_space))
     if elastic.material.effective_poisson_ratio == 0.5 and not mesh.is_exterior:
         # the map leaves out the pressure that keeps the volume
         held = np.column_stack([held, forces(elastic, lambda _, normal: normal).ravel()])
@@ -47,7 +47,7 @@ def neumann(elastic: GalerkinMap | CollocationMap, force: FloatArray) -> FloatAr
 
 def distance(elastic: SteklovPoincare, one: FloatArray, other: FloatArray) -> float:
     """Return the largest difference of two displacements, up to motions that cause no tractions, relative."""
-    motions = resting_motions(elastic.displacement_space.mesh, dof_points(elastic.displacement_space))
+    motions = traction_free_modes(elastic.displacement_space.mesh, dof_points(elastic.displacement_space))
     difference = (one - other).ravel()
     if motions.size:
         difference = difference - motions @ np.linalg.lstsq(motions, difference, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""Partitions of outlines: cut, graded, shared by a wish, and balanced."""
+"""Partitions of outlines: cut, graded, shared by a density, and balanced."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def test_the_first_partition_is_graded_but_for_even_parts() -> None:
 
 def test_elements_end_at_the_cuts_and_crowd_around_them() -> None:
     old = first()
-    wish = np.ones(old.mesh.n_elements)
-    new = better_partition(old, wish, 80, cuts={0: [0.3, 0.6], 2: [0.25]}, spread_over=["floor"])
+    density = np.ones(old.mesh.n_elements)
+    new = better_partition(old, density, 80, cuts={0: [0.3, 0.6], 2: [0.25]}, spread_over=["floor"])
     for point in ((0.3, 0.0), (0.6, 0.0), (0.75, 1.0)):
         assert np.hypot(*(new.mesh.nodes - point).T).min() < 1e-14
     x = np.sort(new.mesh.start[new.mesh.part("floor"), 0])
@@ -45,24 +45,24 @@ def test_elements_end_at_the_cuts_and_crowd_around_them() -> None:
     assert new.mesh.parts.keys() == old.mesh.parts.keys()
 
 
-def test_elements_follow_the_wish() -> None:
+def test_elements_follow_the_density() -> None:
     old = first()
-    wish = np.where(old.mesh.centres[:, 0] < 1e-9, 1.0, 0.0)  # the left side
-    new = better_partition(old, wish, 120, cuts={}, spread_over=[])
+    density = np.where(old.mesh.centres[:, 0] < 1e-9, 1.0, 0.0)  # the left side
+    new = better_partition(old, density, 120, cuts={}, spread_over=[])
     on_left = new.mesh.centres[:, 0] < 1e-9
-    # a fifth of the others' wish remains, and they are balanced against their neighbours
+    # a fifth of the others' density remains, and they are balanced against their neighbours
     assert on_left.sum() > 0.5 * new.mesh.n_elements
     assert on_left.sum() >= 3 * (old.mesh.centres[:, 0] < 1e-9).sum()
 
 
 def test_half_of_the_elements_are_spread_over_the_parts_named() -> None:
     old = first()
-    wish = np.where(old.mesh.centres[:, 0] < 1e-9, 1.0, 0.0)
-    new = better_partition(old, wish, 100, cuts={}, spread_over=["floor"])
+    density = np.where(old.mesh.centres[:, 0] < 1e-9, 1.0, 0.0)
+    new = better_partition(old, density, 100, cuts={}, spread_over=["floor"])
     assert 50 <= new.mesh.part("floor").size <= 65
 
 
-def test_without_any_wish_all_elements_count_alike() -> None:
+def test_without_any_density_all_elements_count_alike() -> None:
     old = first()
     new = better_partition(old, np.zeros(old.mesh.n_elements), 100, cuts={}, spread_over=[])
     counts = [np.count_nonzero(new.sides == side) / np.count_nonzero(old.sides == side) for side in range(4)]
@@ -73,17 +73,17 @@ def test_every_piece_has_elements_and_neighbours_are_similar() -> None:
     rng = np.random.default_rng(7)
     partition = first()
     for _ in range(4):
-        wish = 10.0 ** rng.uniform(-6.0, 0.0, partition.mesh.n_elements)
-        partition = better_partition(partition, wish, 90, cuts={0: [0.9999]}, spread_over=["floor"])
+        density = 10.0 ** rng.uniform(-6.0, 0.0, partition.mesh.n_elements)
+        partition = better_partition(partition, density, 90, cuts={0: [0.9999]}, spread_over=["floor"])
         assert min(len(s) - 1 for s in partition.parameters) >= LEAST
         assert ratios(partition) <= STEEPEST * (1.0 + 1e-9)
 
 
 def test_cuts_at_ends_of_pieces_change_nothing() -> None:
     old = first()
-    wish = np.ones(old.mesh.n_elements)
+    density = np.ones(old.mesh.n_elements)
     plain, cut = (
-        better_partition(old, wish, 80, cuts=cuts, spread_over=[]) for cuts in ({}, {0: [0.0, 1.0], 2: [0.5]})
+        better_partition(old, density, 80, cuts=cuts, spread_over=[]) for cuts in ({}, {0: [0.0, 1.0], 2: [0.5]})
     )
     np.testing.assert_array_equal(plain.mesh.nodes, cut.mesh.nodes)
 

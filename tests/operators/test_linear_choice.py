@@ -16,25 +16,25 @@ AUTOMATIC = bk.Automatic()
 
 
 @pytest.mark.parametrize(
-    ("n_dofs", "n_open", "kind", "reason"),
+    ("n_dofs", "n_retained", "kind", "reason"),
     [
-        (640, 160, bk.DenseCholesky, "Cholesky, because 160 of 640 displacements are open to contact: conj"),
+        (640, 160, bk.DenseCholesky, "Cholesky, because 160 of 640 displacements are retained for contact: conj"),
         (640, 2, bk.DenseCholesky, "conjugate gradients would take"),
         (4000, 400, bk.DenseCholesky, "conjugate gradients would take"),
         (
             8000,
             10,
             bk.Krylov,
-            "conjugate gradients, because only 10 of 8000 displacements are open to contact: about 0.",
+            "conjugate gradients, because only 10 of 8000 displacements are retained for contact: about 0.",
         ),
         (20000, 40, bk.Krylov, "of the time of Cholesky"),
         (20000, 4000, bk.DenseCholesky, "times as long"),
     ],
 )
 def test_small_contact_boundaries_of_large_bodies_are_iterated(
-    n_dofs: int, n_open: int, kind: type, reason: str
+    n_dofs: int, n_retained: int, kind: type, reason: str
 ) -> None:
-    choice = choose_linear_solver(AUTOMATIC, n_dofs, n_open)
+    choice = choose_linear_solver(AUTOMATIC, n_dofs, n_retained)
     assert isinstance(choice.solver, kind)
     assert reason in choice.reason
 
@@ -52,9 +52,9 @@ def test_what_does_not_fit_is_iterated() -> None:
 
 
 def test_what_was_asked_for_is_taken() -> None:
-    wish = bk.Krylov(rtol=1e-6)
-    choice = choose_linear_solver(wish, 100, 100)
-    assert choice.solver is wish
+    requested = bk.Krylov(rtol=1e-6)
+    choice = choose_linear_solver(requested, 100, 100)
+    assert choice.solver is requested
     assert choice.reason == "asked for"
 
 
@@ -64,7 +64,7 @@ def test_nearly_incompressible_bodies_are_factored() -> None:
     choices = [prepare(each, each.build_mesh()).linear_solver for each in (rubber, scene)]
     assert all(choice.solver == bk.DenseCholesky() for choice in choices)
     assert choices[0].reason == "asked for"  # whatever their sizes
-    assert choices[1].reason.startswith("Cholesky, because 31 of 120 displacements are open to contact")
+    assert choices[1].reason.startswith("Cholesky, because 31 of 120 displacements are retained for contact")
     with pytest.raises(
         ValueError, match=r"at the Poisson ratio 0\.4999999, where its rtol leaves errors of 5e-03: choose"
     ):
@@ -96,7 +96,7 @@ def test_the_plan_says_which_and_why() -> None:
         return next(item.reason for item in items if item.name == "linear solver of the body")
 
     scene = replace(SCENE, discretisation=bk.LinearGalerkin())
-    assert reason(scene).startswith("Cholesky, because 31 of 120 displacements are open to contact")
+    assert reason(scene).startswith("Cholesky, because 31 of 120 displacements are retained for contact")
     assert reason(replace(scene, linear_solver=bk.Krylov())).startswith("asked for")
     assert reason(replace(scene, discretisation=bk.ConstantCollocation())).startswith(
         "LU, because the equations of coll"

@@ -14,7 +14,7 @@ from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.maps import CollocationMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from tests.operators.test_curved import composite
@@ -35,18 +35,18 @@ def any_conditions(mesh: BoundaryMesh, seed: int) -> NodalConditions:
     axis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     frame = np.stack([axis, np.stack([-axis[:, 1], axis[:, 0]], axis=1)], axis=1)
     kind = rng.integers(0, 3, (n, 2))
-    is_fixed, is_open = kind == 1, kind == 2
+    is_fixed, is_retained = kind == 1, kind == 2
     displacement = np.where(is_fixed & (rng.random((n, 2)) < 0.5), rng.normal(size=(n, 2)), 0.0)
-    return NodalConditions(frame, is_fixed, displacement, is_open)
+    return NodalConditions(frame, is_fixed, displacement, is_retained)
 
 
 def whole_equations(
-    mesh: BoundaryMesh, conditions: NodalConditions, force: FloatArray, opened: FloatArray
+    mesh: BoundaryMesh, conditions: NodalConditions, force: FloatArray, kept: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Solve the bordered equations with full matrices in x and y: unknown u, t and errors, all conditions as rows."""
     n = 2 * mesh.n_elements
     single, double = collocation_matrices(mesh, MATERIAL)[0], with_slopes(mesh)
-    motions = resting_motions(mesh, mesh.centres)
+    motions = traction_free_modes(mesh, mesh.centres)
     weights = np.repeat(mesh.lengths, 2)
     turn = np.zeros((n, n))
     for k, frame in enumerate(conditions.frame):
@@ -58,7 +58,7 @@ def whole_equations(
     system[:n, :n], system[:n, n : 2 * n], system[:n, 2 * n :] = 0.5 * np.eye(n) + double, -single, errors
     is_free = conditions.is_free.ravel()
     held = np.where(conditions.is_fixed, conditions.displacement, 0.0).ravel()
-    held[conditions.is_open.ravel()] = opened
+    held[conditions.is_retained.ravel()] = kept
     system[n : 2 * n, :n] = np.where(is_free[:, None], 0.0, turn)
     system[n : 2 * n, n : 2 * n] = np.where(is_free[:, None], turn, 0.0)
     right[n : 2 * n] = np.where(is_free, turn @ (force.ravel() / weights), held)
@@ -149,9 +149,9 @@ def test_columns_give_what_whole_matrices_give(make: type, seed: int) -> None:
         conditions.is_free & (rng.random((mesh.n_elements, 2)) < 0.5), rng.normal(size=(mesh.n_elements, 2)), 0
     )
     force = np.einsum("nkc,nk->nc", conditions.frame, local)
-    opened = rng.normal(size=int(conditions.is_open.sum()))
-    u, f = CollocationMap(mesh, MATERIAL).condense(conditions, force).recover(opened)
-    exact_u, exact_f = whole_equations(mesh, conditions, force, opened)
+    kept = rng.normal(size=int(conditions.is_retained.sum()))
+    u, f = CollocationMap(mesh, MATERIAL).condense(conditions, force).recover(kept)
+    exact_u, exact_f = whole_equations(mesh, conditions, force, kept)
     # two different eliminations of one well-conditioned system
     np.testing.assert_allclose(u, exact_u, rtol=0.0, atol=1e-10 * np.abs(exact_u).max())
     np.testing.assert_allclose(f, exact_f, rtol=0.0, atol=1e-10 * np.abs(exact_f).max())
@@ -175,25 +175,25 @@ def test_supports_and_loads_in_patches_give_what_whole_matrices_give(loaded: lis
     np.testing.assert_allclose(f, exact_f, rtol=0.0, atol=1e-10 * np.abs(exact_f).max())
 
 
-def test_stiffness_and_load_are_those_of_the_open_directions() -> None:
+def test_stiffness_and_load_are_those_of_the_retained_directions() -> None:
     mesh = MESHES["square"]()
     conditions = any_conditions(mesh, 3)
     force = np.einsum("nkc,nk->nc", conditions.frame, np.where(conditions.is_free, 1.0, 0.0))
     condensed = CollocationMap(mesh, MATERIAL).condense(conditions, force)
-    opened = np.random.default_rng(3).normal(size=int(conditions.is_open.sum()))
-    _, f = condensed.recover(opened)
-    local = np.einsum("nkc,nc->nk", conditions.frame, f)[conditions.is_open]
-    np.testing.assert_allclose(condensed.stiffness @ opened - condensed.load, local, rtol=0.0, atol=1e-11)
+    kept = np.random.default_rng(3).normal(size=int(conditions.is_retained.sum()))
+    _, f = condensed.recover(kept)
+    local = np.einsum("nkc,nc->nk", conditions.frame, f)[conditions.is_retained]
+    np.testing.assert_allclose(condensed.stiffness @ kept - condensed.load, local, rtol=0.0, atol=1e-11)
 
 
 def test_only_columns_that_something_multiplies_are_computed() -> None:
     mesh = MESHES["square"]()  # six elements on each side
     nothing = np.zeros((24, 2), bool)
-    is_fixed, is_open = nothing.copy(), nothing.copy()
+    is_fixed, is_retained = nothing.copy(), nothing.copy()
     is_fixed[mesh.normals[:, 0] > 0.5, 0] = True
-    is_open[mesh.normals[:, 1] < -0.5] = True
+    is_retained[mesh.normals[:, 1] < -0.5] = True
     frame = np.tile(np.eye(2), (24, 1, 1))
-    conditions = NodalConditions(frame, is_fixed, np.zeros((24, 2)), is_open)
+    conditions = NodalConditions(frame, is_fixed, np.zeros((24, 2)), is_retained)
     force = np.zeros((24, 2))
     force[mesh.normals[:, 1] > 0.5, 1] = -1.0
     work = CollocationMap(mesh, MATERIAL).condense(conditions, force).work
@@ -212,7 +212,7 @@ def test_later_loads_are_swept_unless_they_are_multiples() -> None:
     rng = np.random.default_rng(5)
     none, displacement = np.zeros((36, 2)), np.where(conditions.is_fixed, rng.normal(size=(36, 2)), 0.0)
     force = np.einsum("nkc,nk->nc", conditions.frame, np.where(conditions.is_free, rng.normal(size=(36, 2)), 0.0))
-    opened = rng.normal(size=int(conditions.is_open.sum()))
+    kept = rng.normal(size=int(conditions.is_retained.sum()))
     first = CollocationMap(mesh, MATERIAL).condense(replace(conditions, displacement=none), none)
     loaded = int(np.count_nonzero(conditions.is_free.any(axis=1)))
     # loads alone take their own columns, displacements all of them; multiples, zero among them, nothing at all
@@ -230,14 +230,14 @@ def test_later_loads_are_swept_unless_they_are_multiples() -> None:
         assert condensed.work.element_pairs == n_pairs
         assert condensed.work.right_hand_sides == (n_pairs > 0)
         fresh = CollocationMap(mesh, MATERIAL).condense(replace(conditions, displacement=moved), given)
-        for one, other in zip(condensed.recover(opened), fresh.recover(opened), strict=True):
+        for one, other in zip(condensed.recover(kept), fresh.recover(kept), strict=True):
             np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * np.abs(other).max())
         np.testing.assert_allclose(condensed.load, fresh.load, rtol=0.0, atol=1e-11)
 
 
 def left_on_rotation(mesh: BoundaryMesh, slopes: bool) -> float:
     matrix = CollocationMap(mesh, MATERIAL, slopes=slopes).matrix()
-    left = np.abs(matrix @ resting_motions(mesh, mesh.centres)).max(axis=0) / np.abs(matrix).max()
+    left = np.abs(matrix @ traction_free_modes(mesh, mesh.centres)).max(axis=0) / np.abs(matrix).max()
     assert left[:2].max() < 1e-12  # translations are exact up to round-off in any case
     return float(left[2])
 

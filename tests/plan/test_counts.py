@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import bemkit as bk
-from bemkit.operators.counts import Entries, Factorisation, FactorKind, Work
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.linear.solvers import Krylov
 from bemkit.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
@@ -174,7 +174,7 @@ def test_a_later_load_step_adds_right_hand_sides_at_most(discretisation: bk.Disc
     one, two = (bk.run(paper(load_factors=factors, discretisation=discretisation)) for factors in ((1.0,), (0.5, 1.0)))
     # collocation takes the multiple of the first solution
     n_columns = 0 if isinstance(discretisation, bk.ConstantCollocation) else 1
-    assert two.work == one.work + Work(right_hand_sides=n_columns)
+    assert two.work == one.work + OperationCounts(right_hand_sides=n_columns)
 
 
 @pytest.mark.parametrize("kind", ["constant", "Krylov", "load history, linear"])

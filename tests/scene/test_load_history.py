@@ -111,8 +111,8 @@ def test_friction_remembers() -> None:
 
 def test_an_elastic_step_back_and_forth_changes_nothing() -> None:
     """Without slip in between, unloading to the same load returns to the same state."""
-    glue = bk.Coulomb(100.0)
-    there, _, back = run_history([block(push=0.3, law=glue), block(push=0.25, law=glue), block(push=0.3, law=glue)])
+    rough = bk.Coulomb(100.0)
+    there, _, back = run_history([block(push=0.3, law=rough), block(push=0.25, law=rough), block(push=0.3, law=rough)])
     np.testing.assert_allclose(back.contact.sigma_t, there.contact.sigma_t, atol=1e-9)
 
 

@@ -14,7 +14,7 @@ from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.problem import ContactState
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.equilibrium import NOISE, Unbalanced
+from bemkit.operators.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.studies.stability.independent_check import check_solution
 
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()]
@@ -96,11 +96,11 @@ def test_what_springs_leave_on_a_carried_body_is_no_equilibrium() -> None:
     """A force of 1e-8 on a body that is free to move: nothing beside the load of the clamped body, but all there is."""
     scene = carried_disc(0.3)
     problem = build_model(prepare(scene, scene.build_mesh())).problem
-    body, glued = problem.body, problem.sticking_state
-    assert body.imbalance(ContactState(glued.displacement, np.zeros_like(glued.traction))).is_below(1e-12)
-    left = np.zeros_like(glued.traction)
+    body, sticking = problem.body, problem.sticking_state
+    assert body.imbalance(ContactState(sticking.displacement, np.zeros_like(sticking.traction))).is_below(1e-12)
+    left = np.zeros_like(sticking.traction)
     left[3, 0] = -1e-8
-    off = body.imbalance(ContactState(glued.displacement, left))
+    off = body.imbalance(ContactState(sticking.displacement, left))
     assert off.force == pytest.approx(1.0)  # nothing else acts at the node
     assert off.moment > 0.1  # its share along x, where the body is free
 
@@ -124,9 +124,9 @@ def test_what_is_missing_is_relative_to_the_forces_at_hand(contact: float, given
 @given(forces, st.floats(0.1, 0.9))
 def test_round_off_of_a_moved_body_is_no_force_but_a_load_is(terms: float, share: float) -> None:
     round_off = np.finfo(float).eps * terms
-    noise = share * NOISE * round_off
+    noise = share * NOISE_FACTOR * round_off
     moved = Unbalanced(np.array([noise]), noise, noise, round_off, round_off, terms)
-    assert moved.beside(np.zeros(3)).worst <= NOISE * np.finfo(float).eps
+    assert moved.beside(np.zeros(3)).worst <= NOISE_FACTOR * np.finfo(float).eps
     assert moved.beside(np.array([noise])).worst >= 0.5  # a body on its way to infinity balances no load
     assert moved.beside(np.array([noise])).round_off == 1e-6
     more = 1.1 / share * noise

@@ -14,15 +14,15 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported, unsupported_motions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
-CAN_TOUCH = 1e-3
+APPROACH_TOLERANCE = 1e-3
 """Cosine of the angle between the one direction in which a supported node can move and the direction of contact below
 which contact there is left to the support: it would have to slide a thousand times as far as it closes the gap."""
-WEAK = 0.03
+LEAST_RETAINED_SHARE = 0.03
 """A rigid motion whose share in the retained directions is less than this is held too weakly by them: eliminating the
 rest then loses the square of it in digits."""
-SMALLEST = 1e-9
+RANK_TOLERANCE = 1e-9
 """A combination of motions that moves the contact nodes by less than this share of the others moves none of them."""
 
 
@@ -104,7 +104,7 @@ def contact_along_normals(space: BoundarySpace, elements: IntArray, *, is_fricti
 def contact_conditions(
     space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes
 ) -> tuple[NodalConditions, ContactNodes]:
-    """Find what is known at every node of a space: held by a support, open to contact, or free.
+    """Find what is known at every node of a space: held by a support, retained for contact, or free.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def contact_conditions(
     Returns
     -------
     conditions : NodalConditions
-        Their open directions are the unknowns of the contact system, but for tangents that supports hold.
+        Their retained directions are the unknowns of the contact system, but for tangents that supports hold.
     contact : ContactNodes
         The candidates that can touch. The others are left to their supports, which let them move neither towards the
         obstacle nor away from it.
@@ -129,8 +129,8 @@ def contact_conditions(
     """
     conditions = supported(space, supports)
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
-    can_touch: BoolArray = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1) > CAN_TOUCH
-    contact = candidates.take(can_touch)
+    approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
+    contact = candidates.take(approach > APPROACH_TOLERANCE)
     is_supported = held_nodes(conditions, contact)
     motions = free_motions(conditions, contact, space)
     has_tangent = retained_tangents(motions, contact.is_frictionless, is_supported)
@@ -144,12 +144,12 @@ def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
 
 def _opened(conditions: NodalConditions, contact: ContactNodes, has_tangent: BoolArray) -> NodalConditions:
     """Open the directions of contact of the contact nodes, and the tangential ones of some, that no support fixes."""
-    frame, is_open = conditions.frame.copy(), conditions.is_open.copy()
+    frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
     unsupported = ~held_nodes(conditions, contact)
     frame[contact.nodes[unsupported]] = contact.frame[unsupported]
-    is_open[contact.nodes] = ~conditions.is_fixed[contact.nodes]
-    is_open[contact.nodes[unsupported & ~has_tangent], 1] = False
-    return replace(conditions, frame=frame, is_open=is_open)
+    is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
+    is_retained[contact.nodes[unsupported & ~has_tangent], 1] = False
+    return replace(conditions, frame=frame, is_retained=is_retained)
 
 
 def free_motions(conditions: NodalConditions, contact: ContactNodes, space: BoundarySpace) -> FloatArray:
@@ -157,7 +157,7 @@ def free_motions(conditions: NodalConditions, contact: ContactNodes, space: Boun
 
     Tangential components that a support holds are zero. An exterior, at rest far away, has none of these motions.
     """
-    motions = unsupported_motions(space, conditions)[:, contact.nodes]
+    motions = free_modes(space, conditions)[:, contact.nodes]
     at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
     at_contact[:, held_nodes(conditions, contact), 1] = 0.0
     return at_contact
@@ -169,7 +169,7 @@ def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArr
     That is at nodes without friction, but for the few that are retained, and wherever a support holds the node: what
     acts there along the tangent cannot be told from the reaction of the support.
     """
-    return np.asarray(~np.all(conditions.is_open[contact.nodes], axis=1))
+    return np.asarray(~np.all(conditions.is_retained[contact.nodes], axis=1))
 
 
 def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_supported: BoolArray) -> BoolArray:
@@ -187,11 +187,11 @@ def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_suppor
     _, singular, directions = np.linalg.svd(np.linalg.qr(held, mode="r"), full_matrices=True)
     sizes = np.zeros(len(motions))
     sizes[: singular.size] = singular
-    weak = directions[sizes < WEAK * np.sqrt(len(held))]
+    weak = directions[sizes < LEAST_RETAINED_SHARE * np.sqrt(len(held))]
     along = np.where((is_frictionless & ~is_supported)[:, None], tangential @ weak.T, 0.0)
     for _ in weak:  # the tangents that feel most of what is still free
         sizes = np.linalg.norm(along, axis=1)
-        if sizes.max(initial=0.0) < WEAK:
+        if sizes.max(initial=0.0) < LEAST_RETAINED_SHARE:
             break
         node = int(np.argmax(sizes))
         is_retained[node] = True
@@ -207,5 +207,5 @@ def _of_unit_size(motions: FloatArray) -> FloatArray:
     """
     columns = motions.reshape(len(motions), -1).T
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    basis = basis[:, sizes > SMALLEST * sizes[0]]
+    basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
     return np.asarray(np.sqrt(motions.shape[1]) * basis.T.reshape(-1, *motions.shape[1:]))

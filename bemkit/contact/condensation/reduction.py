@@ -14,9 +14,9 @@ from bemkit.contact.condensation.nodes import ContactNodes as ContactNodes
 from bemkit.contact.condensation.nodes import contact_conditions, find_tangents, free_motions, held_nodes
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
-from bemkit.operators.counts import Work
-from bemkit.operators.equilibrium import NOISE, Imbalance, resultant_imbalance, round_off_of
-from bemkit.operators.rigid_modes import possible_motions, rigid_motions
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
+from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
 
@@ -46,9 +46,9 @@ class Unknowns:
     @classmethod
     def of(cls, conditions: NodalConditions, contact: ContactNodes) -> Unknowns:
         """Return the unknowns under the conditions of all displacement nodes, ascending by contact node."""
-        row, component = np.nonzero(conditions.is_open[contact.nodes])
+        row, component = np.nonzero(conditions.is_retained[contact.nodes])
         node, is_held = contact.nodes[row], held_nodes(conditions, contact)[row]
-        position = np.cumsum(conditions.is_open).reshape(-1, 2) - 1
+        position = np.cumsum(conditions.is_retained).reshape(-1, 2) - 1
         along = np.einsum("nkc,nc->nk", conditions.frame[node], contact.directions[row])
         each = np.arange(row.size)
         factor = 1.0 / np.where(is_held, along[each, component], 1.0)
@@ -86,10 +86,10 @@ class Unknowns:
         held = np.flatnonzero(is_held)
         node = nodes[held]
         along = np.einsum("nkc,njc->nkj", conditions.frame[node], contact.frame[chosen[held]])
-        free = np.argmax(conditions.is_open[node], axis=1)
+        free = np.argmax(conditions.is_retained[node], axis=1)
         moving, fixed = along[np.arange(held.size), free], along[np.arange(held.size), 1 - free]
         slope = moving[:, 1] / moving[:, 0]
-        n_before = np.cumsum(np.count_nonzero(conditions.is_open[contact.nodes], axis=1)) - 1
+        n_before = np.cumsum(np.count_nonzero(conditions.is_retained[contact.nodes], axis=1)) - 1
         response[held, n_before[chosen[held]]] = slope
         given = conditions.displacement[node, 1 - free]
         at_rest[held] = (fixed[:, 1] - slope * fixed[:, 0]) * given
@@ -143,9 +143,9 @@ class CondensedBody(DenseBody):
         return held_nodes(self.conditions, self.nodes)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
-        return self.condensed.work + Work(contact_unknowns=self.n_unknowns)
+        return self.condensed.work + OperationCounts(contact_unknowns=self.n_unknowns)
 
     def under(self, displacement: FloatArray, force: FloatArray) -> CondensedBody:
         """Return the same body under another load, without another factorisation.
@@ -189,7 +189,7 @@ class CondensedBody(DenseBody):
         displacement, force = self.recover(state)
         reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
         round_off = max(of_forces, np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum()))
-        noise = NOISE * round_off
+        noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
         inside = self.condensed.volume_force
@@ -239,7 +239,7 @@ def condense(
     ConflictingSupportsError
         If supports contradict each other at a node.
     SingularMatrixError
-        If even glued contact does not hold the body.
+        If even tied contact does not hold the body.
     """
     conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
     return condensed_body(elastic, conditions, contact, force)
@@ -268,5 +268,5 @@ def condensed_body(
         force=force,
         conditions=conditions,
         nodes=contact,
-        balanced=possible_motions(space.mesh),
+        balanced=admissible_modes(space.mesh),
     )

@@ -26,8 +26,8 @@ STEEPEST = 4.0
 """Largest ratio of the lengths of two neighbours."""
 LEAST = 4
 """Elements of a piece: the error estimate lives on the nodes between elements."""
-FAINTEST = 0.02
-"""No element is wished away: the smallest wish relative to the largest."""
+LEAST_DENSITY = 0.02
+"""Smallest target density relative to the largest: elements stay everywhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +105,18 @@ def first_partition(
 
 def better_partition(
     old: Partition,
-    wish: FloatArray,
+    density: FloatArray,
     n_elements: int,
     *,
     cuts: Mapping[int, Sequence[float]],
     spread_over: Collection[str],
 ) -> Partition:
-    """Divide an outline anew, in proportion to what is wished for the elements of an old partition.
+    """Divide an outline anew, by a target density on the elements of an old partition.
 
     Parameters
     ----------
     old : Partition
-    wish : (n_elements_old,) array
+    density : (n_elements_old,) array
         How many new elements should lie in each old one, up to a factor.
     n_elements : int
         About so many elements, more where `LEAST` or `STEEPEST` ask for them.
@@ -124,7 +124,7 @@ def better_partition(
         Where pieces shall end besides corners and ends of parts: parameters by the number of the side.
     spread_over : collection of str
         Parts that share `SPREAD` of the elements among their pieces by the square roots of lengths, each graded
-        towards its ends; the rest follows the wish.
+        towards its ends; the rest follows the density.
 
     Returns
     -------
@@ -133,19 +133,19 @@ def better_partition(
     division = old.base.cut(cuts)
     shares = np.sqrt(division.piece_lengths) * [piece.part in spread_over for piece in division.pieces]
     shares *= SPREAD / shares.sum() if shares.any() else 0.0
-    wish = np.maximum(wish, FAINTEST * wish.max()) if wish.any() else np.ones_like(wish)
-    wish = wish * (1.0 - shares.sum()) / wish.sum()
+    density = np.maximum(density, LEAST_DENSITY * density.max()) if density.any() else np.ones_like(density)
+    density = density * (1.0 - shares.sum()) / density.sum()
     parameters = []
     for piece, share in zip(division.pieces, shares.tolist(), strict=True):
-        y, wanted = _wish_along(piece, old, wish)
+        y, wanted = _density_along(piece, old, density)
         wanted += share * y
         count = max(LEAST, round(n_elements * float(wanted[-1])))
         parameters.append(piece.at(_stretched(np.interp(np.linspace(0.0, wanted[-1], count + 1), wanted, y))))
     return _balanced(old.base, division, parameters)
 
 
-def _wish_along(piece: Piece, old: Partition, wish: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the wish summed up along a piece, as values at increasing stretched positions y from 0 to 1.
+def _density_along(piece: Piece, old: Partition, density: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the density summed up along a piece, as values at increasing stretched positions y from 0 to 1.
 
     In the coordinate y the piece is graded towards its ends already, so that an old element there is not merely cut
     into equal parts.
@@ -155,7 +155,7 @@ def _wish_along(piece: Piece, old: Partition, wish: FloatArray) -> tuple[FloatAr
     spans = (old.spans[own] - piece.span[0]) / (piece.span[1] - piece.span[0])
     ends = np.append(spans[:, 0], spans[-1, 1])
     x = np.concatenate([[0.0], ends[(ends > 0.0) & (ends < 1.0)], [1.0]])
-    sums = np.interp(x, ends, np.append(0.0, np.cumsum(wish[own])))
+    sums = np.interp(x, ends, np.append(0.0, np.cumsum(density[own])))
     return _flattened(x), sums - sums[0]
 
 

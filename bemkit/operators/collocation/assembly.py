@@ -103,16 +103,16 @@ def sweep_rows(
     images = [(1.0, 1.0)] if mesh.symmetry is None else mesh.symmetry.images.tolist()
     panels = Panels(whole)
     points = CollocationPoints(panels, material, mesh.diameter)
-    slopes = GradientReconstruction.of(whole, panels) if takes_slopes and needs_double else None
+    reconstruction = GradientReconstruction.of(whole, panels) if takes_slopes and needs_double else None
     has_single = np.tile(needs_single, len(images))
     runs = [(run, bool(has_single[run.start])) for run in constant_runs(has_single, whole.is_straight)]
     runs = [(run, single) for run, single in runs if single or needs_double]
     value_of_one = 0.5 if mesh.is_exterior else -0.5
 
     def evaluate(rows: slice) -> None:
-        block = points.evaluate(rows, runs, slopes is not None)
-        if slopes is not None:
-            block.add_slopes(slopes)
+        block = points.evaluate(rows, runs, reconstruction is not None)
+        if reconstruction is not None:
+            block.add_slopes(reconstruction)
         if needs_double:
             sums = block.on_displacement.sum(axis=1), block.on_conjugate_displacement.sum(axis=1)
         block = block.folded(images)

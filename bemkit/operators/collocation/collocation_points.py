@@ -59,10 +59,10 @@ class Coefficients:
         tractions = np.zeros(shape), np.zeros(shape, complex)
         return cls(*tractions, *(np.empty(each, complex) for each in (shape, shape, on_slopes, on_slopes)))
 
-    def add_slopes(self, slopes: GradientReconstruction) -> None:
+    def add_slopes(self, reconstruction: GradientReconstruction) -> None:
         """Add the slopes that displacements suggest."""
-        slopes.add_to(self.on_displacement, self.on_slope, is_conjugate=False)
-        slopes.add_to(self.on_conjugate_displacement, self.on_conjugate_slope, is_conjugate=True)
+        reconstruction.add_to(self.on_displacement, self.on_slope, is_conjugate=False)
+        reconstruction.add_to(self.on_conjugate_displacement, self.on_conjugate_slope, is_conjugate=True)
 
     def folded(self, images: Sequence[tuple[float, float]]) -> Coefficients:
         """Return those of the first elements with those of their images, whose densities have the signs given."""

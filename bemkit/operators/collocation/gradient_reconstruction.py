@@ -22,7 +22,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import corner_nodes
 from bemkit.operators.integrals.panels import Panels
 
-SHARP = 0.3
+CORNER_ANGLE = 0.3
 """Angle [rad] between neighbours from which on they have slopes of their own; polygons for curves turn by less."""
 
 
@@ -64,7 +64,7 @@ class GradientReconstruction:
         for loop in mesh.loops:
             neighbours[:, loop] = np.roll(loop, 1), loop, np.roll(loop, -1)
         counts = np.ones(neighbours.shape, bool)
-        counts[0], counts[2] = ~corner_nodes(mesh, SHARP)[mesh.elements].T
+        counts[0], counts[2] = ~corner_nodes(mesh, CORNER_ANGLE)[mesh.elements].T
         is_smooth = counts.all(axis=0) & (neighbours[0] != neighbours[2])
         counts[:, counts.sum(axis=0) == 1] = True
         arm = panels.centre[neighbours]

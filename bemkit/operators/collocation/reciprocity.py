@@ -60,14 +60,14 @@ class Reciprocity:
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
         """
         panels = Panels(mesh.whole)
-        slopes = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
+        reconstruction = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
             on_displacement = field.displacement[None, :]
-            if slopes is not None:
+            if reconstruction is not None:
                 on_slope = field.gradient / (panels.half * panels.tangent)
-                slopes.add_to(on_displacement, on_slope[None, :], is_conjugate=False)
+                reconstruction.add_to(on_displacement, on_slope[None, :], is_conjugate=False)
             on_tractions.append(_folded(mesh, field.traction))
             on_displacements.append(_folded(mesh, on_displacement[0]))
             fields.append(np.stack([field.value.real, field.value.imag], axis=1)[: mesh.n_elements].ravel())

@@ -3,7 +3,7 @@
 Both solve S_ff x = b with the symmetric positive definite block of the Steklov-Poincare map that belongs to the
 directions of known force. Factorisation forms S and factors it, with n^3 work. Iteration needs products with S alone,
 which the boundary operators and the factor of the single layer give, with n^2 work for each right-hand side and step;
-there is one right-hand side for each direction that is open to contact.
+there is one right-hand side for each direction that is retained for contact.
 """
 
 from __future__ import annotations
@@ -226,11 +226,11 @@ class Automatic:
     """Factorisation or iteration, whichever takes less time and fits into memory; see `choose_linear_solver`."""
 
 
-LinearSolverWish: TypeAlias = Automatic | LinearSolver
+LinearSolverChoice: TypeAlias = Automatic | LinearSolver
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenLinearSolver:
     """A linear solver and why it was taken.
 
     Parameters

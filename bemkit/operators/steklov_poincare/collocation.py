@@ -42,7 +42,7 @@ class CollocationElasticity:
         self.traction_space: BoundarySpace = self.displacement_space
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Exchange columns so that all unknowns but the open displacements stand on the left, and solve once.
+        """Exchange columns so that all unknowns but the retained displacements stand on the left, and solve once.
 
         Columns of tractions and displacements that are known to be zero are neither computed nor stored.
         """

@@ -11,15 +11,15 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
 from bemkit.geometry.vectors import turned_right
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolver, LinearSolverChoice
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
 from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
 from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
@@ -44,14 +44,14 @@ class GalerkinFactors:
         V = L L^T.
     whitened_trace : (n_traction_dofs, n_dofs) array
         L^-1 (1/2 M + K), less the part whose tractions exert a resultant.
-    work : Work
+    work : OperationCounts
         What they took; nothing if they come from a cache.
     """
 
     matrix: FloatArray
     single_layer: Cholesky
     whitened_trace: FloatArray
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
 
 
 class GalerkinElasticity:
@@ -88,7 +88,7 @@ class GalerkinElasticity:
         material: Material,
         displacement_space: BoundarySpace | None = None,
         traction_space: BoundarySpace | None = None,
-        linear_solver: LinearSolverWish = _DIRECT,
+        linear_solver: LinearSolverChoice = _DIRECT,
     ) -> None:
         self.mesh = mesh
         self.material = material
@@ -106,7 +106,7 @@ class GalerkinElasticity:
         """What the map is made of when S is formed, computed on first use."""
         layers = self.__dict__.get("layers") or self._assemble()
         whitened_trace = layers.whitened_trace()
-        work = layers.work + Work(right_hand_sides=whitened_trace.shape[1])
+        work = layers.work + OperationCounts(right_hand_sides=whitened_trace.shape[1])
         return GalerkinFactors(
             _symmetric_sum(layers.hypersingular, whitened_trace), layers.single_layer, whitened_trace, work
         )
@@ -152,9 +152,9 @@ class GalerkinElasticity:
             for elements in self._pressed
         ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
-        flux[:, vanishing_dofs(self.displacement_space)] = 0.0
+        flux[:, antisymmetric_dofs(self.displacement_space)] = 0.0
         # the interpolant of a rotation changes the volume of curved elements; a rigid motion does not
-        motions = resting_motions(self.mesh, dof_points(self.displacement_space))
+        motions = traction_free_modes(self.mesh, dof_points(self.displacement_space))
         return np.asarray(flux.T - motions @ np.linalg.lstsq(motions, flux.T, rcond=None)[0])
 
     @cached_property
@@ -184,7 +184,7 @@ class GalerkinElasticity:
         self.__dict__["factors"] = factors  # where cached_property keeps its value
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not open by a Schur complement, with the linear solver of the map."""
+        """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""
         condense = self._condense_matrix if self.linear_solver.forms_matrix else self._condense_products
         return condense(self.linear_solver, conditions, force)
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.assembly import assemble_together
-from bemkit.operators.counts import Entries, Work
+from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.forms import (
     DoubleLayerForm,
     HypersingularForm,
@@ -20,7 +20,7 @@ from bemkit.operators.forms import (
 )
 from bemkit.operators.linear.dense import Cholesky, multiply
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Layers:
         B = 1/2 M + K.
     hypersingular : (n_dofs, n_dofs) array
         W.
-    work : Work
+    work : OperationCounts
         What they took.
     """
 
@@ -45,7 +45,7 @@ class Layers:
     resultant: FloatArray
     trace_operator: FloatArray
     hypersingular: FloatArray
-    work: Work
+    work: OperationCounts
 
     def whitened_trace(self, displacement: FloatArray | None = None) -> FloatArray:
         """Return L^-1 B u less its projection on `resultant`.
@@ -94,7 +94,7 @@ def assemble_layers(
     u, t, mesh = displacements, tractions, displacements.mesh
     single = SingleLayerForm(t, t, material)
     (v, k, w), n_pairs = assemble_together([single, DoubleLayerForm(u, t, material), HypersingularForm(u, u, material)])
-    work = Work(
+    work = OperationCounts(
         element_pairs=n_pairs,
         single_layer=Entries.full(t.n_dofs, t.n_dofs),
         double_layer=Entries.full(t.n_dofs, u.n_dofs),
@@ -102,10 +102,10 @@ def assemble_layers(
     )
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
     annihilated = mass_product(t, t, pressures[:, : 0 if is_compressible else None])
-    kernel = np.column_stack([annihilated, _unit_vectors(vanishing_dofs(t))])
+    kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator")
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
-    motions = resting_motions(mesh, dof_points(u))
+    motions = traction_free_modes(mesh, dof_points(u))
     resultants = mass_product(u, t, motions)
     values, rows, columns = mass_entries(u, t)
     np.add.at(k, (rows, columns), 0.5 * values)
@@ -117,13 +117,13 @@ def assemble_layers(
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     idle = np.column_stack([resultants, annihilated, trace @ dilatation])
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
-    work += Work(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
+    work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
     return Layers(factor, resultant, trace, hyper, work)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:
     """Return the dofs (n_dofs,) of the displacement by which every point moves away from the middle of the body."""
-    return np.where(vanishing_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
+    return np.where(antisymmetric_dofs(space), 0.0, (dof_points(space) - space.mesh.centre).ravel())
 
 
 def _without(matrix: FloatArray, motions: FloatArray) -> FloatArray:

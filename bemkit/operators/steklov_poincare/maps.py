@@ -16,7 +16,7 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.assembly import Tag
-from bemkit.operators.linear.solvers import DenseCholesky, LinearSolverWish
+from bemkit.operators.linear.solvers import DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
@@ -91,7 +91,7 @@ class GalerkinMap(GalerkinElasticity, _SteklovPoincareMap):
         material: Material,
         displacement_space: BoundarySpace | None = None,
         traction_space: BoundarySpace | None = None,
-        linear_solver: LinearSolverWish = DenseCholesky(),  # noqa: B008 - frozen
+        linear_solver: LinearSolverChoice = DenseCholesky(),  # noqa: B008 - frozen
     ) -> None:
         super().__init__(mesh, material, displacement_space, traction_space, linear_solver)
         self._become_operator()
@@ -127,7 +127,7 @@ class CollocationMap(CollocationElasticity, _SteklovPoincareMap):
     def _form(self) -> FloatArray:
         n = self.mesh.n_elements
         frame = np.broadcast_to(np.eye(2), (n, 2, 2))
-        everything_open = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
+        everything_retained = NodalConditions(frame, np.zeros((n, 2), bool), np.zeros((n, 2)), np.ones((n, 2), bool))
         name = "the single layer operator"
-        system = MixedSystem(self.mesh, self.material, everything_open, name, np.zeros((n, 2)), slopes=self.slopes)
+        system = MixedSystem(self.mesh, self.material, everything_retained, name, np.zeros((n, 2)), slopes=self.slopes)
         return system.condensed().stiffness

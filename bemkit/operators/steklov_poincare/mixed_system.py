@@ -11,24 +11,24 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.assembly import sweep_rows, write_columns
 from bemkit.operators.collocation.collocation_points import Coefficients
 from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.counts import Entries, Work
+from bemkit.operators.counts import Entries, OperationCounts
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import resting_motions
+from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Given data, and the unknowns (n_dofs,) under them with the open displacements at rest."""
+    """Given data, and the unknowns (n_dofs,) under them with the retained displacements at rest."""
 
     data: GivenData
     at_rest: FloatArray
 
 
 class MixedSystem:
-    """(1/2 + T) u = U t solved for every unknown but the open displacements.
+    """(1/2 + T) u = U t solved for every unknown but the retained displacements.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class MixedSystem:
     Raises
     ------
     SingularMatrixError
-        If the supports, and the open directions held fast, leave the body free.
+        If the supports, and the retained directions held fast, leave the body free.
 
     Notes
     -----
@@ -73,31 +73,32 @@ class MixedSystem:
     ) -> None:
         self._mesh, self._material, self._conditions, self._slopes = mesh, material, conditions, slopes
         self._weights, self._force = np.repeat(mesh.lengths, 2), force
-        self._free, self._fixed, self._open = (
-            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_open)
+        self._free, self._fixed, self._retained = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
         )
-        motions, reciprocity = resting_motions(mesh, mesh.centres), Reciprocity.of(mesh, material, takes_slopes=slopes)
+        motions = traction_free_modes(mesh, mesh.centres)
+        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
         self._find_balances(motions, reciprocity)
 
         # the displacement equations with the columns of their errors, and the balances below them
         errors = np.column_stack([motions, reciprocity.fields])
         n_rows, order = self._weights.size, self._weights.size + errors.shape[1]
-        matrix, right = np.zeros((order, order)), np.zeros((order, self._open.size), order="F")
+        matrix, right = np.zeros((order, order)), np.zeros((order, self._retained.size), order="F")
         data = GivenData.of(conditions, force, conditions.displacement)
         n_elements = mesh.n_elements
         equations = matrix[:n_rows, :n_rows].reshape(2, n_elements, n_rows)
-        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._open.size))
+        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._retained.size))
         matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
         matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
-        right[n_rows:] = self._on_displacement[:, self._open]
+        right[n_rows:] = self._on_displacement[:, self._retained]
 
         self._factor = DenseLU(matrix, name)
         self._response = -self._factor.solve(right)[:n_rows]
-        work += Work(
+        work += OperationCounts(
             single_layer=Entries.full(n_rows, n_rows - self._free.size),
-            double_layer=Entries.full(n_rows, self._free.size + self._open.size),
+            double_layer=Entries.full(n_rows, self._free.size + self._retained.size),
             factorisations=(self._factor.factorisation,),
-            right_hand_sides=self._open.size + 1,
+            right_hand_sides=self._retained.size + 1,
         )
         self._work, self._base = work, _Solved(data, self._solution(data, known))
 
@@ -120,11 +121,11 @@ class MixedSystem:
 
     def _sweep(
         self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
-    ) -> tuple[FloatArray, Work]:
+    ) -> tuple[FloatArray, OperationCounts]:
         """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
 
-        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_open) those of open
-        displacements.
+        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_retained) those of
+        the retained displacements.
         """
         n, n_rows, frame = self._mesh.n_elements, self._weights.size, self._conditions.frame
         loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
@@ -134,7 +135,7 @@ class MixedSystem:
         loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
         number = np.zeros(n_rows, np.intp)
         number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
-        open_runs = consecutive_runs(self._open)
+        retained_runs = consecutive_runs(self._retained)
         # the columns of consecutive unknowns are consecutive among those of the single layer, too
         unknown_runs = [
             (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1) if isinstance(dofs, slice) else number[dofs])
@@ -155,7 +156,7 @@ class MixedSystem:
             _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
             known[:, rows] -= _product(double[:, :, moved], displacement)
             if right is not None:
-                for positions, dofs in open_runs:
+                for positions, dofs in retained_runs:
                     right[:, rows, positions] = double[:, :, dofs]
                 for dofs, in_single in unknown_runs:
                     double[:, :, dofs] = -single[:, :, in_single]
@@ -171,25 +172,27 @@ class MixedSystem:
             takes_slopes=self._slopes,
         )
         of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
-        return known.ravel(), Work(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
+        return known.ravel(), OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
 
     def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
-        """Return the unknowns (n_dofs,), the open displacements at rest."""
+        """Return the unknowns (n_dofs,), the retained displacements at rest."""
         traction, displacement = data.force.ravel() / self._weights, data.displacement.ravel()
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
 
-    def _condensed(self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: Work) -> CondensedMap:
+    def _condensed(
+        self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
+    ) -> CondensedMap:
         """Return the condensed map under data that are a multiple of others, for which the equations are solved."""
         at_rest = factor * base.at_rest
         conditions, weights, response = self._conditions, self._weights, self._response
         traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / weights
         is_free, given = conditions.is_free.ravel(), data.displacement.ravel()
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            unknowns = at_rest + response @ open_displacement
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            unknowns = at_rest + response @ retained_displacement
             local = np.where(is_free, unknowns, given)
-            local[self._open] = open_displacement
+            local[self._retained] = retained_displacement
             local_force = weights * np.where(is_free, traction, unknowns)
             displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(-1, 2))
             return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(-1, 2))
@@ -201,14 +204,14 @@ class MixedSystem:
             other = GivenData.of(conditions, force, displacement)
             factor = other.factor_of(base.data)
             if factor is not None:  # the usual case of load factors
-                return self._condensed(force, other, base, factor, Work())
+                return self._condensed(force, other, base, factor, OperationCounts())
             known, work = self._sweep(other)
             solved = _Solved(other, self._solution(other, known))
-            return self._condensed(force, other, solved, 1.0, work + Work(right_hand_sides=1))
+            return self._condensed(force, other, solved, 1.0, work + OperationCounts(right_hand_sides=1))
 
-        own = weights[self._open]
-        load = own * (traction[self._open] - at_rest[self._open])
-        return CondensedMap(own[:, None] * response[self._open], load, recover, under, follow, work=work)
+        own = weights[self._retained]
+        load = own * (traction[self._retained] - at_rest[self._retained])
+        return CondensedMap(own[:, None] * response[self._retained], load, recover, under, follow, work=work)
 
 
 def _dofs(elements: IntArray) -> IntArray:

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.counts import Entries, Factorisation, FactorKind, Work
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.integrals.sweep import CHUNK_PAIRS
 from bemkit.operators.linear.choice import krylov_cost
-from bemkit.operators.linear.solvers import Choice, Krylov
+from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import possible_motions
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 _BYTES = 8
@@ -52,10 +52,10 @@ class BodyCase:
     mesh : BoundaryMesh
     material : Material
     conditions : NodalConditions
-        The contact nodes open.
+        Those of contact are retained.
     loads : tuple of GivenData
         Given forces and displacements of each load step.
-    linear_solver : Choice
+    linear_solver : ChosenLinearSolver
         Taken for a symmetric map.
     """
 
@@ -63,7 +63,7 @@ class BodyCase:
     material: Material
     conditions: NodalConditions
     loads: tuple[GivenData, ...]
-    linear_solver: Choice
+    linear_solver: ChosenLinearSolver
 
     @property
     def n_displacements(self) -> int:
@@ -81,9 +81,9 @@ class BodyCase:
         return int(np.count_nonzero(self.conditions.is_free))
 
     @property
-    def n_open(self) -> int:
+    def n_retained(self) -> int:
         """Components that contact decides."""
-        return int(np.count_nonzero(self.conditions.is_open))
+        return int(np.count_nonzero(self.conditions.is_retained))
 
     @property
     def n_curved(self) -> int:
@@ -98,7 +98,7 @@ class BodyNeeds:
     Parameters
     ----------
     items : tuple of PlanItem
-    work : Work
+    work : OperationCounts
         What `CondensedMap.work` will count after the last load step.
     memory : int [bytes]
         Largest sum of what exists at the same time.
@@ -113,7 +113,7 @@ class BodyNeeds:
     """
 
     items: tuple[PlanItem, ...] = ()
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
     memory: int = 0
     kept: int = 0
     evaluations: float = 0.0
@@ -132,29 +132,29 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     degree : int
         Of the displacements.
     """
-    t, u, f, o = n_tractions, case.n_displacements, case.n_free, case.n_open
+    t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained
     mesh, solver = case.mesh, case.linear_solver.solver
     assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
     holds_volume = case.material.is_incompressible and not mesh.is_exterior
     n_pressures = len(mesh.loops) if holds_volume else int(not mesh.is_exterior)
     # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
-    n_columns = len(possible_motions(mesh)) + n_pressures + min(n_pressures, 1) + o + len(case.loads)
+    n_columns = len(admissible_modes(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads)
     factorisations = [Factorisation(FactorKind.CHOLESKY, t)]
     if solver.forms_matrix:
         n_columns += u
         factorisations.append(Factorisation(FactorKind.CHOLESKY, f))
         # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
         largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
-        own = f * f + 2 * f * o + u * case.n_fixed
-        largest, kept = max(largest, assembled + 2 * u * u + own + o * o), assembled + own
-        flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * o + 2.0 * f * o * o)
+        own = f * f + 2 * f * r + u * case.n_fixed
+        largest, kept = max(largest, assembled + 2 * u * u + own + r * r), assembled + own
+        flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * r + 2.0 * f * r * r)
     else:
         # two of the free part of W, while it is factored, and the blocks of the iteration
-        iterating = assembled + 2 * f * f + int(13.5 * u * (o + 1))
+        iterating = assembled + 2 * f * f + int(13.5 * u * (r + 1))
         largest = t * t + max(3 * t * u + u * u, t * u + 3 * u * u if is_curved else 0)
-        largest, kept = max(largest, iterating), assembled + f * f + 3 * u * (o + 1)
-        flops = krylov_cost(u, o).flops
-    work = Work(
+        largest, kept = max(largest, iterating), assembled + f * f + 3 * u * (r + 1)
+        flops = krylov_cost(u, r).flops
+    work = OperationCounts(
         element_pairs=mesh.n_elements * mesh.whole.n_elements,
         single_layer=Entries.full(t, t),
         double_layer=Entries.full(t, u),
@@ -212,28 +212,28 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     takes_slopes : bool
         Whether the double layer takes slopes between neighbouring elements.
     """
-    u, o, mesh = case.n_displacements, case.n_open, case.mesh
-    n_single, n_double = case.n_fixed + o, case.n_free + o
+    u, r, mesh = case.n_displacements, case.n_retained, case.mesh
+    n_single, n_double = case.n_fixed + r, case.n_free + r
     sweeps = _different_loads(case)
     n_loaded, n_moved = sum(each.n_loaded for each in sweeps), sum(each.n_moved for each in sweeps)
-    order = u + len(possible_motions(mesh)) + len(mesh.loops)
+    order = u + len(admissible_modes(mesh)) + len(mesh.loops)
     n_elements = mesh.n_elements  # all of them for the first data, later those with tractions if these suffice
     for later in sweeps[1:]:
         n_elements += mesh.n_elements if later.n_moved else int(np.count_nonzero(later.force.any(axis=1)))
-    work = Work(
+    work = OperationCounts(
         element_pairs=n_elements * mesh.whole.n_elements,
         single_layer=Entries.full(u, n_single) + Entries(u * n_loaded),
         double_layer=Entries.full(u, n_double) + Entries(u * n_moved),
         factorisations=(Factorisation(FactorKind.LU, order),),
-        right_hand_sides=o + len(sweeps),
+        right_hand_sides=r + len(sweeps),
     )
     # the system and its right-hand sides, and what LU copies of them
-    system = (u + len(possible_motions(mesh))) ** 2
-    memory = _BYTES * (system + u * o) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * o))
+    system = (u + len(admissible_modes(mesh))) ** 2
+    memory = _BYTES * (system + u * r) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * r))
     evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
-    flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * o)
+    flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * r)
     items = _collocation_items(case, order, n_loaded, n_moved, takes_slopes)
-    return BodyNeeds(items, work, memory, _BYTES * (system + u * o), evaluations, flops)
+    return BodyNeeds(items, work, memory, _BYTES * (system + u * r), evaluations, flops)
 
 
 def _different_loads(case: BodyCase) -> list[GivenData]:
@@ -248,16 +248,16 @@ def _different_loads(case: BodyCase) -> list[GivenData]:
 def _collocation_items(
     case: BodyCase, order: int, n_loaded: int, n_moved: int, takes_slopes: bool
 ) -> tuple[PlanItem, ...]:
-    u, n_single, n_double = case.n_displacements, case.n_fixed + case.n_open, case.n_free + case.n_open
+    u, n_single, n_double = case.n_displacements, case.n_fixed + case.n_retained, case.n_free + case.n_retained
     n_given = n_loaded + n_moved
     given = f"{n_given} columns are multiplied by given data at once" if n_given else "all given data are zero"
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     volume = "collocation has it among the tractions" if case.material.is_incompressible else "the body is compressible"
     one_equation = "collocation takes the displacement equation alone"
     return (
-        PlanItem("single layer V", True, f"unknown tractions: held and open directions; {u} x {n_single}"),
+        PlanItem("single layer V", True, f"unknown tractions: held and retained directions; {u} x {n_single}"),
         _zero_columns("columns of V on the free surface", "the traction is zero there", u - n_single - n_loaded, u),
-        PlanItem("double layer K", True, f"unknown displacements: free and open directions; {u} x {n_double}"),
+        PlanItem("double layer K", True, f"unknown displacements: free and retained directions; {u} x {n_double}"),
         _zero_columns("columns of K where supports hold", "the displacement is zero there", u - n_double - n_moved, u),
         PlanItem("storage of columns under given data", False, given),
         PlanItem("slopes between constant elements", takes_slopes, slopes),

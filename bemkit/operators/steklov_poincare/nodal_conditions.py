@@ -1,4 +1,4 @@
-"""What is known at the displacement nodes of a body: fixed, free or open directions, forces and displacements."""
+"""What is known at the displacement nodes of a body: fixed, free or retained directions, forces and displacements."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.operators.rigid_modes import possible_motions, rigid_motions
+from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
-SMOOTH = 0.07
+SMOOTH_SIDE_RATIO = 0.07
 """Two directions of one support that differ by less than 30 degrees stand for one smooth side: the eigenvalues of
 their sum then differ by the factor tan(15 deg)^2."""
-CONFLICT = 1e-9
+CONFLICT_TOLERANCE = 1e-9
 """Relative difference of two prescribed displacements at one node that round-off may explain."""
-HELD = 1e-6
+FREE_MOTION_TOLERANCE = 1e-6
 """A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
 from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
 with a million times the load holds nothing."""
-_SAME = 4.0 * np.finfo(float).eps
+_FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
 """Relative difference of two loads that the product with a load factor may leave."""
 
 TractionField = Callable[[FloatArray, FloatArray], FloatArray]
@@ -70,19 +70,19 @@ class NodalConditions:
         Directions whose displacement is prescribed.
     displacement : (n_nodes, 2) array [m]
         The prescribed values, zero elsewhere.
-    is_open : (n_nodes, 2) bool array
+    is_retained : (n_nodes, 2) bool array
         Directions that are kept as unknowns (contact); everything else is free: its force is known.
     """
 
     frame: FloatArray
     is_fixed: BoolArray
     displacement: FloatArray
-    is_open: BoolArray
+    is_retained: BoolArray
 
     @property
     def is_free(self) -> BoolArray:
         """Directions whose force is known, (n_nodes, 2)."""
-        free: BoolArray = ~(self.is_fixed | self.is_open)
+        free: BoolArray = ~(self.is_fixed | self.is_retained)
         return free
 
 
@@ -124,7 +124,7 @@ class GivenData:
             return 0.0
         k = int(np.argmax(np.abs(other)))
         factor = float(own[k] / other[k]) if other[k] else 0.0
-        return factor if np.all(np.abs(own - factor * other) <= _SAME * np.abs(own)) else None
+        return factor if np.all(np.abs(own - factor * other) <= _FACTOR_TOLERANCE * np.abs(own)) else None
 
 
 def integrate_traction(space: BoundarySpace, elements: IntArray, field: TractionField) -> FloatArray:
@@ -213,7 +213,7 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 def _mirrors(space: BoundarySpace) -> list[Support]:
     """Return the supports that stand for symmetry lines: no displacement across them."""
-    held = vanishing_dofs(space).reshape(-1, 2)[space.element_dofs]
+    held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
     elements = np.flatnonzero(held.any(axis=(1, 2)))
     if not elements.size:
         return []
@@ -227,7 +227,7 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
     for local, dofs in enumerate(space.element_dofs[support.elements].T):
         np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
     size, vectors = np.linalg.eigh(matrix)
-    keep = np.where(size > SMOOTH * size[:, 1:], 1.0, 0.0)
+    keep = np.where(size > SMOOTH_SIDE_RATIO * size[:, 1:], 1.0, 0.0)
     projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
     return projector
 
@@ -240,7 +240,7 @@ def _check_agreement(
         values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
         miss = np.abs(np.einsum("nij,nj->ni", own, values - displacement)).max(axis=1)
         worst = int(np.argmax(miss))
-        if miss[worst] > CONFLICT * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
+        if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
             x, y = points[worst]
             raise ConflictingSupportsError(
                 f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
@@ -248,7 +248,7 @@ def _check_agreement(
             )
 
 
-def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
+def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
 
     Parameters
@@ -259,15 +259,15 @@ def unsupported_motions(space: BoundarySpace, conditions: NodalConditions) -> Fl
     Returns
     -------
     (n_motions, n_nodes, 2) array
-        Linearly independent, of sizes about one. None are possible that the mesh excludes; see `possible_motions`.
+        Linearly independent, of sizes about one; combinations of the `admissible_modes`.
     """
     points = dof_points(space)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
-    motions = motions[:, :, list(possible_motions(space.mesh))]
+    motions = motions[:, :, list(admissible_modes(space.mesh))]
     fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
     if fixed.size:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
-        n_held = int(np.count_nonzero(sizes >= HELD * np.sqrt(len(fixed))))
+        n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
     return motions.transpose(2, 0, 1)

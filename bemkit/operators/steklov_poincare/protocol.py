@@ -8,7 +8,7 @@ from typing import Protocol
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import Iterations
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
@@ -16,30 +16,30 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 @dataclass(frozen=True, eq=False)
 class CondensedMap:
-    """A body reduced to its open directions: force = stiffness @ displacement - load.
+    """A body reduced to its retained directions: force = stiffness @ displacement - load.
 
     Parameters
     ----------
-    stiffness : (n_open, n_open) array
+    stiffness : (n_retained, n_retained) array
         In weak form (forces, not tractions).
-    load : (n_open,) array
-        What the given loads and supports press onto the open directions.
+    load : (n_retained,) array
+        What the given loads and supports press onto the retained directions.
     recover : callable
-        (n_open,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in x
-        and y.
+        (n_retained,) displacements -> displacement (n_nodes, 2) and total boundary force (n_nodes, 2) of all nodes, in
+        x and y.
     under : callable
         Other given forces (n_nodes, 2) in x and y and prescribed displacements (n_nodes, 2) in the frames of the
         nodes -> the same body under them, without another factorisation.
     follow : callable
-        (k,) numbers (2 node + component) of free directions -> response (k, n_open) and at_rest (k,) of the
-        displacements there: ``at_rest + response @ open_displacement``.
+        (k,) numbers (2 node + component) of free directions -> response (k, n_retained) and at_rest (k,) of the
+        displacements there: ``at_rest + response @ retained_displacement``.
     sensitivity : (n_nodes, 2) array, optional
         Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
         above the forces themselves, which then are differences and carry its round-off.
     iterations : tuple of Iterations
         What each solution for free displacements so far took that was found by iteration; see
         `bemkit.operators.linear.solvers.Krylov`.
-    work : Work
+    work : OperationCounts
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     volume_force : (3,) array, optional
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
@@ -52,7 +52,7 @@ class CondensedMap:
     follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
     iterations: tuple[Iterations, ...] = ()
-    work: Work = field(default_factory=Work)
+    work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
 
 
@@ -72,7 +72,7 @@ class SteklovPoincare(Protocol):
         """The space of the tractions."""
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Eliminate every direction that is not open, with the given nodal forces (n_nodes, 2) on the free ones."""
+        """Eliminate every direction that is not retained, with the given nodal forces (n_nodes, 2) on the free ones."""
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the tractions [Pa] that belong to what `CondensedMap.recover` gives.

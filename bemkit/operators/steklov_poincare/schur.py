@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.counts import Work
+from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
-from bemkit.operators.steklov_poincare.volume_constraint import HeldVolume, Volume, room
+from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
 
 
 @dataclass(eq=False)
 class SchurCondensation:
-    """A body reduced to its open directions by eliminating the free ones from S.
+    """A body reduced to its retained directions by eliminating the free ones from S.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class SchurCondensation:
     Raises
     ------
     SingularMatrixError
-        If the supports, and the open directions held fast, leave the body free.
+        If the supports, and the retained directions held fast, leave the body free.
     """
 
     matrix: FloatArray
@@ -46,25 +46,25 @@ class SchurCondensation:
     def __post_init__(self) -> None:
         conditions = self.conditions
         matrix = rotate_rows(rotate_columns(self.matrix, conditions.frame), conditions.frame)
-        self._free, self._open, self._fixed = (
-            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_open, conditions.is_fixed)
+        self._free, self._retained, self._fixed = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_retained, conditions.is_fixed)
         )
         self.factor = self.solver.factor(MatrixOperator(matrix[np.ix_(self._free, self._free)]), self.name)
-        self._coupling = matrix[np.ix_(self._free, self._open)]
+        self._coupling = matrix[np.ix_(self._free, self._retained)]
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change
-        self._held = HeldVolume(self.factor, room(volume)[self._free], self.volume.yields)
-        self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._open].T)
-        stiffness = matrix[np.ix_(self._open, self._open)] + multiply(self._coupling.T, self._response)
-        stiffness += volume[self._open] @ self._pressures
+        self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.yields)
+        self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._retained].T)
+        stiffness = matrix[np.ix_(self._retained, self._retained)] + multiply(self._coupling.T, self._response)
+        stiffness += volume[self._retained] @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
         self._sensitivity = np.abs(self.matrix).sum(axis=0).reshape(-1, 2)
 
     @property
-    def work(self) -> Work:
+    def work(self) -> OperationCounts:
         """What the elimination took."""
-        n_columns = self._open.size + self._volume.shape[1]
-        return Work(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
+        n_columns = self._retained.size + self._volume.shape[1]
+        return OperationCounts(factorisations=self.factor.factorisations, right_hand_sides=n_columns)
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
@@ -72,21 +72,21 @@ class SchurCondensation:
         prescribed = displacement.ravel()[self._fixed]
         known = np.einsum("nkc,nc->nk", frame, force).ravel() - self._of_fixed @ prescribed
         at_rest, pressure = self._held.solve(known[free], -self._volume[self._fixed].T @ prescribed)
-        load = known[self._open] - self._coupling.T @ at_rest - self._volume[self._open] @ pressure
+        load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
 
-        def recover(open_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
             local = np.empty(len(self.matrix))
             local[self._fixed] = prescribed
-            local[self._open] = open_displacement
-            local[free] = at_rest + response @ open_displacement
+            local[self._retained] = retained_displacement
+            local[free] = at_rest + response @ retained_displacement
             displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
             force = self.matrix @ displacement.ravel()
-            force += self.volume.change @ (pressure + self._pressures @ open_displacement)
+            force += self.volume.change @ (pressure + self._pressures @ retained_displacement)
             return displacement, force.reshape(-1, 2)
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             rows = np.searchsorted(free, directions)
             return response[rows], at_rest[rows]
 
-        work = Work(right_hand_sides=1)
+        work = OperationCounts(right_hand_sides=1)
         return CondensedMap(self._stiffness, load, recover, self.under, follow, self._sensitivity, work=work)

@@ -35,7 +35,7 @@ class Volume:
 
 
 @dataclass(frozen=True, eq=False)
-class HeldVolume:
+class VolumeConstraint:
     """Solves for the free displacements and the pressure.
 
     Parameters
@@ -73,7 +73,7 @@ class HeldVolume:
         return free - displacement @ pressure, pressure
 
 
-def room(volume: FloatArray) -> FloatArray:
+def without_round_off(volume: FloatArray) -> FloatArray:
     """Return the changes of volume (n_dofs, 0 or 1) without round-off.
 
     What tangential motions change the volume by is round-off, and no room for an incompressible body.

@@ -14,7 +14,7 @@ from bemkit.results.record_file import RecordFile
 
 N_FITTED = 3
 """Meshes, from the finest on, to which an order is fitted."""
-SAME = 1e-6
+EQUALITY_TOLERANCE = 1e-6
 """Relative difference below which errors are equal: drivers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
 
@@ -141,7 +141,7 @@ def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorReco
     known = [record for record in records if np.isfinite(record.seconds) and np.isfinite(getattr(record, measure))]
     front: list[ErrorRecord] = []
     for record in sorted(known, key=lambda record: (record.seconds, getattr(record, measure))):
-        if not front or getattr(record, measure) < (1.0 - SAME) * getattr(front[-1], measure):
+        if not front or getattr(record, measure) < (1.0 - EQUALITY_TOLERANCE) * getattr(front[-1], measure):
             front.append(record)
     return front
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.reflection import unfolded, vanishing_dofs
+from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, break_nodes
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
@@ -49,7 +49,7 @@ def test_fields_are_those_of_the_whole_body(case: str, discretisation: object, p
     difference = half.boundary.traction - whole.boundary.traction[:n]
     assert np.abs(difference).max() <= 1e-11 * np.abs(whole.boundary.traction).max()
     make_space = scene.discretisation.displacement_space
-    displacement = unfolded(make_space(half.mesh), make_space(whole.mesh), half.boundary.displacement)
+    displacement = reflected_to_whole(make_space(half.mesh), make_space(whole.mesh), half.boundary.displacement)
     size = np.abs(whole.boundary.displacement).max()
     assert np.abs(displacement - whole.boundary.displacement).max() <= 1e-11 * size
     assert symmetry.n_images * half.energy == pytest.approx(whole.energy, rel=1e-11)
@@ -66,8 +66,8 @@ SPACES = {
 
 def folding(space: BoundarySpace, whole: BoundarySpace) -> np.ndarray:
     """Return the matrix that makes dofs on the whole boundary of symmetric ones on the half."""
-    units = np.eye(space.n_dofs)[~vanishing_dofs(space)].reshape(-1, space.n_dofs // 2, 2)
-    return np.stack([unfolded(space, whole, unit).ravel() for unit in units], axis=1)
+    units = np.eye(space.n_dofs)[~antisymmetric_dofs(space)].reshape(-1, space.n_dofs // 2, 2)
+    return np.stack([reflected_to_whole(space, whole, unit).ravel() for unit in units], axis=1)
 
 
 @pytest.mark.parametrize("kind", SPACES)
@@ -85,7 +85,7 @@ def test_every_operator_is_the_folded_operator_of_the_whole(
         (bk.adjoint_double_layer, t, u, whole_t, whole_u),
         (bk.hypersingular, u, u, whole_u, whole_u),
     ):
-        folded = make(trial, test, material).matrix()[np.ix_(~vanishing_dofs(test), ~vanishing_dofs(trial))]
+        folded = make(trial, test, material).matrix()[np.ix_(~antisymmetric_dofs(test), ~antisymmetric_dofs(trial))]
         whole = make(whole_trial, whole_test, material).matrix()
         expected = folding(test, whole_test).T @ whole @ folding(trial, whole_trial) / symmetry.n_images
         # single integrals are good to about 1e-14
@@ -97,7 +97,7 @@ def test_every_operator_is_the_folded_operator_of_the_whole(
     assert np.array_equal(elastic.matrix(), elastic.matrix().T)
     fold = folding(u, whole_u)
     expected = fold.T @ whole_elastic.matrix() @ fold / symmetry.n_images
-    keeps = ~vanishing_dofs(u)
+    keeps = ~antisymmetric_dofs(u)
     assert np.abs(elastic.matrix()[np.ix_(keeps, keeps)] - expected).max() <= 1e-12 * np.abs(expected).max()
 
 

@@ -35,7 +35,8 @@ while True:
 SWEEPS = """
 import sys
 from bemkit.cli.main import main
-main(["stability", "paper-1", "--elements", "32", "--axis", "friction", "--axis", "sliding", "-q", "-o", sys.argv[1]])
+axes = [word for axis in sys.argv[2:] for word in ("--axis", axis)]
+main(["stability", "paper-1", "--elements", "32", *axes, "-q", "-o", sys.argv[1]])
 """
 
 
@@ -66,7 +67,7 @@ def kill_while_writing(path: Path, delays: list[float]) -> None:
 
 
 def test_a_process_killed_while_writing_leaves_a_whole_result(result: Path) -> None:
-    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(4)])
+    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(10)])
 
 
 @pytest.mark.slow
@@ -119,7 +120,7 @@ def test_any_flipped_bit_is_noticed(result: Path, is_rows: bool) -> None:
     content = path.read_bytes()
     chooser = random.Random(7)
     complaints: list[str] = []
-    for _ in range(30):
+    for _ in range(60):
         damaged = bytearray(content)
         damaged[chooser.randrange(len(content))] ^= 1 << chooser.randrange(8)
         path.write_bytes(damaged)
@@ -163,16 +164,24 @@ def test_rows_of_another_version_or_kind_are_refused(tmp_path: Path, result: Pat
         FILE.read(result)
 
 
-def sweep_process(path: Path) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-c", SWEEPS, str(path)])
+def sweep_process(path: Path, axes: tuple[str, ...]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", SWEEPS, str(path), *axes])
 
 
-@pytest.mark.slow  # the error study goes through the same engine, in the quick tests
-def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("axes", "n_kills", "n_rows"),
+    [
+        (("sliding",), 1, 11),
+        pytest.param(("friction", "sliding"), 2, 24, marks=pytest.mark.slow),
+    ],
+)
+def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(
+    tmp_path: Path, axes: tuple[str, ...], n_kills: int, n_rows: int
+) -> None:
     path = tmp_path / "rows.h5"
     n_before = 0
-    for _ in range(2):
-        process = sweep_process(path)
+    for _ in range(n_kills):
+        process = sweep_process(path, axes)
         deadline = time.monotonic() + 30.0
         while time.monotonic() < deadline and process.poll() is None:
             with contextlib.suppress(ResultFileError):
@@ -185,8 +194,8 @@ def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
         assert len(rows) > n_before
         n_before = len(rows)
     finished = FILE.read(path)[1]
-    assert sweep_process(path).wait() == 0
+    assert sweep_process(path, axes).wait() == 0
     after = FILE.read(path)[1]
-    assert len(after) == 24
+    assert len(after) == n_rows
     # equal to the run times: finished rows are taken over, not computed again
     assert after[: len(finished)] == finished or any("nan" in repr(row) for row in finished)

@@ -35,10 +35,10 @@ def random_trials(seed: int, count: int) -> list[Trial]:
 
 
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = random_trials(1, 100)
+    trials = random_trials(1, 200)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 40  # a generator of scenes without answers tests nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 80  # a generator of scenes without answers tests nothing
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ def motions_at(solution: Solution, points: FloatArray) -> FloatArray:
     return np.stack([np.stack([one, zero, -y], axis=-1), np.stack([zero, one, x], axis=-1)], axis=-2)
 
 
-def possible_motions_of(solution: Solution) -> list[int]:
+def admissible_modes_of(solution: Solution) -> list[int]:
     """Return which of the two translations and the rotation the symmetry allows; an exterior is at rest far away."""
     mesh = solution.mesh
     if mesh.is_exterior:
@@ -67,8 +67,8 @@ def _loads(solution: Solution, boundary: Boundary, traction: FloatArray) -> Floa
 
 def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
     """Return (n_free, 3) coefficients of the rigid motions that no support resists."""
-    possible = possible_motions_of(solution)
-    rows = [np.eye(3)[[motion for motion in range(3) if motion not in possible]], np.zeros((1, 3))]
+    admissible = admissible_modes_of(solution)
+    rows = [np.eye(3)[[mode for mode in range(3) if mode not in admissible]], np.zeros((1, 3))]
     for elements, directions, _ in held_directions(solution, boundary):
         motions = motions_at(solution, boundary.node_points[elements])
         rows.append(np.einsum("enc,encm->enm", directions, motions).reshape(-1, 3))
@@ -110,7 +110,7 @@ def energy_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, tracti
 def strained_displacement(solution: Solution) -> FloatArray:
     """Return the nodal displacements (n_nodes, 2) [m] without their rigid part."""
     fields = solution.boundary
-    motions = motions_at(solution, fields.points)[:, :, possible_motions_of(solution)].reshape(
+    motions = motions_at(solution, fields.points)[:, :, admissible_modes_of(solution)].reshape(
         2 * len(fields.points), -1
     )
     rigid = np.linalg.lstsq(motions, fields.displacement.ravel(), rcond=None)[0]

@@ -13,7 +13,7 @@ from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.studies.stability.independent_check.boundary import Boundary
 from bemkit.studies.stability.independent_check.obstacles import distance_to
 
-_FACING = 1e-6
+_GRAZING_COSINE = 1e-6
 """Cosine between the body's normal and the direction of contact up to which a node may count as facing away."""
 
 
@@ -84,8 +84,8 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
         points=points,
         offset=offset,
         frame=frame,
-        distance=np.where(facing > _FACING, distance, np.inf),
-        is_grazing=np.abs(facing) <= _FACING,
+        distance=np.where(facing > _GRAZING_COSINE, distance, np.inf),
+        is_grazing=np.abs(facing) <= _GRAZING_COSINE,
         is_supported=is_supported,
         displacement=fields.displacement[nodes],
         traction=np.einsum("nk,nkc->nc", components, frame),
@@ -107,7 +107,7 @@ def hidden_overlap(solution: Solution, boundary: Boundary, nodes: Nodes) -> floa
         if isinstance(part.condition, Contact) and rows.size:
             distance, direction = distance_to(part.condition.obstacle, points[rows], normals)
             overlap = np.sum(displacement[rows] * direction, axis=1) - distance
-            is_facing = np.sum(direction * normals, axis=1) > _FACING
+            is_facing = np.sum(direction * normals, axis=1) > _GRAZING_COSINE
             deepest = max(deepest, float(np.max(overlap[is_facing], initial=0.0)))
     return deepest / motion if motion > 0.0 else deepest
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov, LinearSolverWish
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, LinearGalerkin, QuadraticGalerkin
 from bemkit.scene.load_history import with_scaled_loads
@@ -148,12 +148,14 @@ def _solver(random: np.random.Generator) -> ContactSolver:
     return one_by_weight(random, drivers)
 
 
-def _linear_solver(random: np.random.Generator, discretisation: Discretisation, material: Material) -> LinearSolverWish:
-    wishes: dict[LinearSolverWish, float] = {Automatic(): 7.0, DenseCholesky(): 1.0, Krylov(): 2.0}
+def _linear_solver(
+    random: np.random.Generator, discretisation: Discretisation, material: Material
+) -> LinearSolverChoice:
+    weights: dict[LinearSolverChoice, float] = {Automatic(): 7.0, DenseCholesky(): 1.0, Krylov(): 2.0}
     is_too_inexact = Krylov().error_at(material) > LARGEST_KRYLOV_ERROR
     if not discretisation.is_symmetric or is_too_inexact:  # scenes refuse both
-        del wishes[Krylov()]
-    return one_by_weight(random, wishes)
+        del weights[Krylov()]
+    return one_by_weight(random, weights)
 
 
 def _load_factors(random: np.random.Generator) -> tuple[float, ...]:
