@@ -13,7 +13,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model
-from bemkit.operators.equilibrium import round_off_of
+from bemkit.operators.equilibrium import NOISE, round_off_of
 from bemkit.operators.rigid_modes import resting_motions
 from bemkit.solvers.base import ContactSolution, Status
 
@@ -68,7 +68,9 @@ def negative_share(
     strained = displacement - (motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]).reshape(-1, 2)
     parts = strained * force
     size = float(np.abs(parts).sum())
-    round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * float(np.abs(strained).max())
+    # a body that only moves has strains of round-off alone, and these are known no better than that
+    farthest = max(float(np.abs(strained).max()), NOISE * float(np.finfo(float).eps * np.abs(displacement).max()))
+    round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * farthest
     work = float(parts.sum())
     return -work / size if work < -round_off else 0.0
 

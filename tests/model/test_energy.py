@@ -63,6 +63,17 @@ def test_work_is_judged_apart_from_rigid_motions() -> None:
     assert negative_share(travel, force, motions, np.ones((20, 2))) == 0.0
 
 
+def test_round_off_of_a_body_that_only_moves_is_no_negative_energy() -> None:
+    """Forces of round-off on strains of round-off do a work of either sign, whose size no estimate from either tells."""
+    travel = np.tile([0.0, 1e-7], (8, 1))
+    motions = rigid_motions(np.random.default_rng(2).normal(size=(8, 2)), np.zeros(2), 1.0).reshape(16, 3)
+    sensitivity, astray = np.full((8, 2), 5.0), 1e-23 * np.random.default_rng(3).normal(size=(8, 2))
+    force = -1e-21 * np.sign(astray)  # thrice the round-off of 16 terms, each of 5 * 1e-7
+    assert negative_share(travel + astray, force, motions, sensitivity) == 0.0
+    # the same forces are no round-off of a body that stays where it is
+    assert negative_share(1e10 * astray, force, motions, sensitivity) > 0.1
+
+
 def test_what_is_indefinite() -> None:
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(6, 6)))[0]
     for least, expected in ((1.0, False), (0.0, False), (-1e-15, False), (-1e-6, True), (-1.0, True)):
