@@ -36,12 +36,15 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         return result
     condensed = model.body.condensed
     displacement, force = model.body.recover(result.state)
+    sensitivity = condensed.sensitivity
+    if sensitivity is None:  # a node resists by about E' per displacement, whatever the elements around it are
+        sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
-    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, condensed.sensitivity):
+    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.prepared.space
     motions = resting_motions(space.mesh, dof_points(space))
-    share = negative_share(displacement, force, motions, condensed.sensitivity)
+    share = negative_share(displacement, force, motions, sensitivity)
     return (
         _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
     )
