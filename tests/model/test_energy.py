@@ -64,7 +64,7 @@ def test_work_is_judged_apart_from_rigid_motions() -> None:
 
 
 def test_round_off_of_a_body_that_only_moves_is_no_negative_energy() -> None:
-    """Forces of round-off on strains of round-off do a work of either sign, whose size no estimate from either tells."""
+    """Forces of round-off on strains of round-off do a work of either sign."""
     travel = np.tile([0.0, 1e-7], (8, 1))
     motions = rigid_motions(np.random.default_rng(2).normal(size=(8, 2)), np.zeros(2), 1.0).reshape(16, 3)
     sensitivity, astray = np.full((8, 2), 5.0), 1e-23 * np.random.default_rng(3).normal(size=(8, 2))
