@@ -9,7 +9,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.problem import ContactProblem, ContactState
 
 _ROUND_OFF = 1e-13
-"""Tractions below this share of those that hold the body glued are round-off (450 eps) of the sums they come from.
+"""Tractions below this share of those that hold the body sticking are round-off (450 eps) of the sums they come from.
 Larger ones mean something, however small they are."""
 
 
@@ -128,24 +128,24 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     weights = problem.body.weights
     modulus = problem.body.stiffness_scale * float(np.median(weights))
     furthest = float(np.abs(state.displacement).max())
-    # friction without pressure is a traction to be met as well, however small beside the glued ones
+    # friction without pressure is a traction to be met as well, however small beside the sticking ones
     resisted = problem.friction_bound(np.zeros(problem.n_contact))
-    present, glued = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
+    present, sticking = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
     at_hand = np.maximum(present, resisted)
-    if at_hand.max() > _ROUND_OFF * glued.max() and max(present.max(), glued.max()) > 0.0:
+    if at_hand.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:
         # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must
         # not excuse.
         stress, force = (
-            max(float((by * present).max()), min(float((by * glued).max()), 1e3 * float((by * at_hand).max())))
+            max(float((by * present).max()), min(float((by * sticking).max()), 1e3 * float((by * at_hand).max())))
             for by in (1.0, weights)
         )
         return _Scales(stress, force, max(force / modulus, 1e-6 * furthest))
     # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
     # by what would hold it or, if even that is nothing, by the gaps.
     gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
-    force = float((weights * glued).max())
+    force = float((weights * sticking).max())
     length = furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
-    return _Scales(float(glued.max()) or 1.0, force or float(weights.max()), length)
+    return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length)
 
 
 def _largest(values: FloatArray) -> float:

@@ -109,7 +109,7 @@ def find_long_travel(problem: ContactProblem) -> float | None:
     Returns
     -------
     float or None
-        Smallest gap that must close, in displacements that the load of the glued body causes at one node; None if it
+        Smallest gap that must close, in displacements that the load of the sticking body causes at one node; None if it
         is small enough for displacements to hold both the travel and the deformation.
     """
     deformation = float(np.abs(problem.sticking_state.traction).max()) / problem.body.stiffness_scale

@@ -244,7 +244,7 @@ def condense(
     ConflictingSupportsError
         If supports contradict each other at a node.
     SingularMatrixError
-        If even glued contact does not hold the body.
+        If even sticking contact does not hold the body.
     """
     conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
     return condensed_body(elastic, conditions, contact, force)
