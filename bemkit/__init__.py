@@ -71,11 +71,11 @@ if TYPE_CHECKING:
     from bemkit.results.result_file import read_result as read_result
     from bemkit.results.result_file import write_result as write_result
     from bemkit.results.solution import Solution as Solution
+    from bemkit.runs.history import run_history as run_history
     from bemkit.runs.nested import run_cascade as run_cascade
     from bemkit.runs.run import FailedRun as FailedRun
     from bemkit.runs.run import run as run
     from bemkit.runs.run import run_all as run_all
-    from bemkit.runs.run import run_history as run_history
     from bemkit.runs.run import run_probe as run_probe
     from bemkit.scene.scene import Clamped as Clamped
     from bemkit.scene.scene import ConstantCollocation as ConstantCollocation
@@ -125,8 +125,9 @@ _HOME = {
     "results.interior": ("interior_fields",),
     "results.result_file": ("read_result", "write_result"),
     "results.solution": ("Solution",),
+    "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
-    "runs.run": ("FailedRun", "run", "run_all", "run_history", "run_probe"),
+    "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
     "scene.scene": (
         "Clamped",
         "ConstantCollocation",

@@ -114,7 +114,7 @@ def run(
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):
         if explain:
-            tracemalloc.start()
+            _start_tracing()
         try:
             solution = _solve(chosen, cascade=cascade, is_live=is_live)
         finally:
@@ -239,6 +239,15 @@ def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
 
         return run_cascade(scene, callback=callback)[-1]
     return solve_scene(scene, callback=callback)
+
+
+def _start_tracing() -> None:
+    """Trace memory from now on, with what every run loads on first use behind it."""
+    import scipy.linalg  # noqa: F401
+
+    import bemkit.runs.run  # noqa: F401
+
+    tracemalloc.start()
 
 
 def _path(name: str | None) -> Path | None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.reduction import CondensedBody, ContactNodes, condensed_body
+from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh

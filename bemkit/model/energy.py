@@ -13,7 +13,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model
-from bemkit.operators.equilibrium import round_off_of
+from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.solvers.base import ContactSolution, Status
 
@@ -36,12 +36,15 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         return result
     condensed = model.body.condensed
     displacement, force = model.body.recover(result.state)
+    sensitivity = condensed.sensitivity
+    if sensitivity is None:  # a node resists by about E' per displacement, whatever the elements around it are
+        sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
-    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, condensed.sensitivity):
+    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
     space = model.prepared.space
     motions = traction_free_modes(space.mesh, dof_points(space))
-    share = negative_share(displacement, force, motions, condensed.sensitivity)
+    share = negative_share(displacement, force, motions, sensitivity)
     return (
         _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
     )
@@ -68,7 +71,11 @@ def negative_share(
     strained = displacement - (motions @ np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]).reshape(-1, 2)
     parts = strained * force
     size = float(np.abs(parts).sum())
-    round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * float(np.abs(strained).max())
+    # a body that only moves has strains of round-off alone, and these are known no better than that
+    farthest = max(
+        float(np.abs(strained).max()), NOISE_FACTOR * float(np.finfo(float).eps * np.abs(displacement).max())
+    )
+    round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * farthest
     work = float(parts.sum())
     return -work / size if work < -round_off else 0.0
 

@@ -108,8 +108,8 @@ def plan_items(
         PlanItem("fields on the boundary", True, "part of every result"),
         PlanItem("displacement inside the body", False, "not asked for; see interior_fields"),
         PlanItem("stress inside the body", False, "not asked for; see interior_fields"),
-        PlanItem("result file (h5py)", False, "loaded only when a result is written"),
-        PlanItem("figures (matplotlib)", False, "loaded only when figures are drawn"),
+        PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for"),
+        PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for"),
     )
 
 

@@ -174,6 +174,7 @@ def draw_contact_status(solution: Solution, part: str, *, units: Units = SI) -> 
     clearance = _near(contact.clearance[chosen], solution, chosen)
     opening = right.plot(s, clearance, label="clearance $g - u_n$ (right)", **_SECOND)
     right.set_ylabel(f"clearance [{units.length}]")
+    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)  # a uniform pressure is not scaled to its round-off
     for each in (axes, right):
         bottom, top = each.get_ylim()
         each.set_ylim(bottom, top + 0.15 * (top - bottom))  # room for the legend

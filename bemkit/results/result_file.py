@@ -100,7 +100,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_attributes(file.create_group("provenance"), provenance())
         write_attributes(file.create_group("summary"), _summary(solution))
         write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
-        write_attributes(file.create_group("timings"), solution.timings)
+        write_attributes(file.create_group("timings", track_order=True), solution.timings)
         _write_mesh(file.create_group("mesh"), solution.mesh)
         for name in _BOUNDARY:
             file.create_dataset(f"boundary/{name}", data=getattr(solution.boundary, name))

@@ -19,11 +19,8 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
-from bemkit.results.contact_table import STATUS_WORDS as STATUS_WORDS
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.contact_table import are_neighbours as are_neighbours
-from bemkit.results.contact_table import find_transitions as find_transitions
 from bemkit.results.error_indicators import squared_errors
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord

@@ -11,8 +11,9 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
 from bemkit.operators.rigid_modes import without_motion
+from bemkit.results.contact_table import ContactTable, are_neighbours
 from bemkit.results.error_indicators import blind_elements
-from bemkit.results.solution import ContactTable, Solution, are_neighbours
+from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
 LARGEST_ERROR = 0.05

@@ -22,7 +22,8 @@ from bemkit.model.untouched_body import certified
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
-from bemkit.results.solution import BoundaryFields, ContactTable, Solution, find_transitions, with_totals
+from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.solution import BoundaryFields, Solution, with_totals
 from bemkit.results.warnings import find_warnings
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.runs.warm_start import state_on

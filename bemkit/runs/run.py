@@ -15,7 +15,6 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.solution import Solution
 from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
-from bemkit.runs.history import run_history as run_history
 from bemkit.runs.timing import Stage
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene

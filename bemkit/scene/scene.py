@@ -30,7 +30,6 @@ from bemkit.scene.conditions import Contact as Contact
 from bemkit.scene.conditions import Part as Part
 from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement
 from bemkit.scene.conditions import Pressure as Pressure
-from bemkit.scene.conditions import Region as Region
 from bemkit.scene.conditions import Roller as Roller
 from bemkit.scene.conditions import Traction as Traction
 from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation

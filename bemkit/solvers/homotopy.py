@@ -236,7 +236,7 @@ class _Path:
         problem, bound = self.problem, self.bound
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
-        sticks = ~slips & ~problem.body.tangent_is_eliminated  # where the tangent is free there is nothing to follow
+        sticks = ~slips & ~problem.body.tangent_is_eliminated  # an eliminated tangent is followed by the body
         conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
         conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)

@@ -94,7 +94,7 @@ class LemkePivoting:
         # once more for what the inverse leaves, which loses as many digits as the springs are weak
         missing = load + spring_load + force.ravel() - (stiffness + springs) @ displacement
         displacement = (displacement + compliance @ missing).reshape(-1, 2)
-        displacement = problem.respond(stick(*displacement.T)).displacement  # where the tangent is free it follows
+        displacement = problem.respond(stick(*displacement.T)).displacement  # eliminated tangents follow
         state = ContactState(displacement, force / problem.body.weights[:, None])
         return Iterate(state=state, linear_solves=spent, message=f"{n_pivots} pivots")
 

@@ -22,8 +22,9 @@ from bemkit.results.figures import save_figures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
+from bemkit.runs.history import run_history
 from bemkit.runs.nested import CascadeError, run_cascade
-from bemkit.runs.run import run_history, run_probe
+from bemkit.runs.run import run_probe
 from bemkit.scene.scene import Discretisation, NoContactError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import StepRecord

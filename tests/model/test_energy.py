@@ -63,6 +63,53 @@ def test_work_is_judged_apart_from_rigid_motions() -> None:
     assert negative_share(travel, force, motions, np.ones((20, 2))) == 0.0
 
 
+def test_round_off_of_a_body_that_only_moves_is_no_negative_energy() -> None:
+    """Forces of round-off on strains of round-off do a work of either sign."""
+    travel = np.tile([0.0, 1e-7], (8, 1))
+    motions = rigid_motions(np.random.default_rng(2).normal(size=(8, 2)), np.zeros(2), 1.0).reshape(16, 3)
+    sensitivity, astray = np.full((8, 2), 5.0), 1e-23 * np.random.default_rng(3).normal(size=(8, 2))
+    force = -1e-21 * np.sign(astray)  # thrice the round-off of 16 terms, each of 5 * 1e-7
+    assert negative_share(travel + astray, force, motions, sensitivity) == 0.0
+    # the same forces are no round-off of a body that stays where it is
+    assert negative_share(1e10 * astray, force, motions, sensitivity) > 0.1
+
+
+SLOPE = bk.HalfPlane((-2.0612446580203554, -0.01907209024256276), (0.9142617547626685, -0.4051239856862175))
+HINGED = bk.Scene(
+    title="ring on one element that is held",
+    shape=bk.Ring(1.1116006796304891, 1.9659005601975807),
+    material=bk.Material(0.00021584280930069007, 0.09341455618575156),
+    mesh=bk.MeshOptions(8),
+    parts=(
+        bk.Part("contact", bk.Contact(SLOPE), sides=("outer-3",)),
+        bk.Part(
+            "hinge", bk.PrescribedDisplacement(x=-1.3487208788246108e-05, y=1.3094944620704832e-05), sides=("outer-2",)
+        ),
+        bk.Part("load", bk.Pressure(-3.240145479188419e-11), sides=("inner-1",)),
+    ),
+    discretisation=bk.ConstantCollocation(),
+)
+SHIFTED = bk.Scene(
+    title="ring that is moved towards a cavity",
+    shape=bk.Ring(0.004488467361567214, 0.0063042777161298235),
+    material=bk.Material(5.097701303693615, 0.0),
+    mesh=bk.MeshOptions(14),
+    symmetry=bk.Symmetry(x=0.0),
+    law=bk.Coulomb(0.5),
+    parts=(
+        bk.Part("contact", bk.Contact(bk.Cavity((0.0, 2.2e-05), 0.006326395362193901)), sides=("outer-3", "outer-4")),
+        bk.Part("top", bk.PrescribedDisplacement(y=-1.003295097364806e-07), sides=("outer-1", "outer-2")),
+    ),
+    discretisation=bk.ConstantCollocation(),
+)
+
+
+@pytest.mark.parametrize("scene", [HINGED, SHIFTED], ids=["hinged", "shifted"])
+def test_a_body_that_only_moves_resists_by_round_off_of_either_sign(scene: bk.Scene) -> None:
+    solution = bk.run(scene)
+    assert solution.status is not bk.Status.NEGATIVE_ENERGY, solution.message
+
+
 def test_what_is_indefinite() -> None:
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(6, 6)))[0]
     for least, expected in ((1.0, False), (0.0, False), (-1e-15, False), (-1e-6, True), (-1.0, True)):

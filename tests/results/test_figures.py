@@ -76,6 +76,12 @@ def test_contact_figures_have_labels_curves_and_a_status_strip(solution: Solutio
     assert colours == [STATUS_COLOURS[word].upper() for word in ("separated", "slip", "stick")]
 
 
+def test_a_uniform_pressure_is_drawn_with_zero_and_not_scaled_to_its_round_off() -> None:
+    solution = run(with_overrides(load_scene("uniform-slip"), elements=24))
+    bottom, top = draw_contact_status(solution, "floor").axes[0].get_ylim()
+    assert bottom <= 0.0 < 1.0 < top  # the pressure is 1 Pa
+
+
 def test_titles_may_hold_any_character(solution: Solution, tmp_path: Path) -> None:
     scene = dataclasses.replace(solution.scene, title="costs $5 and \\frac{ more_ than $")
     save_figures(dataclasses.replace(solution, scene=scene), tmp_path)

@@ -66,6 +66,7 @@ def assert_same(one: Solution, other: Solution) -> None:
     assert other.contact.part == one.contact.part
     assert (other.history, other.transitions, other.plan) == (one.history, one.transitions, one.plan)
     assert other.summary() == one.summary()
+    assert list(other.timings) == list(one.timings)  # in the order of the stages
 
 
 def test_a_result_comes_back_bit_for_bit(file: Path, solution: Solution) -> None:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bemkit.results.solution import BoundaryFields, ContactTable, Solution, find_transitions
+from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus

@@ -25,7 +25,8 @@ from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_warnings
-from bemkit.runs.run import run, run_history
+from bemkit.runs.history import run_history
+from bemkit.runs.run import run
 from bemkit.scene.scene import (
     Clamped,
     Contact,

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity
-from bemkit.runs.run import UnsolvableSceneError, run_history
+from bemkit.runs.history import UnsolvableSceneError, run_history
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 
 

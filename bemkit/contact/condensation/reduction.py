@@ -10,8 +10,13 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
-from bemkit.contact.condensation.nodes import ContactNodes as ContactNodes
-from bemkit.contact.condensation.nodes import contact_conditions, find_tangents, free_motions, held_nodes
+from bemkit.contact.condensation.nodes import (
+    ContactNodes,
+    contact_conditions,
+    find_tangents,
+    free_motions,
+    held_nodes,
+)
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts

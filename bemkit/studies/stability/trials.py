@@ -14,7 +14,8 @@ from pathlib import Path
 from bemkit.errors import BemkitError
 from bemkit.results.outputs import write_text
 from bemkit.results.solution import Solution
-from bemkit.runs.run import run, run_history
+from bemkit.runs.history import run_history
+from bemkit.runs.run import run
 from bemkit.studies.engine import Task
 from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
 from bemkit.studies.stability.random_scenes import RandomCase, random_case

@@ -38,7 +38,7 @@ class RandomCase:
     seed, index : int
         From which they were drawn.
     scenes : tuple of Scene
-        For `bemkit.runs.run.run_history`.
+        For `bemkit.runs.history.run_history`.
     """
 
     seed: int
