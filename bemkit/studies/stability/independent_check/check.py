@@ -141,7 +141,7 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
     """
     if not _is_finite(solution):
         return IndependentCheck(float("inf"), *(float("nan"),) * 16)
-    scales, boundary = scales_of(solution), boundary_of(solution)
+    scales, boundary = scales_of(solution, before), boundary_of(solution)
     nodes = contact_nodes_of(solution, boundary)
     measured = measured_contact(solution, before, nodes, scales)
     traction = tractions_of(solution, boundary)

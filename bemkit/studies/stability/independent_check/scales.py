@@ -39,14 +39,17 @@ class Scales(NamedTuple):
     turned: float
 
 
-def scales_of(solution: Solution) -> Scales:
-    """Return the sizes that the violations in a solution are measured by."""
+def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
+    """Return the sizes that the violations in a solution are measured by.
+
+    What is left of the load step `before` is known no better than its own tractions were.
+    """
     modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
     displacement = float(np.abs(solution.boundary.displacement).max())
     table = solution.contact
     fields = (solution.boundary.traction, table.sigma_n, table.sigma_t)
     largest = max(float(np.abs(each).max(initial=0.0)) for each in fields)
-    trusted = trusted_stress(solution)
+    trusted = max(trusted_stress(each) for each in (solution, before) if each is not None)
     stress = max(largest, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     if largest <= CONTACT_LIMIT * trusted:  # the body has only moved: a hundredth of that, to be strict
