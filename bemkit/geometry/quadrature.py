@@ -51,15 +51,13 @@ def gauss_lobatto(degree: int) -> FloatArray:
 
 
 @lru_cache(maxsize=64)
-def gauss_graded(n_points: int, power: int = 4) -> tuple[FloatArray, FloatArray]:
+def gauss_graded(n_points: int) -> tuple[FloatArray, FloatArray]:
     """Return a rule on [0, 1] for functions like u log(u), singular at 0.
 
     Parameters
     ----------
     n_points : int
-        Number of points.
-    power : int
-        The Gauss points are mapped by u = v**power, which makes u**a log(u) as smooth as v**(power (a + 1) - 1) log(v).
+        Number of points: those of Gauss, mapped by u = v**4, which makes u**a log(u) as smooth as v**(4 a + 3) log(v).
 
     Returns
     -------
@@ -68,8 +66,8 @@ def gauss_graded(n_points: int, power: int = 4) -> tuple[FloatArray, FloatArray]
     """
     reference, reference_weights = gauss_legendre(n_points)
     v = 0.5 * (reference + 1.0)
-    points = v**power
-    weights = 0.5 * reference_weights * power * v ** (power - 1)
+    points = v**4
+    weights = 2.0 * reference_weights * v**3
     read_only(points)
     read_only(weights)
     return points, weights

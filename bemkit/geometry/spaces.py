@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
@@ -106,19 +106,13 @@ def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
     return result
 
 
-def _fixed(*nodes: float) -> FloatArray:
-    array = np.array(nodes)
-    read_only(array)
-    return array
-
-
 @dataclass(frozen=True, eq=False)
 class ConstantSpace:
     """Piecewise constant functions: one scalar dof per element, at its midpoint."""
 
     degree: ClassVar[int] = 0
     is_continuous: ClassVar[bool] = False
-    local_nodes: ClassVar[FloatArray] = _fixed(0.0)
+    local_nodes: ClassVar[FloatArray] = gauss_legendre(1)[0]
 
     mesh: BoundaryMesh
 

@@ -25,10 +25,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.arrays import ComplexArray, FloatArray, read_only
 
 LOST = 30.0
 """Factor of round-off that the upward recurrence may lose before the downward one takes over."""
@@ -132,10 +133,10 @@ def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tup
     log_product : (n,) array
         log|zeta**2 - 1|.
     """
-    logarithm, log_product = _logarithm(plus, minus)
+    zeta = local_coordinate(plus, minus)
+    logarithm, log_product = _logarithm(plus, minus, zeta)
     integrals = [logarithm]
     if highest:
-        zeta = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
         integrals.append(zeta * logarithm - 2.0)
         for k in range(1, highest):
             integrals.append(((2 * k + 1) * zeta * integrals[k] - k * integrals[k - 1]) / (k + 1))
@@ -143,12 +144,15 @@ def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tup
     return integrals, log_product
 
 
-def _logarithm(plus: ComplexArray, minus: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+def local_coordinate(plus: ComplexArray, minus: ComplexArray) -> ComplexArray:
+    """Return zeta from zeta + 1 or zeta - 1, whichever is smaller: xi and eta are exact near either end."""
+    zeta: ComplexArray = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
+    return zeta
+
+
+def _logarithm(plus: ComplexArray, minus: ComplexArray, zeta: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """Return log((zeta + 1) / (zeta - 1)) and log|zeta**2 - 1|."""
-    abs_plus, abs_minus = np.abs(plus), np.abs(minus)
-    near_start = abs_plus < abs_minus
-    eta = np.where(near_start, plus.imag, minus.imag)
-    xi = np.where(near_start, plus.real - 1.0, minus.real + 1.0)
+    abs_plus, abs_minus, xi, eta = np.abs(plus), np.abs(minus), zeta.real, zeta.imag
     result = np.empty(plus.shape, complex)
     # the angle under which the element is seen
     np.negative(np.arctan2(2.0 * eta, plus.real * minus.real + eta * eta), out=result.imag)
@@ -234,10 +238,14 @@ def log_on_itself(a: int, b: int) -> float:
     return 2.0 * (products[0] - products[1]) / (2 * high + 1)
 
 
+@lru_cache(maxsize=16)
 def legendre_of_monomials(highest: int) -> FloatArray:
-    """Return the square matrix whose row m holds the Legendre coefficients of t**m."""
-    rows = [np.polynomial.legendre.poly2leg(row[: m + 1]) for m, row in enumerate(np.eye(highest + 1))]
-    return np.stack([np.pad(row, (0, highest + 1 - row.size)) for row in rows])
+    """Return the square matrix, read-only, whose row m holds the Legendre coefficients of t**m."""
+    matrix = np.zeros((highest + 1, highest + 1))
+    for m, unit in enumerate(np.eye(highest + 1)):
+        matrix[m, : m + 1] = np.polynomial.legendre.poly2leg(unit[: m + 1])
+    read_only(matrix)
+    return matrix
 
 
 def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:

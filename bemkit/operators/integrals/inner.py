@@ -84,8 +84,7 @@ def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
 def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
     """Return the closed forms of straight elements; `plus` and `minus` as in `kernels.near_integrals`."""
     integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
-    eta = np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
-    return Inner.straight(degrees, integrals, log_product, eta)
+    return Inner.straight(degrees, integrals, log_product, kernels.local_coordinate(plus, minus).imag)
 
 
 def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray, minus: ComplexArray) -> Inner:
@@ -99,11 +98,9 @@ def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray,
     plus, minus : (n,) complex arrays
     """
     integrals, log_product = kernels.near_integrals(plus, minus, degrees.highest_integral)
-    at_start = np.abs(plus) < np.abs(minus)
-    eta = np.where(at_start, plus.imag, minus.imag)
-    root = np.where(at_start, plus - 1.0, minus + 1.0)
-    straight = Inner.straight(degrees, integrals, log_product, eta)
-    return _sum(straight, bending(degrees, coefficients, root, eta, integrals))
+    root = kernels.local_coordinate(plus, minus)
+    straight = Inner.straight(degrees, integrals, log_product, root.imag)
+    return _sum(straight, bending(degrees, coefficients, root, root.imag, integrals))
 
 
 def _sum(straight: Inner, smooth: Inner) -> Inner:

@@ -83,7 +83,7 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
     """
     integrals, _ = kernels.near_integrals(plus, minus, highest)
     result = [integrals]
-    zeta = np.where(np.abs(plus) < np.abs(minus), plus - 1.0, minus + 1.0)
+    zeta = kernels.local_coordinate(plus, minus)
     product = plus * minus
     if n_orders > 1:
         pairs = zip(range(1, highest + 1), integrals[1:], integrals, strict=False)
@@ -164,7 +164,7 @@ def _local(panels: Panels, x: ComplexArray, elements: IntArray) -> tuple[Complex
     """Return zeta + 1, zeta - 1 and eta, each exact near its end point."""
     to_local = panels.to_local[elements]
     plus, minus = (x - panels.start[elements]) * to_local, (x - panels.end[elements]) * to_local
-    return plus, minus, np.where(np.abs(plus) < np.abs(minus), plus.imag, minus.imag)
+    return plus, minus, kernels.local_coordinate(plus, minus).imag
 
 
 class CurvedElements:
