@@ -86,7 +86,7 @@ class UntouchedBody(LinearBody):
         total = float(np.abs(force).sum()) or 1.0
         missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
-        return residual.joined(resultant_imbalance(points, force, balanced, round_off))
+        return residual.joined(resultant_imbalance(points, force, balanced, round_off, self.condensed.volume_force))
 
 
 def untouched_state() -> ContactState:

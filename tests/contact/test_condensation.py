@@ -15,13 +15,14 @@ from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, Selection, Shape, discretise
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, dof_points
+from bemkit.model.untouched_body import UntouchedBody, certified
 from bemkit.operators.equilibrium import resultant_imbalance
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
-from bemkit.solvers.base import solve
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported
+from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
 
 MAPS = [GalerkinMap, CollocationMap]
@@ -238,6 +239,18 @@ def test_a_body_under_its_own_weight_is_certified(law: FrictionLaw) -> None:
     assert solution.certificate.force_imbalance < 1e-10
     weightless = replace(body, condensed=replace(body.condensed, volume_force=None))
     assert weightless.imbalance(solution.state).force > 0.3  # as if nothing pressed the block down
+
+
+def test_a_body_that_touches_nothing_is_certified_under_its_own_weight() -> None:
+    mesh = mesh_of(Rectangle(2.0, 1.0), 48, "bottom", "right", "left")
+    heavy = Heavy(GalerkinMap(mesh, MATERIAL, LinearSpace(mesh)))
+    space = heavy.displacement_space
+    conditions = supported(space, [roller(mesh, part) for part in ("bottom", "left", "right")])
+    nothing = np.zeros((space.n_dofs // 2, 2))
+    body = UntouchedBody(space, conditions, nothing, heavy.condense(conditions, nothing))
+    assert certified(body).status is Status.CONVERGED
+    weightless = replace(body, condensed=replace(body.condensed, volume_force=None))
+    assert weightless.imbalance(certified(body).state).force > 0.3
 
 
 def test_forces_inside_a_body_have_a_moment() -> None:

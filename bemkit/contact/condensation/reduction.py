@@ -193,7 +193,7 @@ class CondensedBody(DenseBody):
         """
         displacement, force = self.recover(state)
         reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
-        round_off = max(of_forces, np.finfo(float).eps * reach * float(np.abs(self.stiffness).sum()))
+        round_off = max(of_forces, np.finfo(float).eps * reach * float(self._column_sizes[1].sum()))
         noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
