@@ -170,7 +170,7 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
     discretisation = _word(DISCRETISATIONS, solution.scene.discretisation)
-    if isinstance(degree := getattr(solution.scene.discretisation, "degree", None), int) and degree > 2:
+    if (degree := solution.scene.discretisation.displacement_space(solution.mesh).degree) > 2:
         discretisation += f", degree {degree}"
     rows = [
         ("status", status),

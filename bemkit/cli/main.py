@@ -107,10 +107,19 @@ def run(
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     from bemkit.atomic_files import reserved
     from bemkit.cli.outputs import Outputs
+    from bemkit.scene.toml import load_scene, with_overrides
 
     wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
     click.get_current_context().with_resource(reserved(wanted.check()))
-    chosen = _load(scene, elements, discretisation, degree, solver, rho, accuracy)
+    chosen = with_overrides(
+        load_scene(scene),
+        elements=elements,
+        accuracy=accuracy,
+        discretisation=discretisation,
+        degree=degree,
+        solver=solver,
+        rho=rho,
+    )
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):
         if explain:
@@ -183,8 +192,9 @@ def plan(scene: str, elements: int | None, discretisation: str | None, degree: i
     """Say what SCENE needs and what it leaves out, without solving it."""
     from bemkit.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
+    from bemkit.scene.toml import load_scene, with_overrides
 
-    chosen = _load(scene, elements, discretisation, degree)
+    chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation, degree=degree)
     with concerning(scene):
         check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None
@@ -201,29 +211,6 @@ def plan(scene: str, elements: int | None, discretisation: str | None, degree: i
 
 commands.add_command(study)
 commands.add_command(stability)
-
-
-def _load(
-    source: str,
-    elements: int | None,
-    discretisation: str | None,
-    degree: int | None,
-    solver: str | None = None,
-    rho: float | None = None,
-    accuracy: float | None = None,
-) -> Scene:
-    from bemkit.scene.toml import load_scene, with_overrides
-
-    scene = load_scene(source)
-    return with_overrides(
-        scene,
-        elements=elements,
-        accuracy=accuracy,
-        discretisation=discretisation,
-        degree=degree,
-        solver=solver,
-        rho=rho,
-    )
 
 
 def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
