@@ -107,12 +107,12 @@ def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
         check = check_solution(step, before)
         if not check.is_good:
             return Outcome.WRONG, check.faults[0], describe(check)
-        if check.is_coarse and not getattr(step, "warnings", ()):
-            return Outcome.WRONG, "reciprocity", describe(check)
+        if check.needs_warning and not step.warnings:
+            return Outcome.WRONG, check.needs_warning, describe(check)
     last = steps[-1]
     if not last.is_converged:
         return Outcome.NAMED, last.status.name.lower(), last.message or last.status.value
-    if any(getattr(step, "warnings", ()) for step in steps):
+    if any(step.warnings for step in steps):
         return Outcome.WARNED, "warning", "; ".join(sorted({text for step in steps for text in step.warnings}))
     return Outcome.SUCCESS, "", ""
 
