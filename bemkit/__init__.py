@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import ConstantCollocation as ConstantCollocation
     from bemkit.scene.scene import Contact as Contact
     from bemkit.scene.scene import Galerkin as Galerkin
+    from bemkit.scene.scene import HpGalerkin as HpGalerkin
     from bemkit.scene.scene import LinearGalerkin as LinearGalerkin
     from bemkit.scene.scene import MeshOptions as MeshOptions
     from bemkit.scene.scene import Part as Part
@@ -133,6 +134,7 @@ _HOME = {
         "ConstantCollocation",
         "Contact",
         "Galerkin",
+        "HpGalerkin",
         "LinearGalerkin",
         "MeshOptions",
         "Part",

@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, read_only
+from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.coefficient_decay import CoefficientErrors, coefficient_errors
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.error_indicators import squared_errors
+from bemkit.results.error_indicators import contact_errors, squared_errors
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
@@ -133,8 +134,21 @@ class Solution:
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @cached_property
+    def coefficient_errors(self) -> CoefficientErrors | None:
+        """Estimated errors of each element of degree 3 and more; None of other elements."""
+        discretisation, mesh = self.scene.discretisation, self.mesh
+        space, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+        if not discretisation.estimates_error or space.degree <= 2:
+            return None
+        at_nodes = self.boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
+        modulus = self.scene.material.plane_modulus
+        return coefficient_errors(space, tractions, self.boundary.displacement, at_nodes, modulus)
+
+    @cached_property
     def element_errors(self) -> FloatArray | None:
         """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
+        if self.coefficient_errors is not None:
+            return self.coefficient_errors.energy
         discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
         if not discretisation.estimates_error:
             return None
@@ -155,6 +169,32 @@ class Solution:
             return 0.0
         return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
 
+    @cached_property
+    def estimated_traction_error(self) -> float | None:
+        """Estimated error of the contact tractions in L2, relative to them.
+
+        None without an estimate and without contact tractions.
+        """
+        if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
+            return None
+        if self.coefficient_errors is None:
+            degree = self.scene.discretisation.displacement_space(self.mesh).degree
+            squared = float(contact_errors(self.contact, degree).sum())
+        else:
+            squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
+        return float(np.sqrt(squared)) / self.contact_traction_size
+
+    @property
+    def contact_elements(self) -> IntArray:
+        """The elements of all contact parts."""
+        return np.concatenate([np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)])
+
+    @property
+    def contact_traction_size(self) -> float:
+        """L2 norm of the contact tractions [Pa m^(1/2)]."""
+        table = self.contact
+        return float(np.sqrt(table.weight @ (table.sigma_n**2 + table.sigma_t**2)))
+
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
 
@@ -163,7 +203,8 @@ class Solution:
         dict
             ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``certified``, ``warnings``,
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
-            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
+            ``estimated_traction_error`` (None without an estimate),
             ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
         """
         return {
@@ -181,6 +222,7 @@ class Solution:
             "force_tangential": self.force_tangential,
             "energy": self.energy,
             "estimated_error": self.estimated_error,
+            "estimated_traction_error": self.estimated_traction_error,
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "timings": dict(self.timings),

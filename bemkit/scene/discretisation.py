@@ -16,6 +16,8 @@ from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 
+_DEGREES = (2, 3, 5, 7, 9, 11, 12)
+"""Of the meshes that follow each other; the last one stays."""
 _LONGEST = 0.75
 """Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
 power of the length."""
@@ -49,11 +51,25 @@ class Discretisation(Protocol):
 
     @property
     def estimates_error(self) -> bool:
-        """Whether jumps of strains and steps of tractions estimate its error, so that meshes can follow an accuracy.
+        """Whether its error can be estimated, so that meshes can follow an accuracy.
 
-        Displacements must then be continuous, of degree 1 or 2, and tractions of a degree less.
+        Displacements must then be continuous, of degree p >= 1, and tractions of degree p - 1.
         """
         return False
+
+    @property
+    def takes_layers(self) -> bool:
+        """Whether meshes that follow an accuracy are few elements in geometric layers, or many of a fitting density."""
+        return False
+
+    @property
+    def needs_accuracy(self) -> bool:
+        """Whether it makes no sense without meshes that follow an accuracy."""
+        return False
+
+    def at_level(self, number: int) -> Discretisation:
+        """Return what to use on a mesh of those that follow an accuracy; `number` counts them, from 0."""
+        return self
 
     @abstractmethod
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
@@ -118,7 +134,7 @@ class Galerkin(SymmetricGalerkin):
     ----------
     degree : int
         p, from 1 to 12. High degrees pay on smooth fields, and on meshes whose elements become shorter towards corners
-        and towards places where contact changes; 1 and 2 estimate their error.
+        and towards places where contact changes, which an accuracy makes.
 
     Raises
     ------
@@ -138,8 +154,17 @@ class Galerkin(SymmetricGalerkin):
 
     @property
     def estimates_error(self) -> bool:
-        """Up to degree 2."""
-        return self.degree <= 2
+        """True."""
+        return True
+
+    @property
+    def takes_layers(self) -> bool:
+        """From degree 3 on."""
+        return self.degree > 2
+
+    def at_level(self, number: int) -> Discretisation:
+        """Return quadratic elements for the first look of a higher degree, later itself."""
+        return QuadraticGalerkin() if number == 0 and self.takes_layers else self
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the continuous functions of the degree; the nodes of the mesh are their first dofs."""
@@ -164,6 +189,38 @@ class QuadraticGalerkin(Galerkin):
     """Symmetric Galerkin of degree 2: displacements continuous and quadratic, tractions linear on each element."""
 
     degree: int = field(default=2, init=False, repr=False)
+
+
+@dataclass(frozen=True)
+class HpGalerkin(Galerkin):
+    """Symmetric Galerkin whose degree rises from mesh to mesh until an accuracy is reached (hp-adaptivity).
+
+    Parameters
+    ----------
+    degree : int
+        On the mesh at hand: 2 on the first one, and that of its mesh in a solution.
+
+    Raises
+    ------
+    GeometryError
+        If the degree is no whole number from 1 to 12.
+    """
+
+    degree: int = field(default=2, repr=False)
+
+    @property
+    def takes_layers(self) -> bool:
+        """True."""
+        return True
+
+    @property
+    def needs_accuracy(self) -> bool:
+        """True."""
+        return True
+
+    def at_level(self, number: int) -> Discretisation:
+        """Return the same with the degree of that mesh."""
+        return HpGalerkin(_DEGREES[min(number, len(_DEGREES) - 1)])
 
 
 @dataclass(frozen=True)

@@ -152,6 +152,7 @@ DISCRETISATIONS = Registry(
     MappingProxyType(
         {
             "galerkin": "bemkit.scene.discretisation:Galerkin",
+            "hp": "bemkit.scene.discretisation:HpGalerkin",
             "linear": "bemkit.scene.discretisation:LinearGalerkin",
             "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
             "constant": "bemkit.scene.discretisation:ConstantCollocation",

@@ -35,6 +35,7 @@ from bemkit.scene.conditions import Traction as Traction
 from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
 from bemkit.scene.discretisation import Discretisation as Discretisation
 from bemkit.scene.discretisation import Galerkin as Galerkin
+from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
 from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
 from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions as MeshOptions
@@ -118,6 +119,11 @@ class Scene:
             self._check_krylov(self.linear_solver)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
+        elif self.discretisation.needs_accuracy:
+            raise InputError(
+                f"discretisation is {self.discretisation}, whose degree rises until an accuracy is reached: give one, "
+                "such as MeshOptions(accuracy=1e-6), or a fixed degree"
+            )
         names = [side.name for loop in self.shape.outline().loops for side in loop]
         for part in self.parts:
             for side in part.sides:

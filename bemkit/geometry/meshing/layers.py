@@ -1,0 +1,173 @@
+"""Partitions into few elements of high degree, in geometric layers towards the ends of their pieces.
+
+Fields are smooth inside a piece and singular at its ends: corners, ends of boundary parts, and places where the contact
+status changes, whose pieces move with them. Elements there shrink by a constant factor from layer to layer, which gives
+exponential convergence together with a rising degree [BabuskaGuo1986]. Where an error is small nothing is cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.curves import Curve
+from bemkit.geometry.meshing.division import Division, Piece
+from bemkit.geometry.meshing.partition import Partition
+from bemkit.geometry.vectors import norms
+
+FACTOR = 0.2
+"""Length of a layer over that of the next one."""
+FIRST_LAYERS = (1, 2)
+"""Layers to begin with: at corners and ends of parts, and where the contact status changes."""
+MOST_LAYERS = 3
+"""Layers that an end gains at once: the estimate behind them is one of the mesh before."""
+STEEPEST = 7.0
+"""Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
+on a short one as a peak of its traction."""
+LARGEST_TURN = np.pi / 4.0
+"""Angle by which a curve may turn on one element."""
+
+
+def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]]) -> Partition:
+    """Divide an outline into few elements, with a layer or two at the ends of its pieces.
+
+    Parameters
+    ----------
+    base : Division
+        The outline cut at corners and ends of parts.
+    cuts : mapping of int to sequence of float
+        Where the contact status changes: parameters by the number of the side.
+    """
+    division = base.cut(cuts)
+    n_layers = np.where(_at_cut(base, division), FIRST_LAYERS[1], FIRST_LAYERS[0]) * _singular_ends(division)
+    return _balanced(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
+
+
+def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Sequence[float]]) -> Partition:
+    """Divide elements whose errors are too large, and move the pieces to where the contact status now changes.
+
+    Parameters
+    ----------
+    old : Partition
+    excess : (n_elements,) array
+        By which factor the error of each element is above its share; what is below 1 stays.
+    cuts : mapping of int to sequence of float
+        As for `layered_partition`. Where their number on a piece of the base has changed, that piece begins anew.
+
+    Returns
+    -------
+    Partition
+        An element at an end of its piece has become layers, others halves.
+    """
+    fresh = layered_partition(old.base, cuts)
+    is_end = _singular_ends(old.division).T.tolist()
+    excesses = np.split(excess, np.cumsum([len(s) - 1 for s in old.parameters])[:-1])
+    refined = [
+        _refined(_fractions(piece, s), own, *ends)
+        for piece, s, own, ends in zip(old.division.pieces, old.parameters, excesses, is_end, strict=True)
+    ]
+    before, now = _owners(old.base, old.division), _owners(old.base, fresh.division)
+    fractions = []
+    for number in range(len(old.base.pieces)):
+        own, new = np.flatnonzero(before == number).tolist(), np.flatnonzero(now == number).tolist()
+        if len(own) == len(new):
+            fractions += [refined[k] for k in own]
+        else:
+            fractions += [_fractions(fresh.division.pieces[k], fresh.parameters[k]) for k in new]
+    return _balanced(old.base, fresh.division, fractions)
+
+
+def has_same_pieces(old: Partition, new: Partition) -> bool:
+    """Whether as many pieces lie on each piece of the base."""
+    return np.array_equal(_owners(old.base, old.division), _owners(new.base, new.division))
+
+
+def _first_layers(n_left: int, n_right: int) -> FloatArray:
+    left, right = (0.5 * FACTOR ** np.arange(n, 0, -1.0) for n in (n_left, n_right))
+    return np.concatenate([[0.0], left, [0.5], 1.0 - right[::-1], [1.0]])
+
+
+def _fractions(piece: Piece, parameters: FloatArray) -> FloatArray:
+    start, end = piece.span
+    fractions: FloatArray = (parameters - start) / (end - start)
+    fractions[[0, -1]] = 0.0, 1.0
+    return fractions
+
+
+def _refined(fractions: FloatArray, excess: FloatArray, is_start: bool, is_end: bool) -> FloatArray:
+    """Cut the elements of a piece; `is_start` and `is_end` tell whether fields may be singular at its ends."""
+    layers = np.clip(np.ceil(np.log(np.maximum(excess, 1.0)) / -np.log(FACTOR)), 0, MOST_LAYERS).astype(int).tolist()
+    last, points = len(layers) - 1, [fractions[:1]]
+    for number, n_layers in enumerate(layers):
+        start, end = fractions[number : number + 2]
+        if n_layers == 0:
+            inner = np.zeros(0)
+        elif last > 0 and is_start and number == 0:
+            inner = FACTOR ** np.arange(n_layers, 0, -1.0)
+        elif last > 0 and is_end and number == last:
+            inner = 1.0 - FACTOR ** np.arange(1.0, n_layers + 1)
+        else:
+            inner = np.array([0.5])
+        points += [start + (end - start) * inner, np.array([end])]
+    return np.concatenate(points)
+
+
+def _balanced(base: Division, division: Division, fractions: Sequence[FloatArray]) -> Partition:
+    """Bisect elements that turn too far, and add layers where a long element meets a short one of another piece."""
+    curves = [division.outline.sides[piece.side].curve for piece in division.pieces]
+    parameters = [
+        _bisected_where_turning(curve, piece.at(f))
+        for curve, piece, f in zip(curves, division.pieces, fractions, strict=True)
+    ]
+    following = division.following
+    is_done = False
+    while not is_done:
+        is_done = True
+        for k, after in enumerate(following.tolist()):
+            if after < 0:
+                continue
+            end, start = parameters[k], parameters[after]
+            length = norms(np.diff(curves[k].point(end[-2:]), axis=0))[0]
+            other = norms(np.diff(curves[after].point(start[:2]), axis=0))[0]
+            if length > STEEPEST * other:
+                parameters[k], is_done = np.insert(end, -1, end[-1] + FACTOR * (end[-2] - end[-1])), False
+            elif other > STEEPEST * length:
+                parameters[after], is_done = np.insert(start, 1, start[0] + FACTOR * (start[1] - start[0])), False
+    return Partition(base, division, tuple(parameters))
+
+
+def _bisected_where_turning(curve: Curve, parameters: FloatArray) -> FloatArray:
+    while not curve.is_straight:
+        middles = 0.5 * (parameters[:-1] + parameters[1:])
+        ends, between = (curve.derivative(s) @ np.array([1.0, 1j]) for s in (parameters, middles))
+        turn = np.abs(np.angle(between / ends[:-1])) + np.abs(np.angle(ends[1:] / between))
+        if not (turn > LARGEST_TURN).any():
+            break
+        parameters = np.sort(np.concatenate([parameters, middles[turn > LARGEST_TURN]]))
+    return parameters
+
+
+def _owners(base: Division, division: Division) -> IntArray:
+    """Return the piece (n_pieces,) of the base that each piece lies on."""
+    spans = [(piece.side, *piece.span) for piece in base.pieces]
+    middles = [(piece.side, 0.5 * sum(piece.span)) for piece in division.pieces]
+    owners = [
+        next(k for k, (own, start, end) in enumerate(spans) if own == side and start < middle < end)
+        for side, middle in middles
+    ]
+    return np.array(owners, dtype=np.intp)
+
+
+def _at_cut(base: Division, division: Division) -> BoolArray:
+    """Tell (2, n_pieces) of the start and the end of each piece whether it is no end of a piece of the base."""
+    ends = {(piece.side, end) for piece in base.pieces for end in piece.span}
+    return np.array([[(piece.side, piece.span[end]) not in ends for piece in division.pieces] for end in (0, 1)], bool)
+
+
+def _singular_ends(division: Division) -> BoolArray:
+    """Tell (2, n_pieces) of the start and the end of each piece whether it is off symmetry lines."""
+    following = division.following
+    has_before = np.isin(np.arange(following.size), following)
+    return np.stack([has_before, following >= 0])

@@ -1,0 +1,92 @@
+"""Meshes of few elements of high degree, in geometric layers towards what is singular: hp-adaptivity.
+
+The literature on hp boundary elements for contact with friction, [BanzStephan2015], marks elements for bisection or a
+higher degree one by one; here the degree is one for all elements, and rises from mesh to mesh, while elements that do
+not profit from it are divided. A few meshes lead from a first look to six and more digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.geometry.meshing.layers import has_same_pieces, layered_partition, refined_partition
+from bemkit.results.solution import Solution
+from bemkit.runs.density import DensityMeshes
+from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
+
+SAFETY = 0.7
+"""The next mesh is planned for this part of the error asked for."""
+LARGEST_STEP = 40.0
+"""Factor by which a mesh is to reduce the error: the places where the status changes must keep up."""
+MOST_LOOKS = 3
+"""Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
+FASTEST = 0.05
+"""Smallest factor that a further degree is trusted to bring."""
+
+
+@dataclass(frozen=True)
+class LayeredMeshes:
+    """Each mesh divides what the degree alone would leave too inaccurate.
+
+    The first one after the first look is made anew, of few elements; its pieces end where the contact status changes,
+    and move with these places from mesh to mesh.
+
+    Parameters
+    ----------
+    accuracy : float
+        Largest error relative to the solution, both in the energy norm and of contact tractions in L2.
+    """
+
+    accuracy: float
+
+    def error(self, solution: Solution) -> float:
+        """Return the larger one of the estimated errors of energy and of contact tractions."""
+        errors = solution.estimated_error, solution.estimated_traction_error
+        if errors[0] is None:
+            return float("inf")
+        return max(error for error in errors if error is not None)
+
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+        """Tell whether the error is small enough; not after the first look, whose zones end inside of elements."""
+        is_first = len(solutions) == 1 and bool(solutions[0].transitions)
+        return not is_first and self.error(solutions[-1]) <= self.accuracy
+
+    def _is_stuck(self, solutions: Sequence[Solution]) -> bool:
+        """Tell whether the last two meshes have not halved the error of the best before them."""
+        errors = [self.error(solution) for solution in solutions]
+        return len(errors) > MOST_LOOKS + 1 and min(errors[-2:]) > 0.5 * min(errors[:-2])
+
+    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
+        """Return a mesh of the next degree, with more layers where that is not enough."""
+        if self._is_stuck(solutions):
+            return None
+        solution, partition = solutions[-1], level.partition
+        if level.number == 0 and len(solutions) < MOST_LOOKS and len(zone_ends(solution)) < len(solution.transitions):
+            return DensityMeshes(self.accuracy).following(level, solutions)
+        cuts = zone_cuts(partition, solution)
+        fresh = layered_partition(partition.base, cuts)
+        if level.number == 0:
+            return level.at_level(1, fresh)
+        number = level.number + has_same_pieces(partition, fresh)
+        degree, next_degree = (
+            each.displacement_space(solution.mesh).degree
+            for each in (solution.scene.discretisation, level.scene.discretisation.at_level(number))
+        )
+        return level.at_level(number, refined_partition(partition, self._excess(solution, next_degree - degree), cuts))
+
+    def _excess(self, solution: Solution, rise: int) -> FloatArray:
+        """Return by which factor (n_elements,) the errors at a higher degree would be above equal shares."""
+        errors = solution.coefficient_errors
+        if errors is None:
+            raise InputError(f"{solution.scene.discretisation.method} has no error estimate: take another discretisation")
+        goal = max(SAFETY * self.accuracy, self.error(solution) / LARGEST_STEP)
+        excess = np.sqrt(errors.energy * errors.energy.size / (2.0 * solution.energy))
+        if (elements := solution.contact_elements).size:
+            share = solution.contact_traction_size**2 / elements.size
+            excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / share))
+        return excess / goal * np.clip(errors.decay, FASTEST, 1.0) ** rise
