@@ -221,8 +221,11 @@ def _solve(solution: Solution) -> list[tuple[str, Text]]:
 
 
 def _estimate(solution: Solution) -> list[tuple[str, Text]]:
-    error = solution.estimated_error
-    return [] if error is None else [("estimated error", Text(f"{error:.1e}  relative, in the energy norm"))]
+    energy, tractions = solution.estimated_error, solution.estimated_traction_error
+    if energy is None:
+        return []
+    of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
+    return [("estimated error", Text(f"{energy:.1e}  relative, in the energy norm{of_tractions}"))]
 
 
 def _nan_first(value: float) -> float:

@@ -10,7 +10,7 @@ import sys
 import time
 import tracemalloc
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -67,6 +67,17 @@ def _run_to_end(arguments: list[str] | None) -> int:
     return code if isinstance(code, int) else 0
 
 
+def _degree(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
+    """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
+    if value is None:
+        return None
+    if value == "hp":
+        return "hp"
+    if not value.lstrip("+-").isdecimal():
+        raise click.BadParameter(f"{value} is no whole number: give one from 1 to 12, or hp", context, parameter)
+    return int(value)
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="bemkit")
 def commands() -> None:
@@ -81,8 +92,8 @@ def commands() -> None:
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
-@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
-@click.option("--degree", type=int, metavar="P", help="Galerkin elements of degree P, instead of the scene's.")
+@click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
+@click.option("--degree", metavar="P|hp", callback=_degree, help="Galerkin elements of that degree, or of rising ones.")
 @click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
 @click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
 @click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
@@ -97,7 +108,7 @@ def run(
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
-    degree: int | None,
+    degree: int | Literal["hp"] | None,
     solver: str | None,
     rho: float | None,
     cascade: bool,
@@ -185,16 +196,26 @@ def scenes() -> None:
 @commands.command()
 @click.argument("scene")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
-@click.option("--degree", type=int, metavar="P", help="Galerkin elements of degree P, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Plan the first mesh towards a relative error below E.")
+@click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
+@click.option("--degree", metavar="P|hp", callback=_degree, help="Galerkin elements of that degree, or of rising ones.")
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
-def plan(scene: str, elements: int | None, discretisation: str | None, degree: int | None, is_json: bool) -> None:
+def plan(
+    scene: str,
+    elements: int | None,
+    accuracy: float | None,
+    discretisation: str | None,
+    degree: int | Literal["hp"] | None,
+    is_json: bool,
+) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
     from bemkit.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
     from bemkit.scene.toml import load_scene, with_overrides
 
-    chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation, degree=degree)
+    chosen = with_overrides(
+        load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
+    )
     with concerning(scene):
         check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None

@@ -155,7 +155,8 @@ def contact_errors(contact: ContactTable, degree: int) -> FloatArray:
         tractions = np.stack([contact.sigma_n[rows], contact.sigma_t[rows]], axis=1)
         steps = np.diff(contact.s[rows])
         means = 0.5 * (steps[1:] + steps[:-1])
-        bends = np.diff(np.diff(tractions, axis=0) / steps[:, None], axis=0) * means[:, None]
+        slopes = np.diff(tractions, axis=0) / np.where(steps > 0.0, steps, np.inf)[:, None]  # 0: between two sides
+        bends = np.diff(slopes, axis=0) * means[:, None]
         errors[rows[1:-1]] = CONTACT_CALIBRATION[degree - 1] * means * np.sum(bends**2, axis=1)
     return errors
 

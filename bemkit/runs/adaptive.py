@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from bemkit.errors import BemkitError, InputError
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution, with_totals
 from bemkit.runs.density import DensityMeshes
@@ -52,7 +53,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     meshes: MeshSequence = (LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes)(options.accuracy)
     contact = [part.name for part in scene.contact_parts]
     first = options.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
-    level = Level(scene, first).at_level(0, first)
+    level = Level(scene, first)
     most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
     solutions: list[Solution] = []
     obstacle = ""
@@ -76,7 +77,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             obstacle = "the estimated error no longer falls"
         else:
             level = following
-            expected = _expected_seconds(solution, now - started, level)
+            expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)
             if _size(level) > most_elements:
                 obstacle = f"more than {most_elements} elements would be needed"
             elif options.most_seconds is not None and now - begin + expected > options.most_seconds:
@@ -90,9 +91,9 @@ def _size(level: Level) -> int:
     return len(level.partition.sides) * max(degree, 2) // 2
 
 
-def _expected_seconds(solution: Solution, spent: float, level: Level) -> float:
+def _expected_seconds(solution: Solution, spent: float, scene: Scene, mesh: BoundaryMesh) -> float:
     """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
-    return spent * make_plan(level.scene, level.partition.mesh).seconds / solution.plan.seconds
+    return spent * make_plan(scene, mesh).seconds / solution.plan.seconds
 
 
 def _ending(meshes: MeshSequence, solutions: list[Solution], obstacle: str) -> tuple[Solution, ...]:
@@ -105,10 +106,16 @@ def _ending(meshes: MeshSequence, solutions: list[Solution], obstacle: str) -> t
     if obstacle:
         accuracy = best.scene.mesh.accuracy
         message = (
-            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {meshes.error(best):.1e}; allow "
+            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {_errors(best)}; allow "
             f"more elements or time, or ask for less. {message}"
         )
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
     others = [solution for solution in solutions if solution is not best]
     return (*others, replace(with_totals(best, solutions, names), status=status, message=message))
+
+
+def _errors(solution: Solution) -> str:
+    energy, tractions = solution.estimated_error, solution.estimated_traction_error
+    of_energy = "unknown" if energy is None else f"{energy:.1e}"
+    return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"

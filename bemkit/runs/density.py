@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class DensityMeshes:
             cuts=zone_cuts(level.partition, solution),
             spread_over=[part.name for part in solution.scene.contact_parts],
         )
-        return level.at_level(level.number, partition)
+        return replace(level, partition=partition)
 
     def _next_size(self, solution: Solution) -> int:
         """Return the number of elements that the accuracy needs, or a step towards it."""

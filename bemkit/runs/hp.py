@@ -8,7 +8,7 @@ not profit from it are divided. A few meshes lead from a first look to six and m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,12 @@ from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
 
 SAFETY = 0.7
 """The next mesh is planned for this part of the error asked for."""
-LARGEST_STEP = 40.0
-"""Factor by which a mesh is to reduce the error: the places where the status changes must keep up."""
+FEWEST_LEVELS = 4
+"""Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
+GAIN = 6.0
+"""Factor by which a degree and the layers that come with it reduce the error."""
+LARGEST_RISE = 2
+"""Degrees from mesh to mesh: the places where the status changes must keep up."""
 MOST_LOOKS = 3
 """Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
 FASTEST = 0.05
@@ -57,9 +61,9 @@ class LayeredMeshes:
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
     def _is_stuck(self, solutions: Sequence[Solution]) -> bool:
-        """Tell whether the last two meshes have not halved the error of the best before them."""
-        errors = [self.error(solution) for solution in solutions]
-        return len(errors) > MOST_LOOKS + 1 and min(errors[-2:]) > 0.5 * min(errors[:-2])
+        """Tell whether the last two meshes have not halved the error of the best before them, all in layers."""
+        errors = [self.error(solution) for solution in solutions if solution.coefficient_errors is not None]
+        return len(errors) > FEWEST_LEVELS and min(errors[-2:]) > 0.5 * min(errors[:-2])
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return a mesh of the next degree, with more layers where that is not enough."""
@@ -71,22 +75,31 @@ class LayeredMeshes:
         cuts = zone_cuts(partition, solution)
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
-            return level.at_level(1, fresh)
-        number = level.number + has_same_pieces(partition, fresh)
+            return Level(level.asked, fresh, 1)
+        rise = self._rise(solution) if has_same_pieces(partition, fresh) else 0
+        following = Level(level.asked, fresh, level.number + rise)
         degree, next_degree = (
-            each.displacement_space(solution.mesh).degree
-            for each in (solution.scene.discretisation, level.scene.discretisation.at_level(number))
+            each.discretisation.displacement_space(solution.mesh).degree for each in (level.scene, following.scene)
         )
-        return level.at_level(number, refined_partition(partition, self._excess(solution, next_degree - degree), cuts))
+        excess = self._excess(solution, next_degree - degree)
+        return replace(following, partition=refined_partition(partition, excess, cuts))
+
+    def _rise(self, solution: Solution) -> int:
+        """Return how many degrees the error needs, up to the largest rise."""
+        needed = np.log(self.error(solution) / (SAFETY * self.accuracy)) / np.log(GAIN)
+        return int(np.clip(np.ceil(needed), 1, LARGEST_RISE))
 
     def _excess(self, solution: Solution, rise: int) -> FloatArray:
         """Return by which factor (n_elements,) the errors at a higher degree would be above equal shares."""
         errors = solution.coefficient_errors
         if errors is None:
-            raise InputError(f"{solution.scene.discretisation.method} has no error estimate: take another discretisation")
-        goal = max(SAFETY * self.accuracy, self.error(solution) / LARGEST_STEP)
+            raise InputError(
+                f"{solution.scene.discretisation.method} has no error estimate: take another discretisation"
+            )
+        goal = max(SAFETY * self.accuracy, self.error(solution) / GAIN**LARGEST_RISE)
         excess = np.sqrt(errors.energy * errors.energy.size / (2.0 * solution.energy))
-        if (elements := solution.contact_elements).size:
+        elements = solution.contact_elements
+        if solution.contact_traction_size > 0.0:
             share = solution.contact_traction_size**2 / elements.size
             excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / share))
         return excess / goal * np.clip(errors.decay, FASTEST, 1.0) ** rise

@@ -20,20 +20,20 @@ class Level:
 
     Parameters
     ----------
-    scene : Scene
-        With the discretisation of this mesh.
+    asked : Scene
     partition : Partition
     number : int
         Which of the discretisations that follow each other; see `Discretisation.at_level`.
     """
 
-    scene: Scene
+    asked: Scene
     partition: Partition
     number: int = 0
 
-    def at_level(self, number: int, partition: Partition) -> Level:
-        """Return a further level."""
-        return Level(replace(self.scene, discretisation=self.scene.discretisation.at_level(number)), partition, number)
+    @property
+    def scene(self) -> Scene:
+        """The scene with the discretisation of this level."""
+        return replace(self.asked, discretisation=self.asked.discretisation.at_level(self.number))
 
 
 class MeshSequence(Protocol):

@@ -10,14 +10,19 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LagrangeSpace, break_nodes, check_degree
+from bemkit.geometry.spaces import (
+    BoundarySpace,
+    LARGEST_DEGREE,
+    ConstantSpace,
+    LagrangeSpace,
+    break_nodes,
+    check_degree,
+)
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 
-_DEGREES = (2, 3, 5, 7, 9, 11, 12)
-"""Of the meshes that follow each other; the last one stays."""
 _LONGEST = 0.75
 """Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
 power of the length."""
@@ -68,7 +73,10 @@ class Discretisation(Protocol):
         return False
 
     def at_level(self, number: int) -> Discretisation:
-        """Return what to use on a mesh of those that follow an accuracy; `number` counts them, from 0."""
+        """Return what to use on a mesh of those that follow an accuracy; the first one has the `number` 0.
+
+        Where the number may be skipped, the discretisations should be ever better ones.
+        """
         return self
 
     @abstractmethod
@@ -219,8 +227,8 @@ class HpGalerkin(Galerkin):
         return True
 
     def at_level(self, number: int) -> Discretisation:
-        """Return the same with the degree of that mesh."""
-        return HpGalerkin(_DEGREES[min(number, len(_DEGREES) - 1)])
+        """Return the degree 2 for the first look, and a degree more for each number."""
+        return HpGalerkin(min(2 + number, LARGEST_DEGREE))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
+from typing import Any
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest, shorten
@@ -23,11 +24,21 @@ class Registry:
         Word to ``"module:Class"``; a module is imported when its word is first met.
     group : str
         Name of the entry-point group by which installed packages add classes; empty if there is none.
+    variants : mapping of (str, str, str) to str, optional
+        A word, a key and a value of that key that together name another word.
     """
 
     role: str
     built_in: Mapping[str, str] = field(repr=False)
     group: str = ""
+    variants: Mapping[tuple[str, str, str], str] = field(default_factory=dict, repr=False)
+
+    def without_variant(self, table: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a table whose kind is the word that its kind and another key name together."""
+        for (kind, key, value), word in self.variants.items():
+            if table.get("kind") == kind and table.get(key) == value:
+                return {name: item for name, item in table.items() if name != key} | {"kind": word}
+        return dict(table)
 
     def find(self, kind: str) -> type:
         """Return the class that a word names.
@@ -159,6 +170,7 @@ DISCRETISATIONS = Registry(
         }
     ),
     "bemkit.discretisations",
+    MappingProxyType({("galerkin", "degree", "hp"): "hp"}),
 )
 
 LINEAR_SOLVERS = Registry(

@@ -121,8 +121,8 @@ class Scene:
             self._check_accuracy(self.mesh.accuracy)
         elif self.discretisation.needs_accuracy:
             raise InputError(
-                f"discretisation is {self.discretisation}, whose degree rises until an accuracy is reached: give one, "
-                "such as MeshOptions(accuracy=1e-6), or a fixed degree"
+                "discretisation is 'hp', whose degree rises until an accuracy is reached: give mesh.accuracy, such as "
+                "1e-6, or a fixed degree"
             )
         names = [side.name for loop in self.shape.outline().loops for side in loop]
         for part in self.parts:

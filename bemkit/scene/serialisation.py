@@ -328,7 +328,7 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
     registry = cast(Registry, _registry(wanted))  # the hook is chosen by it
     if isinstance(value, str):
         value = {"kind": value}
-    table = _exactly(value, dict, f"a {registry.role} as a word or as a table with its kind")
+    table = registry.without_variant(_exactly(value, dict, f"a {registry.role} as a word or as a table with its kind"))
     if "kind" not in table:
         raise InputError(f"kind is missing: add kind = one of {', '.join(registry.built_in)}")
     with _at("kind"):

@@ -10,13 +10,13 @@ from dataclasses import fields, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
-from bemkit.scene.scene import Discretisation, Galerkin, Scene
+from bemkit.scene.scene import Discretisation, Galerkin, HpGalerkin, Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 
@@ -151,7 +151,7 @@ def with_overrides(
     elements: int | None = None,
     accuracy: float | None = None,
     discretisation: str | None = None,
-    degree: int | None = None,
+    degree: int | Literal["hp"] | None = None,
     solver: str | None = None,
     rho: float | None = None,
 ) -> Scene:
@@ -165,8 +165,8 @@ def with_overrides(
         Instead of a number of elements.
     discretisation, solver : str, optional
         Words as in scene files.
-    degree : int, optional
-        Of Galerkin elements, instead of a discretisation.
+    degree : int or "hp", optional
+        Of Galerkin elements, instead of a discretisation; "hp" rises until an accuracy is reached.
     rho : float, optional
         Penalty of the solver in units of E'/L; sets all penalties it has.
 
@@ -183,23 +183,24 @@ def with_overrides(
         raise SceneError(f"elements is {elements} and accuracy is {accuracy}: give one of them, the other follows")
     if degree is not None and discretisation is not None:
         raise SceneError(f"degree is {degree} and discretisation is {discretisation}: give one of them")
+    changes: dict[str, Any] = {}
     try:
         if elements is not None:
             options = MeshOptions() if scene.mesh.elements is None else scene.mesh
-            scene = replace(scene, mesh=replace(options, elements=elements))
-        if discretisation is not None:
-            scene = replace(scene, discretisation=structure(discretisation, cast(Any, Discretisation)))
-        if degree is not None:
-            scene = replace(scene, discretisation=Galerkin(degree))
+            changes["mesh"] = replace(options, elements=elements)
         if accuracy is not None:
-            scene = replace(scene, mesh=MeshOptions(accuracy=accuracy))
+            changes["mesh"] = MeshOptions(accuracy=accuracy)
+        if discretisation is not None:
+            changes["discretisation"] = structure(discretisation, cast(Any, Discretisation))
+        if degree is not None:
+            changes["discretisation"] = HpGalerkin() if degree == "hp" else Galerkin(degree)
         if solver is not None:
-            scene = replace(scene, solver=structure(solver, cast(Any, ContactSolver)))
+            changes["solver"] = structure(solver, cast(Any, ContactSolver))
         if rho is not None:
-            scene = replace(scene, solver=_with_rho(scene.solver, rho))
+            changes["solver"] = _with_rho(changes.get("solver", scene.solver), rho)
+        return replace(scene, **changes)
     except (StructureError, ValueError) as error:
         raise SceneError(printable(str(error))) from error
-    return scene
 
 
 def _with_rho(solver: Any, rho: float) -> Any:

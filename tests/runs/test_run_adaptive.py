@@ -229,5 +229,5 @@ def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     scene = paper(1, bk.LinearGalerkin(), bk.MeshOptions(elements=40))
     solution = bk.run(scene)
     finer = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=400)).build_mesh()
-    assert _expected_seconds(solution, 1.0, solution.mesh) == pytest.approx(1.0)
-    assert 2.0 < _expected_seconds(solution, 1.0, finer) < 100.0
+    assert _expected_seconds(solution, 1.0, scene, solution.mesh) == pytest.approx(1.0)
+    assert 2.0 < _expected_seconds(solution, 1.0, scene, finer) < 100.0
