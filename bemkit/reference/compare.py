@@ -15,11 +15,11 @@ from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
 from bemkit.results.solution import Solution
-from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.mesh_options import SMALLEST_ACCURACY, MeshOptions
 from bemkit.scene.scene import Contact, QuadraticGalerkin, Scene
 
-FINEST = 1e-12
-"""An accuracy that no mesh reaches, so that the number of elements alone ends the search."""
+FINEST = SMALLEST_ACCURACY
+"""An accuracy that no mesh of quadratic elements reaches, so that the number of elements alone ends the search."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 CORNERS = Algebraic(3.0)
 """Grading where meshes cannot follow the solution."""

@@ -61,7 +61,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         started = time.perf_counter()
         start = solutions[-1] if solutions and contact else None
         try:
-            solution = run_on_mesh(level.scene, level.partition.mesh, start, callback)
+            solution = _solved(level, start, callback)
         except BemkitError as error:
             if not solutions:
                 raise
@@ -83,6 +83,14 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             elif options.most_seconds is not None and now - begin + expected > options.most_seconds:
                 obstacle = f"more than {options.most_seconds:g} s would be needed"
     return _ending(meshes, solutions, obstacle)
+
+
+def _solved(level: Level, start: Solution | None, callback: Callable[[StepRecord], None] | None) -> Solution:
+    """Solve a scene from the solution before, and if that leads nowhere from the beginning."""
+    solution = run_on_mesh(level.scene, level.partition.mesh, start, callback)
+    if start is None or solution.is_converged:
+        return solution
+    return run_on_mesh(level.scene, level.partition.mesh, None, callback)
 
 
 def _size(level: Level) -> int:

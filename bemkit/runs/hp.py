@@ -67,9 +67,9 @@ class LayeredMeshes:
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return a mesh of the next degree, with more layers where that is not enough."""
-        if self._is_stuck(solutions):
-            return None
         solution, partition = solutions[-1], level.partition
+        if self._is_stuck(solutions) or (level.number > 0 and solution.estimated_error is None):
+            return None
         if level.number == 0 and len(solutions) < MOST_LOOKS and len(zone_ends(solution)) < len(solution.transitions):
             return DensityMeshes(self.accuracy).following(level, solutions)
         cuts = zone_cuts(partition, solution)

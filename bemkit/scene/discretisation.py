@@ -11,8 +11,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import (
-    BoundarySpace,
     LARGEST_DEGREE,
+    BoundarySpace,
     ConstantSpace,
     LagrangeSpace,
     break_nodes,

@@ -18,6 +18,8 @@ DEFAULT_ELEMENTS = 320
 """Elements where neither a number nor an accuracy is given."""
 FIRST_ELEMENTS = 40
 """About the size of the first mesh where the accuracy decides."""
+SMALLEST_ACCURACY = 1e-10
+"""What double precision holds of a solution."""
 MOST_ELEMENTS = 1500
 """Where the search for an accuracy ends unless another number is given."""
 
@@ -36,11 +38,13 @@ class MeshOptions:
     density : mapping of str to float
         How densely sides are divided compared with the others, by the name of the side; 1 where left out.
     accuracy : float, optional
-        Wanted error in the energy norm relative to the solution, instead of a number of elements. Meshes then follow
-        the solution: see `bemkit.runs.adaptive.run_adaptive`.
+        Wanted error relative to the solution, instead of a number of elements, at least 1e-10: in the energy norm, and
+        of degree 3 and more (or rising) of contact tractions in L2, too. Meshes then follow the solution: see
+        `bemkit.runs.adaptive.run_adaptive`.
     most_elements : int, optional
-        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Of a scene with
-        a symmetry these are the elements with unknowns.
+        No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Elements of high
+        degree count as the quadratic ones with as many nodes. Of a scene with a symmetry these are the elements with
+        unknowns.
     most_seconds : float, optional [s]
         No mesh is begun that would take longer, all meshes counted; no limit if left out.
 
@@ -69,6 +73,11 @@ class MeshOptions:
             raise InputError(f"accuracy is {self.accuracy}: leave out grading and density, they follow the solution")
         if not 0.0 < self.accuracy < 1.0:
             raise InputError(f"accuracy is {self.accuracy}: give a relative error between 0 and 1, such as 1e-3")
+        if self.accuracy < SMALLEST_ACCURACY:
+            raise InputError(
+                f"accuracy is {self.accuracy}: round-off leaves about ten digits of a solution: give at least "
+                f"{SMALLEST_ACCURACY:g}"
+            )
         if self.most_elements is not None and not FIRST_ELEMENTS <= self.most_elements <= 1_000_000:
             raise InputError(f"most_elements is {self.most_elements}: give a number from {FIRST_ELEMENTS} to 1000000")
         if self.most_seconds is not None and not self.most_seconds > 0.0:

@@ -195,8 +195,6 @@ def test_scenes_name_a_degree() -> None:
         scene_from_toml(text.replace("degree = 4", "degree = 13"))
     with pytest.raises(SceneError, match="degree is 4 and discretisation is linear: give one of them"):
         with_overrides(scene, degree=4, discretisation="linear")
-    with pytest.raises(SceneError, match=r"accuracy is 0\.001: Galerkin of degree 4 has no error estimate"):
-        with_overrides(scene, accuracy=1e-3)
     with pytest.raises(SceneError, match="degree is 0: give a whole number from 1 to 12"):
         with_overrides(scene, degree=0)
 

@@ -1,0 +1,219 @@
+"""Degrees that rise from mesh to mesh, in geometric layers, until an accuracy is reached."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.errors import InputError
+from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.meshing.layers import FACTOR, STEEPEST, layered_partition, refined_partition
+from bemkit.reference import answer_of, errors_of, find_reference
+from bemkit.runs.adaptive import run_adaptive
+from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, with_overrides
+from tests.scenes import true_error
+
+EXAMPLES = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates")
+
+
+@lru_cache
+def risen(name: str, accuracy: float, degree: int | None = None) -> tuple[bk.Solution, ...]:
+    discretisation = bk.HpGalerkin() if degree is None else bk.Galerkin(degree)
+    mesh = bk.MeshOptions(accuracy=accuracy)
+    return run_adaptive(dataclasses.replace(bk.load_scene(name), discretisation=discretisation, mesh=mesh))
+
+
+def degree_of(solution: bk.Solution) -> int:
+    return solution.scene.discretisation.displacement_space(solution.mesh).degree
+
+
+def traction_error(solution: bk.Solution) -> float:
+    """Return the relative error in L2 of both contact tractions against the reference."""
+    reference = find_reference(solution.scene)
+    assert reference is not None
+    weight = np.concatenate([places.weight for places in reference.places])
+    mine, exact = answer_of(solution, reference.places), reference.answer
+    miss = (mine.sigma_n - exact.sigma_n) ** 2 + (mine.sigma_t - exact.sigma_t) ** 2
+    return float(np.sqrt(weight @ miss / (weight @ (exact.sigma_n**2 + exact.sigma_t**2))))
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_few_meshes_lead_to_five_digits(name: str) -> None:
+    """Asked for 3e-5; the references are good to 1e-7 and better."""
+    solutions = risen(name, 3e-5)
+    last = solutions[-1]
+    reference = find_reference(last.scene)
+    assert reference is not None
+    assert last.is_converged
+    assert len(solutions) <= 5
+    assert last.mesh.n_elements <= 100
+    assert last.certificate.worst <= 1e-9
+    errors = errors_of(answer_of(last, reference.places), reference)
+    assert traction_error(last) <= 3e-5
+    assert errors["energy"] <= 1e-7
+    assert errors["transitions"] <= 3e-5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*EXAMPLES, "clamped-angle"])
+def test_six_digits_from_scratch(name: str) -> None:
+    """The logarithm of the error falls at least like -0.4 sqrt(unknowns): exponential convergence."""
+    solutions = risen(name, 1e-6)
+    assert solutions[-1].is_converged
+    layered = [solution for solution in solutions if degree_of(solution) > 2]
+    roots = [np.sqrt(solution.mesh.n_elements * degree_of(solution)) for solution in layered]
+    errors = [solution.estimated_traction_error for solution in layered]
+    slope = np.polyfit(roots, np.log(np.array(errors, float)), 1)[0]
+    assert -1.5 < slope < -0.4
+    if name != "clamped-angle":  # without a reference
+        assert traction_error(solutions[-1]) <= 1e-6
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_estimates_are_near_the_errors(name: str) -> None:
+    """Of contact tractions at every degree from 3 on; of the energy where the bisected mesh is not too large."""
+    for solution in risen(name, 3e-5):
+        if degree_of(solution) > 2:
+            assert solution.estimated_traction_error is not None
+            # on one mesh of Example 1 the estimate is 2.9 times the error, elsewhere up to twice
+            assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 3.0
+    solution = next(each for each in risen(name, 3e-5) if degree_of(each) == 5)
+    assert solution.estimated_error is not None
+    assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_low_degrees_estimate_contact_tractions(name: str, degree: int) -> None:
+    """On uniform meshes nearly all of the error lies where the status changes."""
+    mesh = bk.MeshOptions(elements=80)
+    solution = bk.run(dataclasses.replace(bk.load_scene(name), discretisation=bk.Galerkin(degree), mesh=mesh))
+    assert solution.estimated_traction_error is not None
+    assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 3.0
+
+
+def test_collocation_estimates_no_tractions() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40)))
+    assert solution.estimated_traction_error is None
+    assert solution.summary()["estimated_traction_error"] is None
+
+
+def test_pieces_end_where_the_status_changes() -> None:
+    before, solution = risen("paper-1", 3e-5)[-2:]
+    for transition in before.transitions:
+        distance = np.hypot(*(solution.mesh.nodes - [transition.x, transition.y]).T)
+        assert distance.min() < 1e-12
+
+
+def test_later_meshes_start_near_their_solution() -> None:
+    *_, before, last = risen("paper-1", 3e-5)
+    own_solves = last.linear_solves - sum(each.linear_solves for each in risen("paper-1", 3e-5)[:-1])
+    assert own_solves <= 4
+    assert before.linear_solves <= 4
+
+
+def test_a_fixed_degree_takes_layers_alone() -> None:
+    first, *later = risen("wavy-obstacle", 1e-3, degree=4)
+    assert degree_of(first) == 2
+    assert {degree_of(solution) for solution in later} == {4}
+    assert later[-1].is_converged
+    assert traction_error(later[-1]) <= 1e-3
+    assert later[-1].scene.discretisation == bk.Galerkin(4)
+
+
+def test_what_is_smooth_takes_one_mesh() -> None:
+    scene = bk.load_scene("bending")
+    solutions = run_adaptive(
+        dataclasses.replace(scene, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-10))
+    )
+    assert len(solutions) == 1
+    assert solutions[0].is_converged
+
+
+def test_high_degrees_on_wholes_agree_with_low_ones_on_halves() -> None:
+    """Example 1 on one graded mesh of quartic elements, and of quadratic ones half as long: to their estimates."""
+    scene = bk.load_scene("paper-1")
+    mesh = risen("paper-1", 3e-5)[1].mesh
+    halves = mesh.refined(np.arange(mesh.n_elements))
+    quartic = bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(4)), mesh=mesh)
+    quadratic = bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(2)), mesh=halves)
+    assert quartic.estimated_error is not None
+    assert quadratic.estimated_error is not None
+    squared = quartic.estimated_error**2 + quadratic.estimated_error**2
+    assert abs(quartic.energy / quadratic.energy - 1.0) <= squared
+    assert quartic.estimated_error < quadratic.estimated_error
+
+
+def test_layers_stand_at_ends_and_not_on_symmetry_lines() -> None:
+    whole = divide(bk.Rectangle(2.0, 1.0).outline(), {})
+    lengths = layered_partition(whole, {}).mesh.lengths
+    np.testing.assert_allclose(lengths[:4], 2.0 * np.array([0.5 * FACTOR, 0.5 - 0.5 * FACTOR] * 2)[[0, 1, 3, 2]])
+    half = layered_partition(whole.half(bk.Symmetry(x=1.0)), {})
+    # the halves of bottom and top have one layer, at their corner
+    assert sorted(len(s) - 1 for s in half.parameters) == [3, 3, 4]
+
+
+def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
+    base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
+    old = layered_partition(base, {})
+    excess = np.zeros(len(old.sides))
+    excess[0], excess[1] = FACTOR**-1.5, 1.5  # two layers more, and a half
+    fine = refined_partition(old, excess, {})
+    start, first = old.parameters[0][:2]
+    expected = [start, *(first * FACTOR ** np.array([2.0, 1.0])), first, 0.5 * (first + 0.5)]
+    np.testing.assert_allclose(fine.parameters[0][:5], expected, rtol=1e-12)
+    # the side around the corner has followed
+    ratio = (fine.mesh.lengths / np.roll(fine.mesh.lengths, 1))[np.cumsum([0, *map(len, fine.parameters[:-1])]) - 1]
+    assert max(ratio.max(), 1.0 / ratio.min()) <= STEEPEST * (1.0 + 1e-9)
+
+
+def test_pieces_move_with_the_places_of_the_changes() -> None:
+    base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
+    old = layered_partition(base, {0: [0.3]})
+    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]})
+    np.testing.assert_allclose(moved.parameters[0], old.parameters[0] * 0.35 / 0.3, rtol=1e-12)
+    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]})
+    np.testing.assert_allclose(anew.parameters[1], layered_partition(base, {0: [0.35, 0.6]}).parameters[1])
+
+
+def test_curves_turn_little_on_an_element() -> None:
+    mesh = layered_partition(divide(bk.Disk(1.0).outline(), {}), {}).mesh
+    assert mesh.lengths.max() <= np.pi / 4.0 + 1e-12
+
+
+def test_words_for_rising_degrees() -> None:
+    scene = with_overrides(bk.load_scene("paper-1"), degree="hp", accuracy=1e-6)
+    assert scene.discretisation == bk.HpGalerkin()
+    text = scene_to_toml(scene)
+    assert 'discretisation = "hp"' in text
+    assert scene_from_toml(text) == scene
+    longer = text.replace('discretisation = "hp"', 'discretisation = { kind = "galerkin", degree = "hp" }')
+    assert scene_from_toml(longer) == scene
+    assert with_overrides(bk.load_scene("paper-1"), discretisation="hp", accuracy=1e-6) == scene
+
+
+def test_rising_degrees_need_an_accuracy() -> None:
+    with pytest.raises(SceneError, match=r"discretisation is .hp., whose degree rises .*: give mesh\.accuracy"):
+        with_overrides(bk.load_scene("paper-1"), degree="hp")
+
+
+def test_an_accuracy_beyond_round_off_is_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"accuracy is 1e-13: round-off leaves about ten digits .*: give at least 1e-10"
+    ):
+        bk.MeshOptions(accuracy=1e-13)
+
+
+def test_budgets_are_kept() -> None:
+    scene = dataclasses.replace(
+        bk.load_scene("paper-1"), discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-8, most_elements=100)
+    )
+    last = bk.run(scene)
+    assert last.status is bk.Status.ACCURACY_NOT_REACHED
+    assert "more than 100 elements would be needed; estimated error" in last.message
+    assert ", of contact tractions" in last.message
+    assert last.mesh.n_elements * degree_of(last) <= 200
