@@ -16,10 +16,10 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
 from bemkit.results.solution import Solution
 from bemkit.scene.mesh_options import SMALLEST_ACCURACY, MeshOptions
-from bemkit.scene.scene import Contact, QuadraticGalerkin, Scene
+from bemkit.scene.scene import Contact, HpGalerkin, QuadraticGalerkin, Scene
 
 FINEST = SMALLEST_ACCURACY
-"""An accuracy that no mesh of quadratic elements reaches, so that the number of elements alone ends the search."""
+"""The accuracy asked for, so that the number of elements ends the search."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 CORNERS = Algebraic(3.0)
 """Grading where meshes cannot follow the solution."""
@@ -73,24 +73,25 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
     Returns
     -------
     Reference
-        Of quadratic elements on the last of a sequence of adaptive meshes (of a load history, on a mesh graded towards
-        corners and ends of parts). Its own errors are those of the mesh before, and so on the safe side.
+        Of elements of rising degree on the last of a sequence of meshes in layers (of a load history, of quadratic
+        elements on a mesh graded towards corners and ends of parts). Its own errors are those of the mesh before, and
+        so on the safe side.
 
     Raises
     ------
     OverResolutionError
         If there are no two converged solutions.
     """
-    scene = replace(scene, discretisation=QuadraticGalerkin())
-    solutions = _fine_solutions(scene, most_elements)
-    solutions = sorted((s for s in solutions if s.is_certified), key=lambda s: s.mesh.n_elements)
+    solutions = sorted((s for s in _fine_solutions(scene, most_elements) if s.is_certified), key=_n_points)
     if len(solutions) < 2:
         raise OverResolutionError(
             f"no two converged solutions with up to {most_elements} quadratic elements: give more, or another scene"
         )
     before, finest = solutions[-2:]
     places = tuple(_gauss_places(finest, part.name) for part in scene.contact_parts)
-    source = f"{finest.mesh.n_elements} quadratic elements, estimated error {finest.estimated_error or 0.0:.1e}"
+    degree = finest.scene.discretisation.displacement_space(finest.mesh).degree
+    elements = f"{finest.mesh.n_elements} elements of degree {degree}"
+    source = f"{elements}, estimated error {finest.estimated_error or 0.0:.1e}"
     reference = Reference(f"over-resolved: {source}", places, answer_of(finest, places))
     return replace(reference, own_errors=errors_of(answer_of(before, places), reference))
 
@@ -100,9 +101,14 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
     from bemkit.runs.run import run
 
     if len(scene.load_factors) == 1:
-        return list(run_adaptive(replace(scene, mesh=MeshOptions(accuracy=FINEST, most_elements=most_elements))))
-    counts = (most_elements // 2, most_elements)
+        options = MeshOptions(accuracy=FINEST, most_elements=most_elements)
+        return list(run_adaptive(replace(scene, discretisation=HpGalerkin(), mesh=options)))
+    scene, counts = replace(scene, discretisation=QuadraticGalerkin()), (most_elements // 2, most_elements)
     return [run(replace(scene, mesh=MeshOptions(elements=n, grading=CORNERS))) for n in counts]
+
+
+def _n_points(solution: Solution) -> int:
+    return len(solution.boundary.points)
 
 
 def _laws(scene: Scene) -> list[FrictionLaw]:

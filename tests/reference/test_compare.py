@@ -104,7 +104,7 @@ def test_a_reference_belongs_to_its_problem_alone() -> None:
 def test_a_fine_solution_knows_how_wrong_it_is() -> None:
     exact = known("paper-1")
     fine = over_resolved(bk.load_scene("paper-1"), 200)
-    assert "quadratic elements, estimated error" in fine.source
+    assert "elements of degree 5, estimated error" in fine.source
     assert abs(fine.answer.energy / exact.answer.energy - 1.0) <= fine.own_errors["energy"] + exact.own_errors["energy"]
     at_exact = errors_of(fine.answer, fine)
     assert all(value == 0.0 for value in at_exact.values())
@@ -116,7 +116,7 @@ def test_a_fine_solution_knows_how_wrong_it_is() -> None:
 def test_a_load_history_is_over_resolved_on_given_meshes() -> None:
     scene = dataclasses.replace(bk.load_scene("paper-2"), load_factors=(0.5, 1.0))
     fine = over_resolved(scene, 80)
-    assert "80 quadratic elements" in fine.source
+    assert "80 elements of degree 2" in fine.source
     assert 0.0 < fine.own_errors["sigma_n"] < 0.1
 
 
