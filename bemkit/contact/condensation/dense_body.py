@@ -266,20 +266,24 @@ class DenseBody(LinearBody):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         wanted = np.flatnonzero(~is_given)
         node, component = np.divmod(self.unknown_dofs[wanted], 2)
-        position = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
-        position.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
-        matrix = np.zeros((wanted.size, self.n_unknowns))
+        number = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
+        number.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
+        position = np.cumsum(~is_given) - 1  # of each unknown among the wanted ones
+        forces = self.stiffness[:, is_given] @ unknowns[is_given] - self.load
         right_side = conditions.value[node, component]
-        for of in (0, 1):
-            row = np.flatnonzero(position[node, of] >= 0)
-            column, own = position[node[row], of], (node[row], component[row], of)
-            factor = conditions.on_traction[own] / self.weights[node[row]]
-            acts = factor != 0.0
-            matrix[row[acts]] += factor[acts, None] * self.stiffness[column[acts]]
-            matrix[row, column] += conditions.on_displacement[own]
-            right_side[row] += factor * self.load[column]
-        right_side -= matrix[:, is_given] @ unknowns[is_given]
-        matrix = matrix[:, wanted]
+        matrix = np.zeros((wanted.size, wanted.size))
+        for of in (component, 1 - component):
+            on_displacement, on_traction = (
+                matrices[node, component, of] for matrices in (conditions.on_displacement, conditions.on_traction)
+            )
+            row = np.flatnonzero((number[node, of] >= 0) & ((on_displacement != 0.0) | (on_traction != 0.0)))
+            column, factor = number[node[row], of[row]], (on_traction / self.weights[node])[row]
+            block = self.stiffness[np.ix_(column, wanted)]
+            block *= factor[:, None]
+            inside = np.flatnonzero(~is_given[column])
+            block[inside, position[column[inside]]] += on_displacement[row[inside]]
+            matrix[row] += block
+            right_side[row] -= factor * forces[column] + on_displacement[row] * np.where(is_given, unknowns, 0.0)[column]
 
         row_size = np.abs(matrix).max(axis=1)
         if not row_size.all():
