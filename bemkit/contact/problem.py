@@ -58,7 +58,7 @@ class ContactProblem:
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             read_only(array)
             object.__setattr__(self, name, array)
-        self.friction_bound(np.zeros(n_contact))
+        _ = self.cohesion  # a law that fails does so at once
 
     @property
     def n_contact(self) -> int:
@@ -100,6 +100,11 @@ class ContactProblem:
         if "sticking_state" in self.__dict__:  # it does not depend on the law
             other.__dict__["sticking_state"] = self.sticking_state
         return other
+
+    @cached_property
+    def cohesion(self) -> FloatArray:
+        """(n_contact,) array [Pa]: the friction bound without pressure."""
+        return self.friction_bound(np.zeros(self.n_contact))
 
     def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
         """Return the bound of the tangential traction at every node.

@@ -99,7 +99,7 @@ def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArr
     (n_log, n_double), extra_points = degrees.n_trial, degrees.extra_points
     sums = np.zeros((outer.size, 3 * n_log + 2 * n_double, max(n_log, n_double)))
     level = gauss_levels(panels, outer, inner)
-    for is_curved in (False, True):
+    for is_curved in np.unique(~panels.is_straight[inner]).tolist():
         is_kind = panels.is_straight[inner] != is_curved
         for number, (n_points, _) in enumerate(GAUSS_LEVELS):
             item = np.flatnonzero(is_kind & (level == number))

@@ -29,6 +29,12 @@ class Degrees:
         return 0 if self.log is None else self.log[1] + 1, 0 if self.double is None else self.double[1] + 1
 
     @property
+    def n_products(self) -> int:
+        """How many products of polynomials on the two elements the larger family has."""
+        families = [family for family in (self.log, self.double) if family]
+        return max(((test + 1) * (trial + 1) for test, trial in families), default=1)
+
+    @property
     def either_way(self) -> Degrees:
         """The same with test and trial elements exchanged, too."""
         log, double = (family and (max(family),) * 2 for family in (self.log, self.double))

@@ -39,7 +39,9 @@ from bemkit.operators.integrals.panels import Panels, squared_distance
 DENSE_DISTANCE = 45.0
 """Pairs closer than this, in half lengths of the trial element, leave the dense sweep."""
 CHUNK_PAIRS = 32768
-"""Pairs treated at once: a few complex arrays of this length stay in the cache."""
+"""Pairs treated at once, at most: a few complex arrays of this length stay in the cache."""
+CHUNK_INTEGRALS = 65536
+"""Integrals of one kind treated at once, at most: those of all polynomials."""
 LISTED_COST = 2.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""
 
@@ -68,7 +70,8 @@ class PairSweep:
         self.degrees = degrees
         self.test = everything if test_elements is None else test_elements
         self.trial = everything if trial_elements is None else trial_elements
-        self.rows_per_chunk = max(1, CHUNK_PAIRS // max(1, self.trial.size))
+        n_pairs = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products)
+        self.rows_per_chunk = max(1, n_pairs // max(1, self.trial.size))
         level, is_close = self._classify()
         self.base = _cheapest_level(np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1))
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
