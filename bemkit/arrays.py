@@ -24,11 +24,14 @@ Run: TypeAlias = tuple[slice, slice | IntArray]
 def consecutive_runs(indices: IntArray) -> list[Run]:
     """Cut indices into runs of consecutive numbers: pairs (positions, indices) of slices, which index without copies.
 
-    A list in no particular order is one run whose indices are an array.
+    A list that ascends by equal steps is one run. A list in no particular order is one, too, whose indices are an array.
     """
     if not indices.size:
         return []
-    breaks = np.flatnonzero(np.diff(indices) != 1) + 1
+    steps = np.diff(indices)
+    if steps.size and steps[0] > 1 and (steps == steps[0]).all():
+        return [(slice(0, indices.size), slice(int(indices[0]), int(indices[-1]) + 1, int(steps[0])))]
+    breaks = np.flatnonzero(steps != 1) + 1
     if breaks.size > 8:
         return [(slice(0, indices.size), indices)]
     edges = [0, *breaks.tolist(), indices.size]

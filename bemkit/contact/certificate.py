@@ -1,6 +1,6 @@
 """The certificate: how well a state satisfies contact and friction, in numbers anyone can check."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +63,7 @@ class Certificate:
 
     def as_dict(self) -> dict[str, float]:
         """Return all numbers by name."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 def certify(problem: ContactProblem, state: ContactState) -> Certificate:
@@ -129,7 +129,7 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     modulus = problem.body.stiffness_scale * float(np.median(weights))
     furthest = float(np.abs(state.displacement).max())
     # friction without pressure is a traction to be met as well, however small beside those of the sticking state
-    resisted = problem.friction_bound(np.zeros(problem.n_contact))
+    resisted = problem.cohesion
     present, sticking = (np.abs(held.traction).max(axis=1) for held in (state, problem.sticking_state))
     at_hand = np.maximum(present, resisted)
     if at_hand.max() > _ROUND_OFF * sticking.max() and max(present.max(), sticking.max()) > 0.0:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class PartwiseLaw(FrictionLaw):
         """Whether all the laws are."""
         return all(law.is_frictionless for law in self.laws)
 
-    @property
+    @cached_property
     def acts_across_gap(self) -> BoolArray:
         """(n_contact,) bool array: what the law of each node says."""
         values = [np.broadcast_to(law.acts_across_gap, nodes.shape) for law, nodes in self._pairs]

@@ -58,7 +58,7 @@ class ContactProblem:
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
             read_only(array)
             object.__setattr__(self, name, array)
-        self.friction_bound(np.zeros(n_contact))
+        _ = self.cohesion  # a law that fails does so at once
 
     @property
     def n_contact(self) -> int:
@@ -100,6 +100,11 @@ class ContactProblem:
         if "sticking_state" in self.__dict__:  # it does not depend on the law
             other.__dict__["sticking_state"] = self.sticking_state
         return other
+
+    @cached_property
+    def cohesion(self) -> FloatArray:
+        """(n_contact,) array [Pa]: the friction bound without pressure."""
+        return self.friction_bound(np.zeros(self.n_contact))
 
     def friction_bound(self, sigma_n: FloatArray, is_closed: BoolArray | None = None) -> FloatArray:
         """Return the bound of the tangential traction at every node.
@@ -145,18 +150,22 @@ class ContactProblem:
         return np.where(is_closed | np.asarray(self.law.acts_across_gap), values, 0.0)
 
     def _ask_law(self, method: str, sigma_n: FloatArray) -> FloatArray:
-        name = f"friction law {law_name(self.law)}.{method}"
         try:
             values = np.asarray(getattr(self.law, method)(sigma_n), dtype=float)
         except Exception as error:  # whatever an own law raises must surface with the law's name
-            raise LawError(f"{name} failed: {type(error).__name__}: {error}") from error
+            raise LawError(f"{self._name(method)} failed: {type(error).__name__}: {error}") from error
         if values.shape != sigma_n.shape:
-            raise LawError(f"{name} returned the shape {values.shape} for {sigma_n.shape}; give one value a node")
+            shapes = f"the shape {values.shape} for {sigma_n.shape}"
+            raise LawError(f"{self._name(method)} returned {shapes}; give one value a node")
         # A state that is not finite is the driver's to report; finite tractions must give finite bounds.
         if not np.isfinite(values).all() and np.isfinite(sigma_n).all():
             node = int(np.argmin(np.isfinite(values)))
-            raise LawError(f"{name} is {values[node]} at contact node {node} (sigma_n = {sigma_n[node]:g})")
+            at = f"at contact node {node} (sigma_n = {sigma_n[node]:g})"
+            raise LawError(f"{self._name(method)} is {values[node]} {at}")
         return values
+
+    def _name(self, method: str) -> str:
+        return f"friction law {law_name(self.law)}.{method}"
 
 
 def _check_members(body: LinearBody, law: FrictionLaw) -> None:

@@ -123,7 +123,7 @@ def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, Float
     """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
     none = np.zeros(problem.n_contact)
     pressure = float(np.abs(problem.sticking_state.traction).max()) or 1.0
-    cohesion = problem.friction_bound(none)
+    cohesion = problem.cohesion
     slopes = [-problem.friction_slope(none)]
     for factor in 10.0 ** np.arange(-6, 7):
         slopes.append((problem.friction_bound(none - factor * pressure) - cohesion) / (factor * pressure))

@@ -273,7 +273,8 @@ class BoundaryMesh:
         derivative = self._on_curves(elements, xi, derivative_on, straight)
         # the chain rule: half the span of the parameter for xi from -1 to 1
         is_curved = ~self.is_straight[elements]
-        derivative[is_curved] *= 0.5 * np.diff(self._span[elements][is_curved], axis=1)[:, :, None]
+        if is_curved.any():
+            derivative[is_curved] *= 0.5 * np.diff(self._span[elements][is_curved], axis=1)[:, :, None]
         return derivative
 
     def jacobian(self, elements: IntArray, xi: FloatArray) -> FloatArray:

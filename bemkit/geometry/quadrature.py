@@ -52,12 +52,12 @@ def gauss_lobatto(degree: int) -> FloatArray:
 
 @lru_cache(maxsize=64)
 def gauss_graded(n_points: int) -> tuple[FloatArray, FloatArray]:
-    """Return a rule on [0, 1] for functions like u log(u), singular at 0.
+    """Return a rule on [0, 1] for functions like log(u), singular at 0.
 
     Parameters
     ----------
     n_points : int
-        Number of points: those of Gauss, mapped by u = v**4, which makes u**a log(u) as smooth as v**(4 a + 3) log(v).
+        Number of points: those of Gauss, mapped by u = v**6, which makes u**a log(u) as smooth as v**(6 a + 5) log(v).
 
     Returns
     -------
@@ -66,8 +66,8 @@ def gauss_graded(n_points: int) -> tuple[FloatArray, FloatArray]:
     """
     reference, reference_weights = gauss_legendre(n_points)
     v = 0.5 * (reference + 1.0)
-    points = v**4
-    weights = 2.0 * reference_weights * v**3
+    points = v**6
+    weights = 3.0 * reference_weights * v**5
     read_only(points)
     read_only(weights)
     return points, weights

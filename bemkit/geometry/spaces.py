@@ -60,7 +60,7 @@ def local_coefficients(space: BoundarySpace) -> FloatArray:
         Row p holds the coefficients of P_0 ... P_degree of the local basis function p.
     """
     n = space.degree + 1
-    xi, weights = np.polynomial.legendre.leggauss(n)
+    xi, weights = gauss_legendre(n)
     polynomials = np.polynomial.legendre.legvander(xi, space.degree)
     coefficients: FloatArray = (space.basis(xi) * weights) @ polynomials * (np.arange(n) + 0.5)
     coefficients[np.abs(coefficients) < 1e-14] = 0.0  # round-off; keeps sums free of empty terms

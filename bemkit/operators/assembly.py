@@ -23,7 +23,6 @@ from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators import kernels
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
@@ -31,7 +30,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
-"""The xx, xy, yx, yy entries, each (n_rows, n_trial); None is zero."""
+"""The xx, xy, yx, yy entries, each (n_test_polynomials, n_trial_polynomials, n_rows, n_trial); None is zero."""
 
 
 class Block:
@@ -45,10 +44,10 @@ class Block:
         self.trial_half = trial_half[None, :]
         self.log_scale = log_scale
 
-    def mass(self, a: int, b: int) -> FloatArray:
-        """Return the integrals of P_a(xi) P_b(t) themselves, (n_rows, n_trial)."""
-        constant = kernels.interval_moment(a) * kernels.interval_moment(b)
-        return constant * (self.test_half * self.trial_half)
+    @property
+    def measure(self) -> FloatArray:
+        """The products of the lengths, (n_rows, n_trial): the integrals of P_0(xi) P_0(t) themselves."""
+        return (4.0 * self.test_half) * self.trial_half
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +59,11 @@ class TrialTerm:
     coefficients : (n_local, n_polynomials) array
         Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
     tensor : callable
-        (block, a, b) -> the 2 x 2 tensor of integrals of P_a (test) and P_b (trial).
+        (block, a, b) -> the 2 x 2 tensor of integrals of some P_a (test) and P_b (trial), slices of the degrees.
     """
 
     coefficients: FloatArray
-    tensor: Callable[[Block, int, int], Tensor]
+    tensor: Callable[[Block, slice, slice], Tensor]
 
 
 class Tag(enum.Enum):
@@ -187,9 +186,9 @@ def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: 
     def fill(rows: slice) -> int:
         block = Block(sweep.chunk(rows), test_half[rows], trial_half, log_scale)
         for target in targets:
-            for a, gathered in target.gather(block):
-                with lock:  # two chunks share the rows of the node between them
-                    target.add(rows, a, gathered)
+            gathered = target.gather(block)
+            with lock:  # two chunks share the rows of the node between them
+                target.add(rows, gathered)
         return block.test_half.size * block.trial_half.size
 
     n_pairs = for_each_chunk(fill, sweep.row_slices(), n_pairs=sweep.test.size * sweep.trial.size)
@@ -226,36 +225,36 @@ class _Target:
             self.matrix[:, :, antisymmetric_dofs(self._form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
-    def gather(self, block: Block) -> list[tuple[int, list[FloatArray]]]:
-        """Return, for each degree a on the test elements, the four components by element row and trial dof."""
-        n_rows = block.test_half.shape[0]
-        result = []
-        for a in range(self.test_coefficients.shape[1]):
-            buffers = [np.zeros((n_rows, self.trial_nodes.size)) for _ in range(4)]
-            for term in self.terms:
-                for b in np.flatnonzero(np.any(term.coefficients != 0.0, axis=0)).tolist():
-                    for index, values in enumerate(term.tensor(block, a, b)):
-                        if values is not None:
-                            self._add_columns(buffers[index], values, term.coefficients[:, b], index % 2)
-            result.append((a, buffers))
-        return result
+    def gather(self, block: Block) -> FloatArray:
+        """Return the rows of elements, (n_local, n_rows, 2, n_trial_nodes, 2), by dof of the test element and trial dof."""
+        n_rows, test = block.test_half.shape[0], self.test_coefficients
+        gathered = np.zeros((test.shape[1], n_rows, 2, self.trial_nodes.size, 2))
+        for term in self.terms:
+            degrees = slice(test.shape[1]), slice(term.coefficients.shape[1])
+            for index, values in enumerate(term.tensor(block, *degrees)):
+                if values is not None:
+                    component = index % 2
+                    self._add_columns(gathered[:, :, index // 2, :, component], values, term.coefficients, component)
+        return _combined(test, gathered)
 
-    def _add_columns(self, buffer: FloatArray, values: FloatArray, coefficients: FloatArray, component: int) -> None:
+    def _add_columns(self, target: FloatArray, values: FloatArray, coefficients: FloatArray, component: int) -> None:
+        """Add (n_test_polynomials, n_polynomials, n_rows, n_trial) values to the columns of the trial dofs."""
+        local = _combined(coefficients, values.swapaxes(0, 1))
         for elements, signs, columns in self.images:
-            own = values[:, elements]
-            for coefficient, runs in zip((signs[component] * coefficients).tolist(), columns, strict=True):
-                if coefficient:
-                    scaled = own if coefficient == 1.0 else coefficient * own
-                    for positions, dofs in runs:
-                        buffer[:, dofs] += scaled[:, positions]
+            for own, runs in zip(local, columns, strict=True):
+                for positions, dofs in runs:
+                    added = own[..., elements][..., positions]
+                    target[..., dofs] += added if signs[component] == 1.0 else signs[component] * added
 
-    def add(self, rows: slice, a: int, gathered: list[FloatArray]) -> None:
+    def add(self, rows: slice, gathered: FloatArray) -> None:
         """Add the gathered rows to the matrix."""
-        for p, coefficient in enumerate(self.test_coefficients[:, a].tolist()):
-            if not coefficient:
-                continue
-            for positions, dofs in consecutive_runs(self.test_dofs[rows, p]):
-                for index, buffer in enumerate(gathered):
-                    values = buffer[positions]
-                    view = self.matrix[:, index // 2, :, index % 2]
-                    view[dofs] += values if coefficient == 1.0 else coefficient * values
+        for values, dofs in zip(gathered, self.test_dofs[rows].T, strict=True):
+            for positions, nodes in consecutive_runs(dofs):
+                self.matrix[nodes] += values[positions]
+
+
+def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the sums (n_local, ...) of (n_polynomials, ...) values with the coefficients (n_local, n_polynomials)."""
+    if np.array_equal(coefficients, np.eye(*coefficients.shape)):
+        return values
+    return np.asarray(coefficients @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])

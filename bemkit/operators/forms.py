@@ -55,12 +55,12 @@ class SingleLayerForm(PairForm):
         """Return the one term of V."""
         return [TrialTerm(local_coefficients(self.trial), self._tensor)]
 
-    def _tensor(self, block: Block, a: int, b: int) -> Tensor:
+    def _tensor(self, block: Block, a: slice, b: slice) -> Tensor:
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
         quotient = block.integrals.quotient[a, b]
         diagonal = (-factor * (3.0 - 4.0 * nu)) * block.integrals.log[a, b]
-        diagonal += (factor * ((3.0 - 4.0 * nu) * block.log_scale + 0.5)) * block.mass(a, b)
+        diagonal[0, 0] += (factor * ((3.0 - 4.0 * nu) * block.log_scale + 0.5)) * block.measure
         half_difference, off = (0.5 * factor) * quotient.real, (0.5 * factor) * quotient.imag
         return diagonal + half_difference, off, off, diagonal - half_difference
 
@@ -89,11 +89,11 @@ class DoubleLayerForm(PairForm):
         coefficients = local_coefficients(self.trial)
         return [TrialTerm(coefficients, self._scalar), TrialTerm(_derivative(coefficients), self._slope)]
 
-    def _scalar(self, block: Block, a: int, b: int) -> Tensor:
+    def _scalar(self, block: Block, a: slice, b: slice) -> Tensor:
         diagonal = block.integrals.double[a, b]
         return diagonal, None, None, diagonal
 
-    def _slope(self, block: Block, a: int, b: int) -> Tensor:
+    def _slope(self, block: Block, a: slice, b: slice) -> Tensor:
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (4.0 * np.pi * (1.0 - nu)) / block.trial_half
         log = (factor * (1.0 - 2.0 * nu)) * block.integrals.log[a, b]
@@ -133,7 +133,7 @@ class HypersingularForm(PairForm):
         """Return the one term of W, on du/ds and dv/ds."""
         return [TrialTerm(_derivative(local_coefficients(self.trial)), self._tensor)]
 
-    def _tensor(self, block: Block, a: int, b: int) -> Tensor:
+    def _tensor(self, block: Block, a: slice, b: slice) -> Tensor:
         nu = self.material.effective_poisson_ratio
         factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - nu)) / (block.test_half * block.trial_half)
         log = -factor * block.integrals.log[a, b]

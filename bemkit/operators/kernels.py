@@ -17,14 +17,13 @@ combination, for rho = x - y and m_k = int P_k dt, which is 2 for k = 0 and 0 ot
 The C_k satisfy the recurrence of the P_k, (k + 1) C_{k+1} = (2 k + 1) zeta C_k - k C_{k-1}, of which they are the
 smallest solution: upward it loses digits like r^(2 k), with r = |zeta + sqrt(zeta^2 - 1)| the sum of the half axes of
 the ellipse through zeta with foci -1 and 1, and downward it gains them. So points close to the element take it upward
-from the logarithm, the others downward as a continued fraction ([DLMF, 3.6]), and points far away from the power
+from the logarithm, the others downward from any values far above ([DLMF, 3.6]), and points far away from the power
 series of the two highest.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -34,7 +33,7 @@ from bemkit.arrays import ComplexArray, FloatArray, read_only
 LOST = 30.0
 """Factor of round-off that the upward recurrence may lose before the downward one takes over."""
 FAR = 12.0
-"""Size r of the ellipse from which the power series takes fewer operations than the continued fraction."""
+"""Size r of the ellipse from which the power series takes fewer operations than the downward recurrence."""
 BANDS = (1.6, 3.0, FAR, 1.0e2, math.inf)
 """Upper ends of the bands of r whose points go downward together, in as many steps as the lower end needs."""
 DIGITS = 17.0
@@ -50,7 +49,7 @@ def terms_needed(distance: float) -> int:
     return max(1, math.ceil(16.5 / (2.0 * math.log10(distance))))
 
 
-def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> list[ComplexArray]:
+def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> ComplexArray:
     """Return C_0 ... C_highest at points far from the element.
 
     Parameters
@@ -64,32 +63,28 @@ def far_integrals(zeta: ComplexArray, highest: int, n_terms: int) -> list[Comple
 
     Returns
     -------
-    list of complex arrays
+    (highest + 1, *shape of zeta) complex array
         C_0 ... C_highest, each to relative round-off.
     """
+    integrals = np.empty((highest + 1, *zeta.shape), complex)
     inverse = 1.0 / zeta
     w = inverse * inverse
     # the two highest as power series, the others by the recurrence downward, the last one from C_1 = zeta C_0 - 2
-    integrals = [_series(highest, w, n_terms)]
-    if highest == 1:
-        integrals[0] *= w
-    else:
-        power = inverse
-        for _ in range(highest - 1):
-            power = power * inverse
-        integrals[0] *= power
-        integrals[0] *= inverse
-        integrals.append(_series(highest - 1, w, n_terms))
-        integrals[1] *= power
+    np.multiply(_series(highest, w, n_terms), w, out=integrals[highest])
+    if highest > 1:
+        power = inverse.copy()
+        for _ in range(highest - 2):
+            power *= inverse
+        integrals[highest] *= power
+        power *= inverse
+        np.multiply(_series(highest - 1, w, n_terms), power, out=integrals[highest - 1])
     for k in range(highest - 1, 1, -1):
-        lower = ((2 * k + 1) / k) * zeta
-        lower *= integrals[-1]
-        lower -= ((k + 1) / k) * integrals[-2]
-        integrals.append(lower)
-    first = integrals[-1] + 2.0
-    first *= inverse
-    integrals.append(first)
-    return integrals[::-1]
+        np.multiply(zeta, integrals[k], out=integrals[k - 1])
+        integrals[k - 1] *= (2 * k + 1) / k
+        integrals[k - 1] -= ((k + 1) / k) * integrals[k + 1]
+    np.add(integrals[1], 2.0, out=integrals[0])
+    integrals[0] *= inverse
+    return integrals
 
 
 def _series(k: int, w: ComplexArray, n_terms: int) -> ComplexArray:
@@ -116,7 +111,7 @@ def far_log_product(zeta: ComplexArray) -> FloatArray:
     return squared
 
 
-def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple[list[ComplexArray], FloatArray]:
+def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tuple[ComplexArray, FloatArray]:
     """Return the Cauchy integrals at points at any distance from the element, exact to round-off.
 
     Parameters
@@ -128,18 +123,21 @@ def near_integrals(plus: ComplexArray, minus: ComplexArray, highest: int) -> tup
 
     Returns
     -------
-    integrals : list of (n,) complex arrays
+    integrals : (highest + 1, n) complex array
         C_0 ... C_highest. The angle -Im C_0 is the one under which the element is seen, in (-pi, pi].
     log_product : (n,) array
-        log|zeta**2 - 1|.
+        log|zeta^2 - 1|.
     """
     zeta = local_coordinate(plus, minus)
-    logarithm, log_product = _logarithm(plus, minus, zeta)
-    integrals = [logarithm]
+    integrals = np.empty((highest + 1, zeta.size), complex)
+    integrals[0], log_product = _logarithm(plus, minus, zeta)
     if highest:
-        integrals.append(zeta * logarithm - 2.0)
+        np.multiply(zeta, integrals[0], out=integrals[1])
+        integrals[1] -= 2.0
         for k in range(1, highest):
-            integrals.append(((2 * k + 1) * zeta * integrals[k] - k * integrals[k - 1]) / (k + 1))
+            np.multiply(zeta, integrals[k], out=integrals[k + 1])
+            integrals[k + 1] *= (2 * k + 1) / (k + 1)
+            integrals[k + 1] -= (k / (k + 1)) * integrals[k - 1]
         _replace_far(integrals, zeta, _sum_of_half_axes(plus, minus))
     return integrals, log_product
 
@@ -174,7 +172,7 @@ def _sum_of_half_axes(plus: ComplexArray, minus: ComplexArray) -> FloatArray:
     return other
 
 
-def _replace_far(integrals: list[ComplexArray], zeta: ComplexArray, size: FloatArray) -> None:
+def _replace_far(integrals: ComplexArray, zeta: ComplexArray, size: FloatArray) -> None:
     """Put in what loses no digits where the upward recurrence does; `size` is r."""
     highest = len(integrals) - 1
     lower = LOST ** (0.5 / highest)
@@ -182,47 +180,65 @@ def _replace_far(integrals: list[ComplexArray], zeta: ComplexArray, size: FloatA
         chosen = np.flatnonzero((size > lower) & (size <= upper))
         if chosen.size and lower < FAR:
             steps = math.ceil(DIGITS / (2.0 * math.log10(lower)))
-            for k, ratio in enumerate(_ratios(zeta[chosen], highest, steps), start=1):
-                integrals[k][chosen] = ratio * integrals[k - 1][chosen]
+            integrals[1:, chosen] = _downward(zeta[chosen], integrals[0, chosen], highest, steps)
         elif chosen.size:
             # |zeta| is at least half the difference of r and 1 / r
             n_terms = terms_needed(0.5 * (lower - 1.0 / lower))
-            for integral, values in zip(integrals, far_integrals(zeta[chosen], highest, n_terms), strict=True):
-                integral[chosen] = values
+            integrals[:, chosen] = far_integrals(zeta[chosen], highest, n_terms)
         lower = max(lower, upper)
 
 
-def _ratios(zeta: ComplexArray, highest: int, steps: int) -> list[ComplexArray]:
-    """Return C_k / C_{k-1} for k = 1 ... highest by a continued fraction of so many more steps."""
-    ratio = np.zeros_like(zeta)
-    ratios = []
-    for k in range(highest + steps, 0, -1):
-        ratio *= -(k + 1)
-        ratio += (2 * k + 1) * zeta
-        np.divide(k, ratio, out=ratio)
-        if k <= highest:
-            ratios.append(ratio.copy())
-    return ratios[::-1]
+def _downward(zeta: ComplexArray, first: ComplexArray, highest: int, steps: int) -> ComplexArray:
+    """Return C_1 ... C_highest from C_0 by the downward recurrence, begun so many steps above with 0 and 1.
 
-
-def log_integral(k: int, integrals: Sequence[ComplexArray], log_product: FloatArray) -> FloatArray:
-    """Return Re int P_k log(zeta - t) dt, that is the log integral for an element of half length 1.
-
-    `log_product` is log|zeta**2 - 1|; `integrals` must reach C_{k+1}.
+    With the factors f_k = f_{k-1} k / (2 k + 1) the C_k / f_k take one product and one difference a step.
     """
-    if k == 0:
-        result: FloatArray = log_product + integrals[1].real
-        return result
-    difference: FloatArray = integrals[k + 1].real - integrals[k - 1].real
-    return difference / (2 * k + 1)
+    above, value = np.zeros_like(zeta), np.ones_like(zeta)
+    integrals = np.empty((highest, zeta.size), complex)
+    for k in range(highest + steps, 0, -1):
+        if k <= highest:
+            integrals[k - 1] = value
+        above *= -((k + 1) ** 2) / (4.0 * (k + 1) ** 2 - 1.0)
+        above += zeta * value
+        above, value = value, above
+    scaled = first / value
+    for k, integral in enumerate(integrals, start=1):
+        scaled *= k / (2.0 * k + 1.0)
+        integral *= scaled
+    return integrals
 
 
-def quotient_integral(k: int, integrals: Sequence[ComplexArray], eta: FloatArray) -> ComplexArray:
-    """Return int P_k rho / conj(rho) dt for an element of half length 1 along the real axis."""
-    result: ComplexArray = integrals[k].conj() * (2j * eta)
-    constant = interval_moment(k)
-    if constant:
-        result += constant
+def log_integrals(integrals: ComplexArray, log_product: FloatArray) -> FloatArray:
+    """Return Re int P_k log(zeta - t) dt, that is the log integrals for an element of half length 1.
+
+    Parameters
+    ----------
+    integrals : (highest + 2, *shape of points) complex array
+        C_0 ... C_{highest + 1}.
+    log_product : array
+        log|zeta**2 - 1|.
+
+    Returns
+    -------
+    (highest + 1, *shape of points) array
+    """
+    result = np.empty((len(integrals) - 1, *log_product.shape))
+    for k, values in enumerate(result):
+        if k:
+            np.subtract(integrals[k + 1].real, integrals[k - 1].real, out=values)
+            values /= 2 * k + 1
+        else:
+            np.add(log_product, integrals[1].real, out=values)
+    return result
+
+
+def quotient_integrals(integrals: ComplexArray, eta: FloatArray) -> ComplexArray:
+    """Return int P_k rho / conj(rho) dt for an element of half length 1 along the real axis, as many as `integrals`."""
+    twice = 2.0 * eta
+    result = np.empty(integrals.shape, complex)
+    np.multiply(integrals.imag, twice, out=result.real)
+    np.multiply(integrals.real, twice, out=result.imag)
+    result[:1] += interval_moment(0)
     return result
 
 

@@ -189,8 +189,6 @@ def coheres(problem: ContactProblem, state: ContactState) -> BoolArray:
 
     As in a certificate a node with less shear than would close its clearance is open.
     """
-    has_cohesion = (problem.friction_bound(np.zeros(problem.n_contact)) > 0.0) & ~np.asarray(
-        problem.law.acts_across_gap
-    )
+    has_cohesion = (problem.cohesion > 0.0) & ~np.asarray(problem.law.acts_across_gap)
     clearance = problem.body.stiffness_scale * np.abs(problem.gap - state.u_n)
     return np.asarray(has_cohesion & (np.abs(state.sigma_t) > clearance))

@@ -80,7 +80,7 @@ def why_no_path(problem: ContactProblem) -> str:
     """
     if problem.body.is_costly:
         return "the path of solutions is not followed, because responses of this body are costly"
-    jumps = problem.friction_bound(np.zeros(problem.n_contact)) > 0.0
+    jumps = problem.cohesion > 0.0
     if np.any(jumps & ~np.asarray(problem.law.acts_across_gap)):
         return "there is no path of solutions, because the friction law jumps where nodes open"
     return ""

@@ -103,7 +103,7 @@ class DenseBody(LinearBody):
 
     @property
     def n_unknowns(self) -> int:
-        """Order of the systems that `respond` solves: two for each contact node, less the eliminated tangents."""
+        """Two for each contact node, less the eliminated tangents."""
         return 2 * self.n_contact - (0 if self.eliminated_tangents is None else len(self.eliminated_tangents.nodes))
 
     @cached_property
@@ -133,7 +133,7 @@ class DenseBody(LinearBody):
         return np.flatnonzero(is_unknown)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
-        """Return the response; one LU factorisation of `n_unknowns`, none if all displacements are given.
+        """Return the response; one LU factorisation of the order of the displacements that are not given.
 
         Notes
         -----
@@ -149,10 +149,12 @@ class DenseBody(LinearBody):
         gives_traction = acts_on_traction & ~acts_on_displacement
 
         displacement = np.zeros_like(conditions.value)
-        if not gives_displacement.ravel()[self.unknown_dofs].all():
-            displacement.flat[self.unknown_dofs] = self._solved(conditions)
         np.divide(conditions.value, conditions.on_displacement[:, own, own], out=displacement, where=gives_displacement)
         unknowns = displacement.ravel()[self.unknown_dofs]
+        is_given = gives_displacement.ravel()[self.unknown_dofs]
+        if not is_given.all():
+            unknowns[~is_given] = self._solved(conditions, unknowns, is_given)
+            displacement.flat[self.unknown_dofs] = unknowns
         displacement[self.tangent_is_eliminated, 1] = self._followed(unknowns)
 
         traction = np.zeros_like(displacement)
@@ -249,30 +251,45 @@ class DenseBody(LinearBody):
         force += self.stiffness_scale * np.abs(state.u_t[rows] - self._followed(unknowns))
         return float(np.max(self.weights[rows] * force, initial=0.0))
 
-    def _solved(self, conditions: LinearConditions) -> FloatArray:
-        """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the unknowns with every row scaled to one."""
+    def _solved(self, conditions: LinearConditions, unknowns: FloatArray, is_given: BoolArray) -> FloatArray:
+        """Solve ``(A_u + A_t T) u = c + A_t t_free`` for the displacements that are not given, every row scaled to one.
+
+        Parameters
+        ----------
+        conditions : LinearConditions
+        unknowns : (n_unknowns,) array [m]
+            The given displacements among them.
+        is_given : (n_unknowns,) bool array
+        """
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        node, component = np.divmod(self.unknown_dofs, 2)
-        position = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
-        position.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
-        matrix = np.zeros_like(self.stiffness)
+        wanted = np.flatnonzero(~is_given)
+        node, component = np.divmod(self.unknown_dofs[wanted], 2)
+        number = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
+        number.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
+        position = np.cumsum(~is_given) - 1  # of each unknown among the wanted ones
+        forces = self.stiffness[:, is_given] @ unknowns[is_given] - self.load
         right_side = conditions.value[node, component]
-        for of in (0, 1):
-            row = np.flatnonzero(position[node, of] >= 0)
-            column, own = position[node[row], of], (node[row], component[row], of)
-            factor = conditions.on_traction[own] / self.weights[node[row]]
-            acts = factor != 0.0
-            matrix[row[acts]] += factor[acts, None] * self.stiffness[column[acts]]
-            matrix[row, column] += conditions.on_displacement[own]
-            right_side[row] += factor * self.load[column]
+        matrix = np.zeros((wanted.size, wanted.size))
+        for of in (component, 1 - component):
+            on_displacement, on_traction = (
+                matrices[node, component, of] for matrices in (conditions.on_displacement, conditions.on_traction)
+            )
+            row = np.flatnonzero((number[node, of] >= 0) & ((on_displacement != 0.0) | (on_traction != 0.0)))
+            column, factor = number[node[row], of[row]], (on_traction / self.weights[node])[row]
+            block = self.stiffness[np.ix_(column, wanted)]
+            block *= factor[:, None]
+            inside = np.flatnonzero(~is_given[column])
+            block[inside, position[column[inside]]] += on_displacement[row[inside]]
+            matrix[row] += block
+            right_side[row] -= factor * forces[column] + on_displacement[row] * np.where(is_given, unknowns, 0.0)[column]
 
         row_size = np.abs(matrix).max(axis=1)
         if not row_size.all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
         matrix /= row_size[:, None]
-        right_sides = np.stack([right_side / row_size, self._probe], axis=1)
+        right_sides = np.stack([right_side / row_size, self._probe[wanted]], axis=1)
         try:
             solution, probed = np.linalg.solve(matrix, right_sides).T
         except np.linalg.LinAlgError as error:

@@ -66,19 +66,16 @@ def inner_on_element(panels: Panels, degrees: Degrees, elements: IntArray, xi: f
     """Integrate over elements seen from their own points at the local coordinate `xi`; k is a principal value."""
     end: ComplexArray = np.full(elements.size, 1.0 + 0j)
     integrals, log_product = kernels.near_integrals(xi + end, xi - end, degrees.highest_integral)
-    principal: list[ComplexArray] = [integral.real.astype(complex) for integral in integrals]
+    principal = integrals.real.astype(complex)
     straight = Inner.straight(degrees, principal, log_product, np.zeros(elements.size))
     return _sum(straight, bending(degrees, panels.polynomials(elements), np.full(elements.size, xi + 0j)))
 
 
 def store(result: Inner, chosen: IntArray | BoolArray, values: Inner) -> None:
     """Write the integrals of some of the points."""
-    for log, value in zip(result.log, values.log, strict=True):
-        log[chosen] = value
-    for quotient, complex_value in zip(result.quotient, values.quotient, strict=True):
-        quotient[chosen] = complex_value
-    for double, value in zip(result.double, values.double, strict=True):
-        double[chosen] = value
+    result.log[:, chosen] = values.log
+    result.quotient[:, chosen] = values.quotient
+    result.cauchy[:, chosen] = values.cauchy
 
 
 def _seen_from(degrees: Degrees, plus: ComplexArray, minus: ComplexArray) -> Inner:
@@ -105,11 +102,7 @@ def near_inner(degrees: Degrees, coefficients: ComplexArray, plus: ComplexArray,
 
 def _sum(straight: Inner, smooth: Inner) -> Inner:
     """Add what bending adds; the quotient of `smooth` is the whole one."""
-    return Inner(
-        [one + other for one, other in zip(straight.log, smooth.log, strict=True)],
-        smooth.quotient,
-        [one + other for one, other in zip(straight.double, smooth.double, strict=True)],
-    )
+    return Inner(straight.log + smooth.log, smooth.quotient, straight.cauchy + smooth.cauchy)
 
 
 def bending(
@@ -117,7 +110,7 @@ def bending(
     coefficients: ComplexArray,
     root: ComplexArray,
     eta: FloatArray | None = None,
-    integrals: list[ComplexArray] | None = None,
+    integrals: ComplexArray | None = None,
 ) -> Inner:
     """Return what bending adds to log and double, and the whole quotient, at points with the parameters `root` (n,).
 
@@ -131,18 +124,17 @@ def bending(
     g = _product(powers, divided)
     size = np.square(g.real) + np.square(g.imag)
     ratio = g * g / size
-    log: list[FloatArray] = list(_weights(n_log, n_points) @ (0.5 * np.log(size)))
-    quotient: list[ComplexArray] = list(_product(_weights(n_log, n_points), ratio))
+    log = _weights(n_log, n_points) @ (0.5 * np.log(size))
+    quotient = _product(_weights(n_log, n_points), ratio)
     if n_log and eta is not None and integrals is not None:
         at_mirror = curved_panels.evaluate(divided, root.conj()) / curved_panels.evaluate(divided, root).conj()
         gap = root.conj() - t[:, None]
         gap[gap == 0.0] = 1.0  # then eta is zero, and with it the whole term
         change = _product(_weights(n_log, n_points), (ratio - at_mirror) / gap)
-        for b in range(n_log):
-            quotient[b] = quotient[b] + (2j * eta) * (at_mirror * integrals[b].conj() + change[b])
+        quotient += (2j * eta) * (at_mirror * integrals[:n_log].conj() + change)
     slope = _product(powers[:, :-1], curved_panels.derivative(divided))
-    double: list[FloatArray] = list(_weights(n_double, n_points) @ (-(slope * g.conj()).imag / size))
-    return Inner(log, quotient, double)
+    double = _weights(n_double, n_points) @ (-(slope * g.conj()).imag / size)
+    return Inner(log, quotient, 1j * double)
 
 
 def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, n_points: int) -> Inner:
@@ -163,20 +155,16 @@ def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, 
     slopes = curved_panels.derivative(coefficients)
     points, weights = gauss_legendre(n_points)
     factors = weights * kernels.legendre_values(max(n_log, n_double, 1) - 1, points)
-    for t, factor in zip(points, factors.T.tolist(), strict=True):
+    for t, factor in zip(points, factors.T, strict=True):
         place = np.full(coefficients.shape[1], t + 0j)
         rho = zeta - curved_panels.evaluate(coefficients, place)
         size = np.square(rho.real) + np.square(rho.imag)
         if n_log:
-            log = np.log(size)
-            quotient = rho * rho / size
+            result.log[:] += np.multiply.outer(0.5 * factor[:n_log], np.log(size))
+            result.quotient[:] += np.multiply.outer(factor[:n_log], rho * rho / size)
         if n_double:
             angle = (curved_panels.evaluate(slopes, place) * rho.conj()).imag / size
-        for b in range(n_log):
-            result.log[b] += (0.5 * factor[b]) * log
-            result.quotient[b] += factor[b] * quotient
-        for b in range(n_double):
-            result.double[b] += factor[b] * angle
+            result.double[:] += np.multiply.outer(factor[:n_double], angle)
     return result
 
 

@@ -1,164 +1,242 @@
 """Integrals of listed element pairs: separated by a few lengths, close, touching, or the same element.
 
-Close and touching pairs are split towards their common points [SauterSchwab2011], with closed forms inside.
+Of two straight elements the shorter one takes the outer rule, whichever is the test element: seen from there the other
+one is far away sooner, and its closed forms serve both ways. Close and touching pairs are split towards their common
+points [SauterSchwab2011].
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.quadrature import gauss_graded, gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.integrals.inner import N_SMOOTH, bending, far_inner, inner_integrals, local_coordinates
-from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
-from bemkit.operators.integrals.panels import Panels
+from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
+from bemkit.operators.integrals.panels import Panels, squared_distance
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
+# An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points
+# with an error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15. A factor P_a costs a digits
+# of that base, so every rule has `Degrees.extra_points` more.
+GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
+"""Numbers of outer points, and the distance [half lengths of the outer element] from which each is enough."""
 N_REGULAR = 10
-N_TOUCHING = 20
+N_TOUCHING = 30
+BATCH_POINTS = 8192
+"""Outer points treated at once: their integrals stay in the cache."""
+
+LevelArray = npt.NDArray[np.int8]
+"""An index into `GAUSS_LEVELS` for each pair; one byte, because there are as many as matrix blocks."""
 
 
-def integrate_separated(
-    panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray, n_points: int
-) -> PairIntegrals:
-    """Integrate pairs with a Gauss rule on the whole test element, and on the whole trial element if that is curved.
+def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray:
+    """Return how many of the distances of `GAUSS_LEVELS` pairs fall short of, for elements of shapes that broadcast.
+
+    A curved inner element needs a rule of its own, with the same distances in its own half lengths.
+    """
+    centre, half = panels.centre[outer], panels.half[outer]
+    nearest = np.minimum(
+        squared_distance(centre, panels.start[inner]), squared_distance(centre, panels.end[inner])
+    )
+    level = np.zeros(nearest.shape, np.int8)
+    for _, distance in GAUSS_LEVELS:
+        level += nearest < np.square(half * panels.reach(distance)[outer])
+    if panels.curved is not None:
+        from_centre = squared_distance(centre, panels.centre[inner])
+        own = np.zeros_like(level)
+        for _, distance in GAUSS_LEVELS:
+            own += from_centre < np.square(panels.half[inner] * panels.reach(distance)[inner] + half)
+        level = np.where(panels.is_straight[inner], level, np.maximum(level, own))
+    return level
+
+
+def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
+    """Integrate pairs of different elements, each with the rule that its distance asks for.
 
     Parameters
     ----------
     panels : Panels
     degrees : Degrees
     test, trial : (n,) arrays
-        Element numbers of the pairs; the trial elements are either all straight or all curved.
-    n_points : int
-        Points on each element.
+        Element numbers of the pairs.
     """
+    half, n_elements = panels.half, panels.half.size
+    is_turned = (half[test] > half[trial]) | ((half[test] == half[trial]) & (test > trial))
+    is_turned &= panels.is_straight[test] & panels.is_straight[trial]
+    # both orders of two elements share their integrals
+    numbers = np.where(is_turned, trial * n_elements + test, test * n_elements + trial)
+    different, item = np.unique(numbers, return_inverse=True)
+    outer, inner = np.divmod(different, n_elements)
+    either_way = degrees.either_way
+    sums = Inner.from_rows(either_way, _outer_sums(panels, either_way, outer, inner))
+    sums.log[:1, :1] += 4.0 * np.log(half[inner])
+    measure = half[outer] * half[inner]
+    log, quotient = measure * sums.log, (measure * panels.tangent[inner] ** 2) * sums.quotient
+    cauchy = (half[outer] / (2.0 * np.pi)) * sums.cauchy
+    # with the normal n = -i tangent at y, k = Re(n / (x - y)) / (2 pi)
+    turned = -((panels.tangent[outer] * panels.tangent[inner].conj()) * cauchy).imag
+
     result = PairIntegrals.zeros(degrees, (test.size,))
-    is_straight = bool(panels.is_straight[trial].all())
-    polynomials = panels.polynomials(trial)
-    points, weights = gauss_legendre(n_points)
-    for at_start in (True, False):
-        half = points < 0.0 if at_start else points >= 0.0
-        xi, weight = points[half, None], weights[half, None]
-        node = (panels.start if at_start else panels.end)[test]
-        # all points at once, the pairs of one point after those of the other: few long arrays
-        own, other = np.tile(test, xi.size), np.tile(trial, xi.size)
-        offset = panels.offset(own, np.repeat(0.5 * (1.0 - np.abs(xi)), test.size), at_start)
-        from_start = np.tile(node - panels.start[trial], xi.size) + offset
-        from_end = np.tile(node - panels.end[trial], xi.size) + offset
-        if is_straight:
-            inner = inner_integrals(panels, degrees, other, from_start, from_end)
-        else:
-            zeta = local_coordinates(panels, other, from_start)
-            inner = far_inner(degrees, np.tile(polynomials, xi.size), zeta, n_points)
-        result.add_points(weight, xi, inner)
-    result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
+    for chosen, double, axes in (
+        (np.flatnonzero(~is_turned), cauchy.imag, (1, 0, 2)),
+        (np.flatnonzero(is_turned), turned, (0, 1, 2)),
+    ):
+        own = item[chosen]
+        for target, values in ((result.log, log), (result.quotient, quotient), (result.double, double)):
+            n_test, n_trial = target.shape[:2]
+            target[..., chosen] = values.transpose(axes)[:n_test, :n_trial, own]
     return result
 
 
-def integrate_near(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
-    """Integrate close or touching pairs: the test element is split until each piece is away from both singular points.
+def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray) -> FloatArray:
+    """Return the (n_rows, n_outer_polynomials, n) sums of the rows of `Inner` over the rules of the outer elements."""
+    (n_log, n_double), extra_points = degrees.n_trial, degrees.extra_points
+    sums = np.zeros((outer.size, 3 * n_log + 2 * n_double, max(n_log, n_double)))
+    level = gauss_levels(panels, outer, inner)
+    for is_curved in np.unique(~panels.is_straight[inner]).tolist():
+        is_kind = panels.is_straight[inner] != is_curved
+        for number, (n_points, _) in enumerate(GAUSS_LEVELS):
+            item = np.flatnonzero(is_kind & (level == number))
+            rule = _Rule.whole(item, n_points + extra_points)
+            _add(sums, panels, degrees, outer, inner, rule, n_points + extra_points if is_curved else None)
+        item = np.flatnonzero(is_kind & (level == len(GAUSS_LEVELS)))
+        pieces = _split(panels, outer, inner, item)
+        for (points, weights), chosen in (
+            (_on_unit_interval(N_REGULAR + extra_points), ~pieces.touches),
+            (gauss_graded(N_TOUCHING + extra_points), pieces.touches),
+        ):
+            _add(sums, panels, degrees, outer, inner, pieces.rule(chosen, points, weights), None)
+    return np.ascontiguousarray(sums.transpose(1, 2, 0))
 
-    Parameters and result as in `integrate_separated`.
 
-    Notes
-    -----
-    Each half of the test element is measured from its own end node, so that the distance to a shared node, and to a
-    node at any small distance from it, is exact however small the piece.
+@lru_cache(maxsize=16)
+def _on_unit_interval(n_points: int) -> tuple[FloatArray, FloatArray]:
+    """Return Gauss points and weights on [0, 1], read-only."""
+    reference, reference_weights = gauss_legendre(n_points)
+    points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
+    read_only(points)
+    read_only(weights)
+    return points, weights
+
+
+@dataclass(frozen=True, eq=False)
+class _Rule:
+    """Points on the outer elements of some items, (n, n_points) each, and the items, ascending.
+
+    Points are given as fractions of the length from one end node, so that the distance to a shared node, and to a node
+    at any small distance from it, is exact however small it is.
     """
-    result = PairIntegrals.zeros(degrees, (test.size,))
-    pair = np.arange(test.size)
-    for at_start in (True, False):
-        pieces = _split(panels, test, trial, at_start)
-        for n_points, chosen in ((N_REGULAR, ~pieces.touches), (N_TOUCHING, pieces.touches)):
-            _integrate_pieces(result, panels, degrees, (test, trial, pair), pieces.select(chosen), n_points, at_start)
-    result.scale(panels.half[test], panels.half[trial], panels.tangent[trial])
-    return result
+
+    item: IntArray
+    at_start: BoolArray
+    fraction: FloatArray
+    weight: FloatArray
+
+    @classmethod
+    def whole(cls, item: IntArray, n_points: int) -> _Rule:
+        """Return one Gauss rule for all, each half of it measured from its own end."""
+        points, weights = gauss_legendre(n_points)
+        parts = (points < 0.0, 0.5 * (1.0 - np.abs(points)), weights)
+        at_start, fraction, weight = (np.broadcast_to(part, (item.size, n_points)) for part in parts)
+        return cls(item, at_start, fraction, weight)
 
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Pieces [low, high] of test elements, as fractions of the length from one end node."""
+    """Pieces [low, high] of outer elements, as fractions of the length from one end node; items ascending."""
 
-    pair: IntArray
+    item: IntArray
+    at_start: BoolArray
     low: FloatArray
     high: FloatArray
     touches: BoolArray
 
-    def select(self, chosen: BoolArray) -> _Pieces:
-        return _Pieces(self.pair[chosen], self.low[chosen], self.high[chosen], self.touches[chosen])
+    def rule(self, chosen: BoolArray, points: FloatArray, weights: FloatArray) -> _Rule:
+        """Return a rule on [0, 1] moved to some of the pieces."""
+        low, length = self.low[chosen, None], (self.high - self.low)[chosen, None]
+        at_start = np.broadcast_to(self.at_start[chosen, None], (low.size, points.size))
+        return _Rule(self.item[chosen], at_start, low + points * length, 2.0 * weights * length)
 
 
-def _split(panels: Panels, test: IntArray, trial: IntArray, at_start: bool) -> _Pieces:
-    """Bisect one half of each test element until every piece may be integrated by a single rule."""
-    node = (panels.start if at_start else panels.end)[test]
-    number = (panels.start_node if at_start else panels.end_node)[test]
-    reach = (panels.reach(SEPARATION) * panels.half)[test]
-    to_start, to_end = node - panels.start[trial], node - panels.end[trial]
-    meets_start, meets_end = number == panels.start_node[trial], number == panels.end_node[trial]
+def _split(panels: Panels, outer: IntArray, inner: IntArray, item: IntArray) -> _Pieces:
+    """Bisect both halves of the outer elements until every piece is away from both end nodes of the inner element.
 
-    def is_clear(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
-        # a piece that begins at a common node takes the rule for that, but must be away from the other node
-        centre = panels.offset(test[pair], 0.5 * (low + high), at_start)
-        distance, at_node = reach[pair] * (high - low), low == 0.0
-        start_is_clear = (np.abs(to_start[pair] + centre) >= distance) | (at_node & meets_start[pair])
-        end_is_clear = (np.abs(to_end[pair] + centre) >= distance) | (at_node & meets_end[pair])
+    A piece that begins at a common node takes the rule for that, but must be away from the other node.
+    """
+    own, other = np.tile(outer[item], 2), np.tile(inner[item], 2)
+    at_start = np.repeat([True, False], item.size)
+    node = np.where(at_start, panels.start[own], panels.end[own])
+    number = np.where(at_start, panels.start_node[own], panels.end_node[own])
+    reach = (panels.reach(SEPARATION) * panels.half)[own]
+    to_start, to_end = node - panels.start[other], node - panels.end[other]
+    meets_start, meets_end = number == panels.start_node[other], number == panels.end_node[other]
+
+    def is_clear(half: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
+        centre = panels.offset(own[half], 0.5 * (low + high), at_start[half])
+        distance, at_node = reach[half] * (high - low), low == 0.0
+        start_is_clear = (np.abs(to_start[half] + centre) >= distance) | (at_node & meets_start[half])
+        end_is_clear = (np.abs(to_end[half] + centre) >= distance) | (at_node & meets_end[half])
         return np.asarray(start_is_clear & end_is_clear)
 
-    pair, low, high = split_until(is_clear, test.size, 0.0, 0.5)
-    return _Pieces(pair, low, high, (low == 0.0) & (meets_start | meets_end)[pair])
+    half, low, high = split_until(is_clear, own.size, 0.0, 0.5)
+    order = np.argsort(half % max(item.size, 1), kind="stable")
+    half, low, high = half[order], low[order], high[order]
+    touches = (low == 0.0) & (meets_start | meets_end)[half]
+    return _Pieces(np.tile(item, 2)[half], at_start[half], low, high, touches)
 
 
-def _integrate_pieces(
-    result: PairIntegrals,
+def _add(
+    sums: FloatArray,
     panels: Panels,
     degrees: Degrees,
-    pairs: tuple[IntArray, IntArray, IntArray],
-    pieces: _Pieces,
-    n_points: int,
-    at_start: bool,
+    outer: IntArray,
+    inner: IntArray,
+    rule: _Rule,
+    n_inner_points: int | None,
 ) -> None:
-    """Add the integrals over some pieces to their pairs."""
-    if not pieces.pair.size:
-        return
-    test, trial = pairs[0][pieces.pair], pairs[1][pieces.pair]
-    sums = PairIntegrals.zeros(degrees, (test.size,))
-    if n_points == N_TOUCHING:
-        # the map of the rule multiplies degrees by four
-        n_points += 4 * degrees.extra_points
-        points, weights = gauss_graded(n_points)
-    else:
-        n_points += degrees.extra_points
-        reference, reference_weights = gauss_legendre(n_points)
-        points, weights = 0.5 * (reference + 1.0), 0.5 * reference_weights
-    node = (panels.start if at_start else panels.end)[test]
-    length = pieces.high - pieces.low
-    fraction = pieces.low + points[:, None] * length
-    xi = (2.0 * fraction - 1.0) * (1.0 if at_start else -1.0)
-    own, other = np.tile(test, n_points), np.tile(trial, n_points)
-    offset = panels.offset(own, fraction.ravel(), at_start)
-    from_start = np.tile(node - panels.start[trial], n_points) + offset
-    from_end = np.tile(node - panels.end[trial], n_points) + offset
-    inner = inner_integrals(panels, degrees, other, from_start, from_end)
-    sums.add_points(2.0 * weights[:, None] * length, xi, inner)
-    for target, values in ((result.log, sums.log), (result.quotient, sums.quotient), (result.double, sums.double)):
-        for index in np.ndindex(*values.shape[:2]):
-            np.add.at(target[index], pieces.pair, values[index])
+    """Add sums over the points of a rule to (n_items, n_rows, n_outer_polynomials) those of their items.
+
+    Curved inner elements that are far away take a Gauss rule of `n_inner_points`.
+    """
+    n_points = rule.fraction.shape[1]
+    size = max(1, BATCH_POINTS // n_points)
+    for batch in (slice(first, first + size) for first in range(0, rule.item.size, size)):
+        item, at_start, fraction = rule.item[batch], rule.at_start[batch], rule.fraction[batch]
+        own, other = outer[item, None], inner[item, None]
+        node = np.where(at_start, panels.start[own], panels.end[own])
+        offset = panels.offset(np.broadcast_to(own, fraction.shape).ravel(), fraction.ravel(), at_start.ravel())
+        from_start, from_end = ((node - end[other]).ravel() + offset for end in (panels.start, panels.end))
+        other = np.broadcast_to(other, fraction.shape).ravel()
+        if n_inner_points is None:
+            values = inner_integrals(panels, degrees, other, from_start, from_end)
+        else:
+            zeta = local_coordinates(panels, other, from_start)
+            values = far_inner(degrees, panels.polynomials(other), zeta, n_inner_points)
+        rows = values.rows().reshape(-1, item.size, n_points)
+        xi = np.where(at_start, 2.0 * fraction - 1.0, 1.0 - 2.0 * fraction)
+        factors = rule.weight[batch] * kernels.legendre_values(sums.shape[2] - 1, xi)
+        moments = rows.transpose(1, 0, 2) @ factors.transpose(1, 2, 0)
+        first = np.flatnonzero(np.diff(item, prepend=-1))
+        sums[item[first]] += np.add.reduceat(moments, first, axis=0)
 
 
-def integrate_same(panels: Panels, degrees: Degrees, test: IntArray) -> PairIntegrals:
+def integrate_same(panels: Panels, degrees: Degrees, elements: IntArray) -> PairIntegrals:
     """Integrate elements against themselves: the logarithm scales from the unit element, bending adds smooth parts."""
-    result = PairIntegrals.zeros(degrees, (test.size,))
-    if panels.curved is None or bool(panels.is_straight[test].all()):
+    result = PairIntegrals.zeros(degrees, (elements.size,))
+    if panels.curved is None or bool(panels.is_straight[elements].all()):
         result.quotient[:1, :1] = 4.0
     else:
-        coefficients = panels.curved.about_centre[:, test]
-        for xi, weight in zip(*gauss_legendre(N_SMOOTH + degrees.extra_points), strict=True):
-            inner = bending(degrees, coefficients, np.full(test.size, xi + 0j))
-            result.add(float(weight), float(xi), inner)
+        coefficients = panels.curved.about_centre[:, elements]
+        points, weights = gauss_legendre(N_SMOOTH + degrees.extra_points)
+        inner = [bending(degrees, coefficients, np.full(elements.size, xi + 0j)) for xi in points]
+        result = PairIntegrals.summed(degrees, points, weights, inner)
     for a, b in np.ndindex(*result.log.shape[:2]):
         result.log[a, b] += kernels.log_on_itself(a, b)
-    result.scale(panels.half[test], panels.half[test], panels.tangent[test])
+    result.scale(panels.half[elements], panels.half[elements], panels.tangent[elements])
     return result

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.operators import kernels
 
 
@@ -27,10 +29,22 @@ class Degrees:
         return 0 if self.log is None else self.log[1] + 1, 0 if self.double is None else self.double[1] + 1
 
     @property
+    def n_products(self) -> int:
+        """How many products of polynomials on the two elements the larger family has."""
+        families = [family for family in (self.log, self.double) if family]
+        return max(((test + 1) * (trial + 1) for test, trial in families), default=1)
+
+    @property
+    def either_way(self) -> Degrees:
+        """The same with test and trial elements exchanged, too."""
+        log, double = (family and (max(family),) * 2 for family in (self.log, self.double))
+        return Degrees(log, double)
+
+    @property
     def extra_points(self) -> int:
         """Gauss points on top of those for linear and quadratic elements: one for every two degrees more."""
         families = [family for family in (self.log, self.double) if family]
-        return max((max(test, trial - 1) // 2 for test, trial in families), default=0)
+        return max((test // 2 for test, _ in families), default=0)
 
     @property
     def highest_integral(self) -> int:
@@ -47,39 +61,49 @@ def _cover(one: tuple[int, int] | None, two: tuple[int, int] | None) -> tuple[in
 
 @dataclass(frozen=True, eq=False)
 class Inner:
-    """Inner integrals over trial elements of half length 1 whose chord is the real axis, by degree b.
+    """Inner integrals over elements of half length 1 whose chord is the real axis, (n_polynomials, *shape of points).
 
     Parameters
     ----------
-    log, quotient, double : lists of arrays
-        Integrals of P_b(t) log|rho|, P_b(t) rho / conj(rho) and 2 pi P_b(t) k, seen from one outer point for each pair.
+    log, quotient : arrays
+        Integrals of P_b(t) log|rho| and P_b(t) rho / conj(rho), seen from one outer point for each pair.
+    cauchy : complex array
+        Its imaginary part is the integral of 2 pi P_b(t) k; on straight elements it is C_b (see `kernels`).
     """
 
-    log: list[FloatArray]
-    quotient: list[ComplexArray]
-    double: list[FloatArray]
+    log: FloatArray
+    quotient: ComplexArray
+    cauchy: ComplexArray
+
+    @property
+    def double(self) -> FloatArray:
+        """Integrals of 2 pi P_b(t) k."""
+        return self.cauchy.imag
 
     @classmethod
     def zeros(cls, degrees: Degrees, shape: tuple[int, ...]) -> Inner:
         """Return integrals that are all zero."""
         n_log, n_double = degrees.n_trial
-        return cls(
-            [np.zeros(shape) for _ in range(n_log)],
-            [np.zeros(shape, complex) for _ in range(n_log)],
-            [np.zeros(shape) for _ in range(n_double)],
-        )
+        return cls(np.zeros((n_log, *shape)), np.zeros((n_log, *shape), complex), np.zeros((n_double, *shape), complex))
 
     @classmethod
-    def straight(
-        cls, degrees: Degrees, integrals: list[ComplexArray], log_product: FloatArray, eta: FloatArray
-    ) -> Inner:
+    def straight(cls, degrees: Degrees, integrals: ComplexArray, log_product: FloatArray, eta: FloatArray) -> Inner:
         """Combine the Cauchy integrals of straight elements (see `kernels`)."""
         n_log, n_double = degrees.n_trial
-        return cls(
-            [kernels.log_integral(b, integrals, log_product) for b in range(n_log)],
-            [kernels.quotient_integral(b, integrals, eta) for b in range(n_log)],
-            [integral.imag for integral in integrals[:n_double]],
-        )
+        log = kernels.log_integrals(integrals[: n_log + 1], log_product)
+        return cls(log, kernels.quotient_integrals(integrals[:n_log], eta), integrals[:n_double])
+
+    def rows(self) -> FloatArray:
+        """Return all of them as (n_rows, *shape of points) real numbers; `from_rows` undoes it."""
+        return np.concatenate([self.log, self.quotient.real, self.quotient.imag, self.cauchy.real, self.cauchy.imag])
+
+    @classmethod
+    def from_rows(cls, degrees: Degrees, rows: FloatArray) -> Inner:
+        """Split what `rows` has joined."""
+        n_log, n_double = degrees.n_trial
+        edges = np.cumsum([n_log, n_log, n_log, n_double])
+        log, real, imaginary, cauchy_real, cauchy_imaginary = np.split(rows, edges)
+        return cls(log, real + 1j * imaginary, cauchy_real + 1j * cauchy_imaginary)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,31 +121,26 @@ class PairIntegrals:
         double = (0, 0) if degrees.double is None else (degrees.double[0] + 1, degrees.double[1] + 1)
         return cls(np.zeros(log + shape), np.zeros(log + shape, complex), np.zeros(double + shape))
 
-    def add(self, weight: float, xi: float, inner: Inner) -> None:
-        """Add one outer point for every pair: `weight` at the test coordinate `xi`."""
-        factors = (weight * self._test_values(xi)).tolist()
-        for b, (log, quotient) in enumerate(zip(inner.log, inner.quotient, strict=True)):
-            for a in range(self.log.shape[0]):
-                self.log[a, b] += factors[a] * log
-                self.quotient[a, b] += factors[a] * quotient
-        for b, double in enumerate(inner.double):
-            for a in range(self.double.shape[0]):
-                self.double[a, b] += (factors[a] / (2.0 * np.pi)) * double
+    @classmethod
+    def summed(
+        cls, degrees: Degrees, points: FloatArray, weights: FloatArray, inner: Sequence[Inner]
+    ) -> PairIntegrals:
+        """Sum inner integrals over the points of one rule on the test elements."""
 
-    def add_points(self, weight: FloatArray, xi: FloatArray, inner: Inner) -> None:
-        """Add several outer points: weights and test coordinates (n_points, n or 1), integrals (n_points * n,)."""
-        for a, factor in enumerate(weight * self._test_values(xi)):
-            if a < self.log.shape[0]:
-                for b, (log, quotient) in enumerate(zip(inner.log, inner.quotient, strict=True)):
-                    self.log[a, b] += (factor * log.reshape(len(weight), -1)).sum(axis=0)
-                    self.quotient[a, b] += (factor * quotient.reshape(len(weight), -1)).sum(axis=0)
-            if a < self.double.shape[0]:
-                for b, double in enumerate(inner.double):
-                    self.double[a, b] += (factor / (2.0 * np.pi) * double.reshape(len(weight), -1)).sum(axis=0)
+        def total(family: tuple[int, int] | None, values: Sequence[FloatArray]) -> FloatArray:
+            # by trial degree, point and pair; the sums are contiguous by trial degree, test degree and pair
+            stacked = np.stack(values, axis=1)
+            n_test = 0 if family is None else family[0] + 1
+            factors = weights * kernels.legendre_values(max(n_test, 1) - 1, points)[:n_test]
+            sums = factors @ stacked.reshape(len(stacked), len(inner), math.prod(stacked.shape[2:]))
+            return sums.reshape(len(stacked), n_test, *stacked.shape[2:]).swapaxes(0, 1)
 
-    def _test_values(self, xi: FloatArray | float) -> FloatArray:
-        """Return the polynomials on the test element at some points."""
-        return kernels.legendre_values(max(self.log.shape[0], self.double.shape[0]) - 1, xi)
+        quotient = total(degrees.log, [one.quotient.view(float) for one in inner])
+        return cls(
+            total(degrees.log, [one.log for one in inner]),
+            quotient.view(complex),
+            total(degrees.double, [one.double for one in inner]),
+        )
 
     def scale(self, test_half: FloatArray, half: FloatArray, tangent: ComplexArray) -> None:
         """Turn sums for half lengths 1 and a real trial axis into the integrals of the elements themselves."""
@@ -130,7 +149,7 @@ class PairIntegrals:
             self.log[:] *= test_half * half
             self.quotient[:] *= test_half * (half * tangent * tangent)
         if self.double.size:
-            self.double[:] *= test_half
+            self.double[:] *= test_half / (2.0 * np.pi)
 
     def put(self, rows: IntArray | slice, columns: IntArray | slice, other: PairIntegrals) -> None:
         """Overwrite the pairs (rows, columns) with those of `other`."""
@@ -138,6 +157,12 @@ class PairIntegrals:
         self.quotient[:, :, rows, columns] = other.quotient
         self.double[:, :, rows, columns] = other.double
 
-    def take(self, chosen: slice) -> PairIntegrals:
+    def assign(self, chosen: IntArray | BoolArray, other: PairIntegrals) -> None:
+        """Overwrite some of the listed pairs with those of `other`."""
+        self.log[..., chosen] = other.log
+        self.quotient[..., chosen] = other.quotient
+        self.double[..., chosen] = other.double
+
+    def take(self, chosen: IntArray | slice) -> PairIntegrals:
         """Return some of the listed pairs."""
         return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.integrals import curved_panels
 
@@ -61,23 +61,23 @@ class Panels:
         local = curved_panels.evaluate(self.polynomials(elements), np.full(elements.size, xi + 0j))
         return self.centre[elements] + (self.half * self.tangent)[elements] * local
 
-    def offset(self, elements: IntArray, fraction: FloatArray | float, at_start: bool) -> ComplexArray:
+    def offset(self, elements: IntArray, fraction: FloatArray, at_start: BoolArray) -> ComplexArray:
         """Return how far points lie from one end node, accurate however close they are to it.
 
         Parameters
         ----------
         elements : (n,) int array
-        fraction : (n,) array or float
-            Distances along the elements, in their lengths, from the start node (or from the end node).
-        at_start : bool
+        fraction : (n,) array
+            Distances along the elements, in their lengths, from the start node or from the end node.
+        at_start : (n,) bool array
             Which end.
         """
-        step = self.tangent[elements] * (2.0 * self.half[elements] * (1.0 if at_start else -1.0))
+        shift = np.where(at_start, 2.0, -2.0) * fraction
+        offset = self.tangent[elements] * (self.half[elements] * shift)
         if self.curved is None:
-            return step * fraction
-        about = (self.curved.about_start if at_start else self.curved.about_end)[1:, elements]
-        shift = np.broadcast_to(2.0 * fraction * (1.0 if at_start else -1.0), elements.shape).astype(complex)
-        return step * fraction * curved_panels.evaluate(about, shift)
+            return offset
+        about = np.where(at_start, self.curved.about_start[1:, elements], self.curved.about_end[1:, elements])
+        return offset * curved_panels.evaluate(about, shift.astype(complex))
 
     def reach(self, distance: float) -> FloatArray:
         """Return how many half lengths from the centre of each element the parameter is `distance` away from it.

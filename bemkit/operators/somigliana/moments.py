@@ -64,7 +64,7 @@ class GradientMoments:
     twist: ComplexArray
 
 
-def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_orders: int) -> list[list[ComplexArray]]:
+def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_orders: int) -> list[ComplexArray]:
     """Return C_k, G_k, H_k (the first `n_orders` of them) for k = 0 ... highest, at any distance from the element.
 
     Parameters
@@ -87,10 +87,10 @@ def local_moments(plus: ComplexArray, minus: ComplexArray, highest: int, n_order
     product = plus * minus
     if n_orders > 1:
         pairs = zip(range(1, highest + 1), integrals[1:], integrals, strict=False)
-        result.append([2.0 / product, *(k * (below - zeta * own) / product for k, own, below in pairs)])
+        result.append(np.stack([2.0 / product, *(k * (below - zeta * own) / product for k, own, below in pairs)]))
     if n_orders > 2:
         pairs = zip(range(highest + 1), integrals, result[1], strict=True)
-        result.append([(zeta * slope + 0.5 * k * (k + 1) * own) / product for k, own, slope in pairs])
+        result.append(np.stack([(zeta * slope + 0.5 * k * (k + 1) * own) / product for k, own, slope in pairs]))
     return result
 
 
@@ -114,19 +114,13 @@ def straight_displacement_moments(
     half, square = panels.half[elements], panels.tangent[elements] ** 2
     c, g = local_moments(plus, minus, highest + 1, 2)
     log_product = np.log(np.abs(plus)) + np.log(np.abs(minus))
-    degrees = range(highest + 1)
-    constants = [kernels.interval_moment(k) for k in degrees]
+    measure = np.stack([half * kernels.interval_moment(k) for k in range(highest + 1)])
     return DisplacementMoments(
-        log=np.stack(
-            [
-                half * (m * np.log(half / length) + kernels.log_integral(k, c, log_product))
-                for k, m in enumerate(constants)
-            ]
-        ),
-        measure=np.stack([half * m for m in constants]),
-        quotient=np.stack([half * square * kernels.quotient_integral(k, c, eta) for k in degrees]),
-        cauchy=np.stack(c[: highest + 1]),
-        turn=np.stack([2j * eta * square * g[k].conj() for k in degrees]),
+        log=half * kernels.log_integrals(c, log_product) + measure * np.log(half / length),
+        measure=measure,
+        quotient=half * square * kernels.quotient_integrals(c[:-1], eta),
+        cauchy=c[:-1],
+        turn=np.stack([2j * eta * square * own.conj() for own in g[:-1]]),
     )
 
 

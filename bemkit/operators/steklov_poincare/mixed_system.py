@@ -138,7 +138,9 @@ class MixedSystem:
         retained_runs = consecutive_runs(self._retained)
         # the columns of consecutive unknowns are consecutive among those of the single layer, too
         unknown_runs = [
-            (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1) if isinstance(dofs, slice) else number[dofs])
+            (dofs, number[dofs])
+            if isinstance(dofs, np.ndarray) or dofs.step
+            else (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1))
             for _, dofs in consecutive_runs(unknown)
         ]
         known = np.zeros((2, n))

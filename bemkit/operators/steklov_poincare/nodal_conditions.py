@@ -154,7 +154,7 @@ def rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
     if not turned.size:
         return matrix
-    result = matrix.copy()
+    result = matrix.copy(order="K")
     x, y = matrix[:, 2 * turned], matrix[:, 2 * turned + 1]
     for k in range(2):
         result[:, 2 * turned + k] = frame[turned, k, 0] * x + frame[turned, k, 1] * y
