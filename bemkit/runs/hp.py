@@ -19,7 +19,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
 
-SAFETY = 0.7
+SAFETY = 0.4
 """The next mesh is planned for this part of the error asked for."""
 FEWEST_LEVELS = 4
 """Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
@@ -90,16 +90,26 @@ class LayeredMeshes:
         return int(np.clip(np.ceil(needed), 1, LARGEST_RISE))
 
     def _excess(self, solution: Solution, rise: int) -> FloatArray:
-        """Return by which factor (n_elements,) the errors at a higher degree would be above equal shares."""
+        """Return by which factor (n_elements,) the errors at a higher degree would be above what is allowed to each."""
         errors = solution.coefficient_errors
         if errors is None:
             raise InputError(
                 f"{solution.scene.discretisation.method} has no error estimate: take another discretisation"
             )
         goal = max(SAFETY * self.accuracy, self.error(solution) / GAIN**LARGEST_RISE)
-        excess = np.sqrt(errors.energy * errors.energy.size / (2.0 * solution.energy))
-        elements = solution.contact_elements
-        if solution.contact_traction_size > 0.0:
-            share = solution.contact_traction_size**2 / elements.size
-            excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / share))
-        return excess / goal * np.clip(errors.decay, FASTEST, 1.0) ** rise
+        falling = np.clip(errors.decay, FASTEST, 1.0) ** (2 * rise)
+        excess = _excess_of(errors.energy * falling, 2.0 * solution.energy * goal**2)
+        elements, size = solution.contact_elements, solution.contact_traction_size
+        if size > 0.0:
+            of_tractions = _excess_of((errors.traction * falling)[elements], (size * goal) ** 2)
+            excess[elements] = np.maximum(excess[elements], of_tractions)
+        return excess
+
+
+def _excess_of(squared: FloatArray, allowed: float) -> FloatArray:
+    """Return the square roots of errors over the bound to which the large ones must come down for a sum allowed."""
+    ascending = np.sort(squared)
+    n_larger = np.arange(squared.size, 0, -1)
+    bounds = (allowed - np.cumsum(ascending) + ascending) / n_larger  # if this and all larger ones come down
+    is_bound = bounds < ascending
+    return np.sqrt(squared / bounds[np.argmax(is_bound)]) if is_bound.any() else np.zeros(squared.size)

@@ -283,7 +283,9 @@ class DenseBody(LinearBody):
             inside = np.flatnonzero(~is_given[column])
             block[inside, position[column[inside]]] += on_displacement[row[inside]]
             matrix[row] += block
-            right_side[row] -= factor * forces[column] + on_displacement[row] * np.where(is_given, unknowns, 0.0)[column]
+            right_side[row] -= (
+                factor * forces[column] + on_displacement[row] * np.where(is_given, unknowns, 0.0)[column]
+            )
 
         row_size = np.abs(matrix).max(axis=1)
         if not row_size.all():

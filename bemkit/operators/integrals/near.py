@@ -41,9 +41,7 @@ def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray
     A curved inner element needs a rule of its own, with the same distances in its own half lengths.
     """
     centre, half = panels.centre[outer], panels.half[outer]
-    nearest = np.minimum(
-        squared_distance(centre, panels.start[inner]), squared_distance(centre, panels.end[inner])
-    )
+    nearest = np.minimum(squared_distance(centre, panels.start[inner]), squared_distance(centre, panels.end[inner]))
     level = np.zeros(nearest.shape, np.int8)
     for _, distance in GAUSS_LEVELS:
         level += nearest < np.square(half * panels.reach(distance)[outer])
