@@ -16,7 +16,7 @@ from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model.prepared import prepare
 
-REFERENCE = Path(bk.__file__).parent / "reference" / "data"
+REFERENCE = Path(__file__).parent / "reference" / "data"
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,15 @@ def reference_table(example: int) -> Any:
 
 
 @lru_cache
+def reference_data(example: int) -> Any:
+    """Return scalars and transitions of the independent reference, each with its error."""
+    return json.loads((REFERENCE / f"paper-{example}.json").read_text())
+
+
+@lru_cache
 def reference_values(example: int) -> tuple[dict[str, float], list[float]]:
     """Return the scalars and the transition points of the independent reference."""
-    data = json.loads((REFERENCE / f"paper-{example}.json").read_text())
+    data = reference_data(example)
     return {name: entry["value"] for name, entry in data["scalars"].items()}, [t["x"] for t in data["transitions"]]
 
 

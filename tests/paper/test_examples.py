@@ -13,7 +13,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 
-REFERENCE = Path(bk.__file__).parent / "reference" / "data"
+REFERENCE = Path(__file__).parents[1] / "reference" / "data"
 DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
 SOLVERS = {"ssn": bk.SemismoothNewton(), "alm": bk.AugmentedLagrangian()}
 

@@ -156,7 +156,8 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatc
 
     def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
         solution = bk.run(scene, mesh=mesh, start=start)
-        return solution if start is None else dataclasses.replace(solution, status=bk.Status.STALLED)
+        is_first = mesh.n_elements < 100
+        return solution if is_first else dataclasses.replace(solution, status=bk.Status.STALLED)
 
     monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", failing)
     failed, best = run_adaptive(scene)
@@ -164,6 +165,15 @@ def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatc
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
     assert f"was not reached: the solve on {failed.mesh.n_elements} elements failed" in best.message
     assert best.linear_solves > failed.linear_solves
+
+
+def test_a_start_that_leads_nowhere_is_left_for_a_cold_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
+        solution = bk.run(scene, mesh=mesh, start=start)
+        return solution if start is None else dataclasses.replace(solution, status=bk.Status.STALLED)
+
+    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", failing)
+    assert run_adaptive(paper(1, mesh=bk.MeshOptions(accuracy=1e-2)))[-1].is_converged
 
 
 def test_a_finer_mesh_that_is_refused_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,7 +41,7 @@ def test_everything_is_written_and_the_tables_are_printed(tmp_path: Path) -> Non
     assert result.exception is None
     assert result.return_value == 0
     for words in (
-        "reference: adaptive p-version of finite elements",
+        "reference: over-resolved: ",
         "its own errors, at most: energy 8e-08",
         "linear elements, Galerkin, uniform meshes, semismooth-newton",
         "linear elements, Galerkin, adaptive meshes",
