@@ -78,7 +78,10 @@ def test_the_angle_jumps_by_two_pi_across_the_element_and_nowhere_else() -> None
 def test_log_and_quotient_integrals_are_what_they_claim_to_be(xi: float, eta: float, k: int) -> None:
     zeta = complex(xi, eta)
     integrals, log_product = kernels.near_integrals(np.array([zeta + 1]), np.array([zeta - 1]), k + 1)
-    logs, quotients = kernels.log_integrals(integrals, log_product), kernels.quotient_integrals(integrals, np.array([eta]))
+    logs, quotients = (
+        kernels.log_integrals(integrals, log_product),
+        kernels.quotient_integrals(integrals, np.array([eta])),
+    )
     points, weights = np.polynomial.legendre.leggauss(400)  # the kernel is analytic at a distance of 0.05
     density = weights * np.polynomial.legendre.legval(points, np.eye(k + 1)[k])
     rho = zeta - points

@@ -122,9 +122,7 @@ class PairIntegrals:
         return cls(np.zeros(log + shape), np.zeros(log + shape, complex), np.zeros(double + shape))
 
     @classmethod
-    def summed(
-        cls, degrees: Degrees, points: FloatArray, weights: FloatArray, inner: Sequence[Inner]
-    ) -> PairIntegrals:
+    def summed(cls, degrees: Degrees, points: FloatArray, weights: FloatArray, inner: Sequence[Inner]) -> PairIntegrals:
         """Sum inner integrals over the points of one rule on the test elements."""
 
         def total(family: tuple[int, int] | None, values: Sequence[FloatArray]) -> FloatArray:

@@ -31,7 +31,6 @@ from bemkit.operators.integrals.near import (
     LevelArray,
     gauss_levels,
     integrate_listed,
-    integrate_same,
 )
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels, squared_distance
@@ -75,7 +74,7 @@ class PairSweep:
         level, is_close = self._classify()
         self.base = _cheapest_level(np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1))
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
-        self._listed = self._correct()
+        self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
     def _n_points(self, level: int) -> int:
         """Return the number of points of a Gauss level."""
@@ -104,18 +103,6 @@ class PairSweep:
         """Return the columns of straight and of curved trial elements."""
         is_straight = self.panels.is_straight[self.trial]
         return np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
-
-    def _correct(self) -> PairIntegrals:
-        """Integrate the listed pairs."""
-        test, trial = self.test[self._rows], self.trial[self._columns]
-        result = PairIntegrals.zeros(self.degrees, (test.size,))
-        is_same = test == trial
-        others = np.flatnonzero(~is_same)
-        result.assign(others, integrate_listed(self.panels, self.degrees, test[others], trial[others]))
-        is_straight = self.panels.is_straight[trial]
-        for same in (np.flatnonzero(is_same & is_straight), np.flatnonzero(is_same & ~is_straight)):
-            result.assign(same, integrate_same(self.panels, self.degrees, test[same]))
-        return result
 
     def chunk(self, rows: slice) -> PairIntegrals:
         """Return the integrals of some rows, of shape (..., n_rows, n_trial).
