@@ -41,7 +41,7 @@ CHUNK_PAIRS = 32768
 """Pairs treated at once, at most: a few complex arrays of this length stay in the cache."""
 CHUNK_INTEGRALS = 65536
 """Integrals of one kind treated at once, at most: those of all polynomials."""
-LISTED_COST = 2.5
+LISTED_COST = 1.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""
 
 
@@ -72,7 +72,8 @@ class PairSweep:
         n_pairs = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products)
         self.rows_per_chunk = max(1, n_pairs // max(1, self.trial.size))
         level, is_close = self._classify()
-        self.base = _cheapest_level(np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1))
+        counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
+        self.base = _cheapest_level(counts, degrees.extra_points)
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
         self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
@@ -151,9 +152,9 @@ class PairSweep:
         return sums
 
 
-def _cheapest_level(counts: IntArray) -> int:
+def _cheapest_level(counts: IntArray, extra_points: int) -> int:
     """Choose the Gauss level of the dense sweep: more points for all, or fewer and a longer list."""
-    n_points = np.array([n for n, _ in GAUSS_LEVELS] + [GAUSS_LEVELS[-1][0]])
+    n_points = extra_points + np.array([n for n, _ in GAUSS_LEVELS] + [GAUSS_LEVELS[-1][0]])
     listed = LISTED_COST * counts * n_points
     costs = [n_points[base] * counts.sum() + listed[base + 1 :].sum() for base in range(len(GAUSS_LEVELS))]
     return int(np.argmin(costs))
