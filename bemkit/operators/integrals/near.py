@@ -28,7 +28,7 @@ GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the outer element] from which each is enough."""
 N_REGULAR = 10
 N_TOUCHING = 30
-BATCH_POINTS = 8192
+BATCH_POINTS = 4096
 """Outer points treated at once: their integrals stay in the cache."""
 
 LevelArray = npt.NDArray[np.int8]

@@ -74,6 +74,8 @@ class PairSweep:
         level, is_close = self._classify()
         counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
         self.base = _cheapest_level(counts, degrees.extra_points)
+        # the inner integrals of all points are held at once
+        self.rows_per_chunk = max(1, 3 * self.rows_per_chunk // max(3, self._n_points(self.base)))
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
         self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
