@@ -24,7 +24,7 @@ Run: TypeAlias = tuple[slice, slice | IntArray]
 def consecutive_runs(indices: IntArray) -> list[Run]:
     """Cut indices into runs of consecutive numbers: pairs (positions, indices) of slices, which index without copies.
 
-    A list that ascends by equal steps is one run. A list in no particular order is one, too, whose indices are an array.
+    A list that ascends by equal steps is one run. So is a list in no particular order, whose indices are an array.
     """
     if not indices.size:
         return []

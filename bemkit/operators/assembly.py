@@ -226,7 +226,7 @@ class _Target:
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
     def gather(self, block: Block) -> FloatArray:
-        """Return the rows of elements, (n_local, n_rows, 2, n_trial_nodes, 2), by dof of the test element and trial dof."""
+        """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes, 2), by their own dofs."""
         n_rows, test = block.test_half.shape[0], self.test_coefficients
         gathered = np.zeros((test.shape[1], n_rows, 2, self.trial_nodes.size, 2))
         for term in self.terms:

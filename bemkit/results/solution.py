@@ -22,7 +22,7 @@ from bemkit.plan import Plan
 from bemkit.results.coefficient_decay import CoefficientErrors, coefficient_errors
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.error_indicators import contact_errors, squared_errors
+from bemkit.results.error_indicators import contact_errors, place_errors, squared_errors
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
@@ -182,6 +182,7 @@ class Solution:
             squared = float(contact_errors(self.contact, degree).sum())
         else:
             squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
+            squared += float(place_errors(self.contact, self.mesh, self.transitions).sum())
         return float(np.sqrt(squared)) / self.contact_traction_size
 
     @property

@@ -85,9 +85,13 @@ class LayeredMeshes:
         return replace(following, partition=refined_partition(partition, excess, cuts))
 
     def _rise(self, solution: Solution) -> int:
-        """Return how many degrees the error needs, up to the largest rise."""
-        needed = np.log(self.error(solution) / (SAFETY * self.accuracy)) / np.log(GAIN)
-        return int(np.clip(np.ceil(needed), 1, LARGEST_RISE))
+        """Return how many degrees the errors of elements need; none where only the places of change must be met."""
+        error = float(solution.estimated_error or 0.0)
+        if solution.coefficient_errors is not None and (size := solution.contact_traction_size) > 0.0:
+            squared = float(solution.coefficient_errors.traction[solution.contact_elements].sum())
+            error = max(error, np.sqrt(squared) / size)
+        needed = np.log(max(error, self.accuracy**2) / (SAFETY * self.accuracy)) / np.log(GAIN)
+        return int(np.clip(np.ceil(needed), 0, LARGEST_RISE))
 
     def _excess(self, solution: Solution, rise: int) -> FloatArray:
         """Return by which factor (n_elements,) the errors at a higher degree would be above what is allowed to each."""

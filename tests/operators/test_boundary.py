@@ -47,7 +47,8 @@ def test_one_sweep_gives_the_same_matrices_as_three() -> None:
     bk.assemble(*together)
     bk.assemble(*together)  # assembled operators are left alone
     for one, other in zip(together, alone, strict=True):
-        np.testing.assert_allclose(one.matrix(), other.matrix(), rtol=0.0, atol=1e-16 * np.abs(one.matrix()).max())
+        # products of matrices of other sizes add up in another order
+        np.testing.assert_allclose(one.matrix(), other.matrix(), rtol=0.0, atol=1e-15 * np.abs(one.matrix()).max())
 
 
 def test_adjoint_is_exactly_the_transpose() -> None:

@@ -269,25 +269,21 @@ class DenseBody(LinearBody):
         number = np.full((self.n_contact, 2), -1)  # of each displacement among the unknowns
         number.flat[self.unknown_dofs] = np.arange(self.n_unknowns)
         position = np.cumsum(~is_given) - 1  # of each unknown among the wanted ones
-        forces = self.stiffness[:, is_given] @ unknowns[is_given] - self.load
+        given = np.where(is_given, unknowns, 0.0)
+        forces = self.stiffness @ given - self.load
         right_side = conditions.value[node, component]
         matrix = np.zeros((wanted.size, wanted.size))
         for of in (component, 1 - component):
-            on_displacement, on_traction = (
-                matrices[node, component, of] for matrices in (conditions.on_displacement, conditions.on_traction)
-            )
+            on_displacement = conditions.on_displacement[node, component, of]
+            on_traction = conditions.on_traction[node, component, of]
             row = np.flatnonzero((number[node, of] >= 0) & ((on_displacement != 0.0) | (on_traction != 0.0)))
             column, factor = number[node[row], of[row]], (on_traction / self.weights[node])[row]
-            block = self.stiffness[np.ix_(column, wanted)]
-            block *= factor[:, None]
+            matrix[row] += factor[:, None] * self.stiffness[np.ix_(column, wanted)]
             inside = np.flatnonzero(~is_given[column])
-            block[inside, position[column[inside]]] += on_displacement[row[inside]]
-            matrix[row] += block
-            right_side[row] -= (
-                factor * forces[column] + on_displacement[row] * np.where(is_given, unknowns, 0.0)[column]
-            )
-
-        row_size = np.abs(matrix).max(axis=1)
+            matrix[row[inside], position[column[inside]]] += on_displacement[row[inside]]
+            right_side[row] -= factor * forces[column] + on_displacement[row] * given[column]
+        sizes = np.abs(matrix)
+        row_size = sizes.max(axis=1)
         if not row_size.all():
             raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
         matrix /= row_size[:, None]
@@ -298,7 +294,7 @@ class DenseBody(LinearBody):
             raise SingularResponse("the contact conditions do not hold the body (a pivot is zero)") from error
         # One more right-hand side is a cheap estimate of the inverse. (LAPACK's own estimate is only in scipy, whose
         # BLAS threads and numpy's get in each other's way: factors of 10 to 100 in time for systems of this size.)
-        rcond = 1.0 / (float(np.abs(matrix).sum(axis=1).max()) * float(np.abs(probed).max()))
+        rcond = 1.0 / (float((sizes.sum(axis=1) / row_size).max()) * float(np.abs(probed).max()))
         if rcond < _SMALLEST_RCOND:
             raise SingularResponse(f"the contact conditions do not hold the body (reciprocal condition {rcond:.1e})")
         return np.ascontiguousarray(solution)

@@ -28,7 +28,7 @@ GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the outer element] from which each is enough."""
 N_REGULAR = 10
 N_TOUCHING = 30
-BATCH_POINTS = 8192
+BATCH_POINTS = 4096
 """Outer points treated at once: their integrals stay in the cache."""
 
 LevelArray = npt.NDArray[np.int8]
@@ -55,7 +55,7 @@ def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray
 
 
 def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
-    """Integrate pairs of different elements, each with the rule that its distance asks for.
+    """Integrate pairs of elements, each with the rule that its distance asks for.
 
     Parameters
     ----------
@@ -65,11 +65,17 @@ def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: In
         Element numbers of the pairs.
     """
     half, n_elements = panels.half, panels.half.size
+    result = PairIntegrals.zeros(degrees, (test.size,))
+    is_same, is_straight = test == trial, panels.is_straight[trial]
+    for same in (np.flatnonzero(is_same & is_straight), np.flatnonzero(is_same & ~is_straight)):
+        result.assign(same, _integrate_same(panels, degrees, test[same]))
     is_turned = (half[test] > half[trial]) | ((half[test] == half[trial]) & (test > trial))
     is_turned &= panels.is_straight[test] & panels.is_straight[trial]
-    # both orders of two elements share their integrals
+    # both orders of two elements share their integrals; those of elements with themselves come last and are left out
     numbers = np.where(is_turned, trial * n_elements + test, test * n_elements + trial)
+    numbers[is_same] = n_elements**2
     different, item = np.unique(numbers, return_inverse=True)
+    different = different[: np.searchsorted(different, n_elements**2)]
     outer, inner = np.divmod(different, n_elements)
     either_way = degrees.either_way
     sums = Inner.from_rows(either_way, _outer_sums(panels, either_way, outer, inner))
@@ -80,9 +86,8 @@ def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: In
     # with the normal n = -i tangent at y, k = Re(n / (x - y)) / (2 pi)
     turned = -((panels.tangent[outer] * panels.tangent[inner].conj()) * cauchy).imag
 
-    result = PairIntegrals.zeros(degrees, (test.size,))
     for chosen, double, axes in (
-        (np.flatnonzero(~is_turned), cauchy.imag, (1, 0, 2)),
+        (np.flatnonzero(~is_turned & ~is_same), cauchy.imag, (1, 0, 2)),
         (np.flatnonzero(is_turned), turned, (0, 1, 2)),
     ):
         own = item[chosen]
@@ -140,9 +145,10 @@ class _Rule:
     def whole(cls, item: IntArray, n_points: int) -> _Rule:
         """Return one Gauss rule for all, each half of it measured from its own end."""
         points, weights = gauss_legendre(n_points)
-        parts = (points < 0.0, 0.5 * (1.0 - np.abs(points)), weights)
-        at_start, fraction, weight = (np.broadcast_to(part, (item.size, n_points)) for part in parts)
-        return cls(item, at_start, fraction, weight)
+        shape = (item.size, n_points)
+        at_start, fraction = points < 0.0, 0.5 * (1.0 - np.abs(points))
+        fraction, weight = np.broadcast_to(fraction, shape), np.broadcast_to(weights, shape)
+        return cls(item, np.broadcast_to(at_start, shape), fraction, weight)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +226,13 @@ def _add(
         xi = np.where(at_start, 2.0 * fraction - 1.0, 1.0 - 2.0 * fraction)
         factors = rule.weight[batch] * kernels.legendre_values(sums.shape[2] - 1, xi)
         moments = rows.transpose(1, 0, 2) @ factors.transpose(1, 2, 0)
-        first = np.flatnonzero(np.diff(item, prepend=-1))
-        sums[item[first]] += np.add.reduceat(moments, first, axis=0)
+        begins = np.flatnonzero(np.diff(item, prepend=-1))
+        if begins.size < item.size:
+            item, moments = item[begins], np.add.reduceat(moments, begins, axis=0)
+        sums[item] += moments
 
 
-def integrate_same(panels: Panels, degrees: Degrees, elements: IntArray) -> PairIntegrals:
+def _integrate_same(panels: Panels, degrees: Degrees, elements: IntArray) -> PairIntegrals:
     """Integrate elements against themselves: the logarithm scales from the unit element, bending adds smooth parts."""
     result = PairIntegrals.zeros(degrees, (elements.size,))
     if panels.curved is None or bool(panels.is_straight[elements].all()):

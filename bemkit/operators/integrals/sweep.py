@@ -31,7 +31,6 @@ from bemkit.operators.integrals.near import (
     LevelArray,
     gauss_levels,
     integrate_listed,
-    integrate_same,
 )
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels, squared_distance
@@ -42,7 +41,7 @@ CHUNK_PAIRS = 32768
 """Pairs treated at once, at most: a few complex arrays of this length stay in the cache."""
 CHUNK_INTEGRALS = 65536
 """Integrals of one kind treated at once, at most: those of all polynomials."""
-LISTED_COST = 2.5
+LISTED_COST = 1.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""
 
 
@@ -73,9 +72,12 @@ class PairSweep:
         n_pairs = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products)
         self.rows_per_chunk = max(1, n_pairs // max(1, self.trial.size))
         level, is_close = self._classify()
-        self.base = _cheapest_level(np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1))
+        counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
+        self.base = _cheapest_level(counts, degrees.extra_points)
+        # the inner integrals of all points are held at once
+        self.rows_per_chunk = max(1, 3 * self.rows_per_chunk // max(3, self._n_points(self.base)))
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
-        self._listed = self._correct()
+        self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
     def _n_points(self, level: int) -> int:
         """Return the number of points of a Gauss level."""
@@ -104,18 +106,6 @@ class PairSweep:
         """Return the columns of straight and of curved trial elements."""
         is_straight = self.panels.is_straight[self.trial]
         return np.flatnonzero(is_straight), np.flatnonzero(~is_straight)
-
-    def _correct(self) -> PairIntegrals:
-        """Integrate the listed pairs."""
-        test, trial = self.test[self._rows], self.trial[self._columns]
-        result = PairIntegrals.zeros(self.degrees, (test.size,))
-        is_same = test == trial
-        others = np.flatnonzero(~is_same)
-        result.assign(others, integrate_listed(self.panels, self.degrees, test[others], trial[others]))
-        is_straight = self.panels.is_straight[trial]
-        for same in (np.flatnonzero(is_same & is_straight), np.flatnonzero(is_same & ~is_straight)):
-            result.assign(same, integrate_same(self.panels, self.degrees, test[same]))
-        return result
 
     def chunk(self, rows: slice) -> PairIntegrals:
         """Return the integrals of some rows, of shape (..., n_rows, n_trial).
@@ -164,9 +154,9 @@ class PairSweep:
         return sums
 
 
-def _cheapest_level(counts: IntArray) -> int:
+def _cheapest_level(counts: IntArray, extra_points: int) -> int:
     """Choose the Gauss level of the dense sweep: more points for all, or fewer and a longer list."""
-    n_points = np.array([n for n, _ in GAUSS_LEVELS] + [GAUSS_LEVELS[-1][0]])
+    n_points = extra_points + np.array([n for n, _ in GAUSS_LEVELS] + [GAUSS_LEVELS[-1][0]])
     listed = LISTED_COST * counts * n_points
     costs = [n_points[base] * counts.sum() + listed[base + 1 :].sum() for base in range(len(GAUSS_LEVELS))]
     return int(np.argmin(costs))

@@ -132,7 +132,7 @@ def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArra
     orders = local_moments(plus, minus, max(1, highest), 3)
     for end, zeta in ((START, plus), (END, minus)):
         _expand_about_end(orders, zeta, np.flatnonzero(origin == end), end)
-    t, g, h = (np.stack(row)[: highest + 1] for row in orders)
+    t, g, h = (row[: highest + 1] for row in orders)
     cube = tangent * tangent * tangent
     return GradientMoments(
         origin=origin,
@@ -143,7 +143,7 @@ def straight_gradient_moments(panels: Panels, x: ComplexArray, elements: IntArra
     )
 
 
-def _expand_about_end(orders: list[list[ComplexArray]], zeta: ComplexArray, chosen: IntArray, end: int) -> None:
+def _expand_about_end(orders: list[ComplexArray], zeta: ComplexArray, chosen: IntArray, end: int) -> None:
     """Replace the Legendre polynomials by the powers of t - e at some points, `zeta` from that end."""
     for k in range(1, len(orders[0])):
         # the integral of (t - e)**(k - 1) over [-1, 1]

@@ -163,7 +163,7 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         right_hand_sides=n_columns,
     )
     # bytes for each element and at most, of close pairs; for each element kept; for each pair of a chunk
-    close, most, listed, swept = (38e3, 14.5e6, 4e3, 160.0) if degree < 2 else (50e3, 13e6, 24e3, 160.0)
+    close, most, listed, swept = (38e3, 14.5e6, 4e3, 330.0) if degree < 2 else (40e3, 10e6, 18e3, 130.0)
     n = mesh.whole.n_elements
     buffers = max(min(close * n, most), swept * _pairs_in_chunks(mesh)) + listed * n
     memory = int(max(_BYTES * assembled + buffers, _BYTES * largest))
