@@ -19,9 +19,9 @@ def paper_reference(number: int) -> Reference:
     """Return the reference of example 1 or 2 along the part ``foundation``."""
     folder = resources.files("bemkit") / "reference" / "data"
     table = (folder / f"paper-{number}.csv").read_text("utf-8")
-    s, weight, *fields = np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1, unpack=True)
+    s, weight, u_n, u_t, sigma_n, sigma_t = np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1, unpack=True)
     record = json.loads((folder / f"paper-{number}.json").read_text("utf-8"))
     zones = tuple(Zone(record["part"], **zone) for zone in record["zones"])
-    scalars = (record[name] for name in ("energy", "force_normal", "force_tangential"))
-    answer = Answer(*fields, *scalars, zones)
+    energy, force_normal, force_tangential = (record[name] for name in ("energy", "force_normal", "force_tangential"))
+    answer = Answer(u_n, u_t, sigma_n, sigma_t, energy, force_normal, force_tangential, zones)
     return Reference(record["source"], (Places(record["part"], s, weight),), answer, record["own_errors"])
