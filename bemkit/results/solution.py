@@ -19,6 +19,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.error_indicators import squared_errors
@@ -155,6 +156,14 @@ class Solution:
             return 0.0
         return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
 
+    @cached_property
+    def between_nodes(self) -> BetweenNodes | None:
+        """Largest violations of the contact conditions between the nodes, of which the certificate says nothing.
+
+        None without contact.
+        """
+        return violations_between_nodes(self.scene, self.mesh, self.contact, self.boundary)
+
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
 
@@ -164,7 +173,8 @@ class Solution:
             ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``certified``, ``warnings``,
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
-            ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
+            ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
+            ``work``, ``memory`` [bytes].
         """
         return {
             "title": self.scene.title,
@@ -183,6 +193,7 @@ class Solution:
             "estimated_error": self.estimated_error,
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
+            "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
             "timings": dict(self.timings),
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),

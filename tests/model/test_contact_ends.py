@@ -6,10 +6,7 @@ displacement across them, so that rollers and smooth obstacles on the axes chang
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
