@@ -143,13 +143,16 @@ class Model:
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
-        space = self.prepared.space
-        at_nodes = np.zeros((space.n_dofs // 2, 2))
-        at_nodes[self.nodes.nodes] = np.einsum("nk,nkc->nc", state.traction, self.nodes.frame)
+        space, nodes = self.prepared.space, self.nodes
+        tractions = np.einsum("nk,nkc->nc", state.traction, nodes.frame)
         xi, weights = gauss_legendre(space.degree + 1)
         projection = space.basis(xi) @ _projector(self.elastic.traction_space, xi, weights).T
         for part, elements, _ in parts_on(self.scene, self.mesh):
             if isinstance(part.condition, Contact):
+                at_nodes = np.zeros((space.n_dofs // 2, 2))
+                own = np.equal(self.contact.parts, part.name)
+                for rows in (~own, own):  # of a node between two obstacles that of this part
+                    at_nodes[nodes.nodes[rows]] = tractions[rows]
                 traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes[space.element_dofs[elements]])
 
     def _insert_loads(self, traction: FloatArray) -> None:
