@@ -94,7 +94,7 @@ def violations_between_nodes(
     stress = float(np.maximum(np.abs(contact.sigma_n), np.abs(contact.sigma_t)).max()) or 1.0
     force = float(np.sum(contact.weight * np.hypot(contact.sigma_n, contact.sigma_t)))
     length = force / scene.material.plane_modulus or float(np.abs(boundary.displacement).max()) or 1.0
-    with np.errstate(invalid="ignore"):  # results that are not finite are measured by nan
+    with np.errstate(all="ignore"):  # results that are not finite are measured by nan
         measured = [
             _violations(
                 _values(scene, part.condition.obstacle, mesh, mesh.part(part.name), boundary),
