@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from bemkit.results.solution import BoundaryFields
 
 _POINTS_PER_NODE = 4
 """Points of an element for each of its nodes: between them a polynomial grows by a few per cent more at most."""
@@ -67,7 +64,7 @@ class BetweenNodes:
 
 
 def violations_between_nodes(
-    scene: Scene, mesh: BoundaryMesh, contact: ContactTable, boundary: BoundaryFields
+    scene: Scene, mesh: BoundaryMesh, contact: ContactTable, displacement: FloatArray, traction_dofs: FloatArray
 ) -> BetweenNodes | None:
     """Measure the displacements and tractions of a result along its contact boundary, without running anything again.
 
@@ -77,7 +74,8 @@ def violations_between_nodes(
         With a single load.
     mesh : BoundaryMesh
     contact : ContactTable
-    boundary : BoundaryFields
+    displacement, traction_dofs : arrays [m], [Pa]
+        As in `bemkit.results.solution.BoundaryFields`.
 
     Returns
     -------
@@ -93,11 +91,11 @@ def violations_between_nodes(
         return None
     stress = float(np.maximum(np.abs(contact.sigma_n), np.abs(contact.sigma_t)).max()) or 1.0
     force = float(np.sum(contact.weight * np.hypot(contact.sigma_n, contact.sigma_t)))
-    length = force / scene.material.plane_modulus or float(np.abs(boundary.displacement).max()) or 1.0
+    length = force / scene.material.plane_modulus or float(np.abs(displacement).max()) or 1.0
     with np.errstate(all="ignore"):  # results that are not finite are measured by nan
         measured = [
             _violations(
-                _values(scene, part.condition.obstacle, mesh, mesh.part(part.name), boundary),
+                _values(scene, part.condition.obstacle, mesh, mesh.part(part.name), displacement, traction_dofs),
                 scene.laws[part.name],
                 stress,
                 length,
@@ -118,19 +116,24 @@ class _Values(NamedTuple):
 
 
 def _values(
-    scene: Scene, obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, boundary: BoundaryFields
+    scene: Scene,
+    obstacle: Obstacle,
+    mesh: BoundaryMesh,
+    elements: IntArray,
+    displacement: FloatArray,
+    traction_dofs: FloatArray,
 ) -> _Values:
     discretisation = scene.discretisation
     displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
     xi = _points_between(displacements.degree)
     points = mesh.points(elements, xi).reshape(-1, 2)
     gap, directions = measure_contact(obstacle, points, mesh.normals_at(elements, xi).reshape(-1, 2))
-    at_nodes = boundary.displacement[displacements.element_dofs[elements]]
-    displacement = np.einsum("pq,epc->eqc", displacements.basis(xi), at_nodes).reshape(-1, 2)
-    at_dofs = boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)[elements]
+    at_nodes = displacement[displacements.element_dofs[elements]]
+    motion = np.einsum("pq,epc->eqc", displacements.basis(xi), at_nodes).reshape(-1, 2)
+    at_dofs = traction_dofs.reshape(mesh.n_elements, -1, 2)[elements]
     traction = np.einsum("lq,elc->eqc", tractions.basis(xi), at_dofs).reshape(-1, 2)
     sigma_n, sigma_t = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
-    return _Values(points, gap - np.sum(displacement * directions, axis=1), sigma_n, sigma_t)
+    return _Values(points, gap - np.sum(motion * directions, axis=1), sigma_n, sigma_t)
 
 
 def _violations(values: _Values, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:

@@ -162,7 +162,8 @@ class Solution:
 
         None without contact.
         """
-        return violations_between_nodes(self.scene, self.mesh, self.contact, self.boundary)
+        displacement, traction_dofs = self.boundary.displacement, self.boundary.traction_dofs
+        return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs)
 
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.

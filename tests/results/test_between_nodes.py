@@ -45,8 +45,7 @@ def changed(solution: Solution, displacement: float = 0.0, normal: float = 0.0, 
     nodes = solution.scene.discretisation.displacement_space(solution.mesh).element_dofs[element]
     u[nodes[2], 1] += displacement
     t[2 * element : 2 * element + 2] += np.outer([-1.0, 1.0], [shear, normal])
-    boundary = replace(solution.boundary, displacement=u, traction_dofs=t)
-    found = violations_between_nodes(solution.scene, solution.mesh, solution.contact, boundary)
+    found = violations_between_nodes(solution.scene, solution.mesh, solution.contact, u, t)
     assert found is not None
     return found
 
