@@ -13,6 +13,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Registry
@@ -181,16 +182,29 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
         *_estimate(solution),
         *_solve(solution),
         ("certificate", Text(_certificate_line(solution.certificate))),
+        *_between_nodes(solution),
         ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
     ]
     return rows
 
 
 def _certificate_line(certificate: Certificate) -> str:
-    violations = certificate.violations
+    return f"{_worst_entry(certificate)}; round-off of the forces up to {certificate.round_off:.1e}"
+
+
+def _between_nodes(solution: Solution) -> list[tuple[str, Text]]:
+    between = solution.between_nodes
+    if between is None:
+        return []
+    line = f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
+    return [("between nodes", Text(line))]
+
+
+def _worst_entry(measured: Certificate | BetweenNodes) -> str:
+    violations = measured.violations
     worst = max(violations, key=lambda name: _nan_first(violations[name]))
-    name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
-    return f"worst entry {certificate.worst:.1e}{name}; round-off of the forces up to {certificate.round_off:.1e}"
+    name = f" ({worst.replace('_', ' ')})" if measured.worst != 0.0 else ""  # where all are equal
+    return f"worst entry {measured.worst:.1e}{name}"
 
 
 def _symmetry(solution: Solution) -> list[tuple[str, Text]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,7 +51,8 @@ class ContactData:
 
     def of(self, nodes: ContactNodes) -> ContactData:
         """Return the rows of some of the nodes, in the order they have here."""
-        rows = np.isin(self.nodes.nodes, nodes.nodes)
+        own, others = (2 * each.nodes + each.is_second for each in (self.nodes, nodes))
+        rows = np.isin(own, others)
         parts = tuple(part for part, is_kept in zip(self.parts, rows.tolist(), strict=True) if is_kept)
         columns = (column[rows] for column in (self.arc_length, self.gap, self.facing, self.points))
         return ContactData(self.nodes.take(rows), parts, *columns)
@@ -76,8 +77,9 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
     Notes
     -----
     A node of several contact parts belongs to the one whose obstacle is nearest, and to the first of those that are
-    equally near. Where their directions are alike, it stands for its share of all of them. At a corner it cannot touch
-    two obstacles in two directions: the others' shares go to their next nodes, as at crosspoints of mortar methods
+    equally near. Where their directions are alike, it stands for its share of all of them. In a corner between two
+    obstacles without friction it touches both, and stands in two rows. With friction two displacements cannot tell four
+    tractions: the share of the other obstacle goes to its next node, as at crosspoints of mortar methods
     [Wohlmuth2000].
     """
     obstacles = {
@@ -95,11 +97,21 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
     for number, side in enumerate(sides):
         own = owner[side.nodes] == number
         directions[side.nodes[own]] = side.directions[own]
+    is_smooth = np.array([scene.laws[name].is_frictionless for name in obstacles])
+    seconds = [
+        is_smooth[number] & is_smooth[owner[side.nodes]] & side.crosses(directions) & (owner[side.nodes] != number)
+        for number, side in enumerate(sides)
+    ]
     weights = np.zeros(owner.size)
-    for side in sides:
-        np.add.at(weights, side.receivers(directions), side.weights)
-    kept = [side.take(owner[side.nodes] == number) for number, side in enumerate(sides)]
-    return _joined(scene, list(obstacles), kept, weights, space)
+    for side, is_second in zip(sides, seconds, strict=True):
+        np.add.at(weights, side.receivers(directions)[~is_second], side.weights[~is_second])
+    kept = [
+        replace(side, weights=np.where(is_second, side.weights, weights[side.nodes])).take(
+            is_second | (owner[side.nodes] == number)
+        )
+        for number, (side, is_second) in enumerate(zip(sides, seconds, strict=True))
+    ]
+    return _joined(scene, list(obstacles), kept, space)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +146,11 @@ class _Side:
     def take(self, rows: BoolArray) -> _Side:
         return _Side(*(column[rows] for column in vars(self).values()))
 
+    def crosses(self, directions: FloatArray) -> BoolArray:
+        """Return (n,) bool: nodes that this side touches at 30 to 150 degrees to the directions (n_nodes, 2) given."""
+        cosine = np.sum(directions[self.nodes] * self.directions, axis=1)
+        return np.asarray((np.abs(cosine) <= SMOOTH_SIDE_COSINE) & np.isfinite(self.gap))
+
     def receivers(self, directions: FloatArray) -> IntArray:
         """Return the node (n,) to which the weight of each node goes: itself, or the next one on this side."""
         is_own = np.sum(directions[self.nodes] * self.directions, axis=1) > SMOOTH_SIDE_COSINE
@@ -152,13 +169,11 @@ def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
     return owner
 
 
-def _joined(
-    scene: Scene, names: Sequence[str], sides: Sequence[_Side], weights: FloatArray, space: BoundarySpace
-) -> ContactData:
+def _joined(scene: Scene, names: Sequence[str], sides: Sequence[_Side], space: BoundarySpace) -> ContactData:
     columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
-    nodes, directions, _, arc_length, gap, facing, points = columns
+    nodes, directions, weights, arc_length, gap, facing, points = columns
     parts = tuple(name for name, side in zip(names, sides, strict=True) for _ in range(side.nodes.size))
     smooth = {name for name, law in scene.laws.items() if law.is_frictionless}
     is_frictionless = np.array([part in smooth for part in parts], bool)
-    found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights[nodes], is_frictionless)
+    found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights, is_frictionless)
     return ContactData(found, parts, arc_length, gap, facing, points)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
@@ -20,7 +20,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contact_data import ContactData
+from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
 from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
@@ -144,13 +144,31 @@ class Model:
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
         space = self.prepared.space
-        at_nodes = np.zeros((space.n_dofs // 2, 2))
-        at_nodes[self.nodes.nodes] = np.einsum("nk,nkc->nc", state.traction, self.nodes.frame)
+        at_rest = np.zeros((1, 2))  # at nodes that contact does not reach
+        tractions = np.concatenate([np.einsum("nk,nkc->nc", state.traction, self.nodes.frame), at_rest])
         xi, weights = gauss_legendre(space.degree + 1)
         projection = space.basis(xi) @ _projector(self.elastic.traction_space, xi, weights).T
         for part, elements, _ in parts_on(self.scene, self.mesh):
             if isinstance(part.condition, Contact):
-                traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes[space.element_dofs[elements]])
+                at_nodes = tractions[self._rows_of(part.name, elements)]
+                traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes)
+
+    def _rows_of(self, part: str, elements: IntArray) -> IntArray:
+        """Return the contact nodes (n_elements, n_local) whose tractions the elements of a part have; -1 without one.
+
+        In a corner that is the row of the part's own obstacle. Where the node there belongs to another part alone, the
+        next node stands for it.
+        """
+        own, directions = np.equal(self.contact.parts, part), self.nodes.directions
+        row = np.full(self.prepared.space.n_dofs // 2, -1)
+        for rows in (np.flatnonzero(~own), np.flatnonzero(own)):
+            row[self.nodes.nodes[rows]] = rows
+        found = row[self.prepared.space.element_dofs[elements]]
+        for end, following in ((0, 1), (-1, -2)) if self.prepared.space.degree else ():
+            there, beside = found[:, end], found[:, following]
+            turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
+            found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
+        return found
 
     def _insert_loads(self, traction: FloatArray) -> None:
         """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero."""

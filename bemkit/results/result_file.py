@@ -6,6 +6,7 @@ stranger runs no code. The layout, version 2:
     /                attributes format = "bemkit-result" and schema_version
     /scene           text, the scene as TOML
     /provenance, /summary, /certificate, /timings, /memory     attributes
+    /between_nodes   attributes, with contact; for other programs, since it follows from the fields
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
@@ -100,6 +101,8 @@ def write_result(path: str | Path, solution: Solution) -> None:
         write_attributes(file.create_group("provenance"), provenance())
         write_attributes(file.create_group("summary"), _summary(solution))
         write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
+        if solution.between_nodes is not None:
+            write_attributes(file.create_group("between_nodes"), solution.between_nodes.as_dict())
         write_attributes(file.create_group("timings", track_order=True), solution.timings)
         _write_mesh(file.create_group("mesh"), solution.mesh)
         for name in _BOUNDARY:

@@ -19,6 +19,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.coefficient_decay import CoefficientErrors, coefficient_errors
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
@@ -196,6 +197,15 @@ class Solution:
         table = self.contact
         return float(np.sqrt(table.weight @ (table.sigma_n**2 + table.sigma_t**2)))
 
+    @cached_property
+    def between_nodes(self) -> BetweenNodes | None:
+        """Largest violations of the contact conditions between the nodes, of which the certificate says nothing.
+
+        None without contact.
+        """
+        displacement, traction_dofs = self.boundary.displacement, self.boundary.traction_dofs
+        return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs)
+
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.
 
@@ -207,6 +217,11 @@ class Solution:
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
             ``estimated_traction_error`` (None without an estimate),
             ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
+
+        @cached_property
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
+            ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
+            ``work``, ``memory`` [bytes].
         """
         return {
             "title": self.scene.title,
@@ -226,6 +241,7 @@ class Solution:
             "estimated_traction_error": self.estimated_traction_error,
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
+            "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
             "timings": dict(self.timings),
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),

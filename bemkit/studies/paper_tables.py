@@ -20,7 +20,7 @@ from bemkit.arrays import IntArray, read_only
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import NoResultError
-from bemkit.geometry.grading import Uniform
+from bemkit.geometry.grading import Algebraic
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
@@ -138,7 +138,8 @@ def paper_model(number: int) -> Model:
     density = {
         side.name: 1.0 / float(np.hypot(*np.ptp(side.curve.point(np.array([0.0, 1.0])), axis=0))) for side in sides
     }
-    mesh = MeshOptions(elements=_N_ELEMENTS, grading=Uniform(), density=density)
+    equal = Algebraic(1.0)  # also next to sides with shorter elements
+    mesh = MeshOptions(elements=_N_ELEMENTS, grading=equal, density=density)
     scene = replace(scene, mesh=mesh, discretisation=ConstantCollocation(slopes=False))
     return build_model(prepare(scene, scene.build_mesh()))
 

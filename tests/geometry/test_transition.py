@@ -24,7 +24,7 @@ def test_positions_increase_and_no_element_is_much_longer_than_the_mean(n: int, 
     assert lengths.max() <= LARGEST_STRETCH / n * (1.0 + 1e-3)  # the sums that place them are that good
 
 
-@given(st.integers(1, 200), st.floats(0.51, 10.0), st.floats(0.51, 10.0))
+@given(st.integers(1, 200), st.floats(0.84, 10.0), st.floats(0.84, 10.0))
 def test_neighbours_of_about_the_same_length_change_nothing(n: int, before: float, after: float) -> None:
     np.testing.assert_array_equal(gradual_positions(n, before / n, after / n), np.arange(n + 1) / n)
 
@@ -34,7 +34,7 @@ def test_lengths_grow_gradually(ratio: float) -> None:
     n = 60
     lengths = np.diff(gradual_positions(n, 1.0 / (ratio * n), np.inf))
     growth = lengths[1:] / lengths[:-1]
-    assert lengths[0] * ratio * n < 2.4  # at most twice as long as the neighbour at its end, and 0.3 / 2 of that more
+    assert 0.99 < lengths[0] * ratio * n < 1.2  # as long as the neighbour at its end, and 0.3 / 2 of that more
     assert 0.99 < growth.min()
     assert growth.max() < 1.4  # exp(0.3) and round-off of the sums
     np.testing.assert_allclose(
@@ -53,7 +53,7 @@ def test_sides_lead_to_a_dense_one_and_keep_their_numbers() -> None:
     np.testing.assert_allclose(bottom, 0.01, rtol=1e-12)
     np.testing.assert_allclose(top, 0.1, rtol=1e-12)
     np.testing.assert_allclose(right, left[::-1], rtol=1e-9)  # sums of some hundred terms
-    assert right[0] < 0.026  # ten elements grow faster than sixty
+    assert right[0] < 0.016  # ten elements grow faster than sixty
     assert np.all(np.diff(right) > -1e-12)
 
 

@@ -61,11 +61,28 @@ def test_every_length_of_the_contact_boundary_belongs_to_a_node(discretisation: 
 @pytest.mark.parametrize(("distance", "owner"), [(0.0, "floor"), (0.1, "floor"), (-0.1, "wall")])
 def test_a_corner_node_touches_the_nearer_obstacle_or_the_first(distance: float, owner: str) -> None:
     wall = bk.Part("wall", bk.Contact(bk.HalfPlane((1.0 + distance, 0.0), (-1.0, 0.0))), sides=("right",))
-    contact = contact_of(block(FLOOR_PART, wall))
+    contact = contact_of(block(FLOOR_PART, wall, law=bk.Coulomb(0.5)))
     right = np.isclose(contact.nodes.points[:, 0], contact.nodes.points[:, 0].max())
     low = np.isclose(contact.nodes.points[:, 1], contact.nodes.points[:, 1].min())
     corner = np.flatnonzero(right & low)
     assert [contact.parts[k] for k in corner] == [owner]
+
+
+@pytest.mark.parametrize("discretisation", ELEMENTS[1:])  # constant elements have no node there
+@pytest.mark.parametrize("smooth", [(FLOOR_PART, WALL_PART), (FLOOR_PART,), ()])
+def test_a_corner_node_touches_both_obstacles_without_friction(
+    smooth: tuple[bk.Part, ...], discretisation: bk.Discretisation
+) -> None:
+    rough = (replace(part, condition=replace(part.condition, law=bk.Coulomb(0.5))) for part in (FLOOR_PART, WALL_PART))
+    parts = [part if part in smooth else other for part, other in zip((FLOOR_PART, WALL_PART), rough, strict=True)]
+    contact = contact_of(block(*parts, discretisation=discretisation))
+    nodes = contact.nodes
+    shared = nodes.nodes[nodes.is_second]
+    assert shared.size == (1 if len(smooth) == 2 else 0)
+    rows = np.flatnonzero(np.isin(nodes.nodes, shared))
+    assert [contact.parts[row] for row in rows] == ["floor", "wall"][: rows.size]
+    np.testing.assert_array_equal(nodes.is_shared, np.isin(np.arange(nodes.nodes.size), rows))
+    assert nodes.weights.sum() * np.sqrt(2.0) == pytest.approx(2.0, rel=1e-12)  # the diameter is the unit of length
 
 
 def test_parts_that_go_on_in_one_line_share_their_node() -> None:

@@ -79,8 +79,7 @@ def test_the_estimates_are_near_the_errors(name: str) -> None:
     for solution in risen(name, 3e-5):
         if degree_of(solution) > 2:
             assert solution.estimated_traction_error is not None
-            # on one mesh of Example 1 the estimate is 2.9 times the error, elsewhere up to twice
-            assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 3.0
+            assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 2.5
     solution = next(each for each in risen(name, 3e-5) if degree_of(each) == 5)
     assert solution.estimated_error is not None
     assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
@@ -93,7 +92,7 @@ def test_low_degrees_estimate_contact_tractions(name: str, degree: int) -> None:
     mesh = bk.MeshOptions(elements=80)
     solution = bk.run(dataclasses.replace(bk.load_scene(name), discretisation=bk.Galerkin(degree), mesh=mesh))
     assert solution.estimated_traction_error is not None
-    assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 3.0
+    assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 2.5
 
 
 def test_collocation_estimates_no_tractions() -> None:

@@ -30,6 +30,9 @@ RANK_TOLERANCE = 1e-9
 class ContactNodes:
     """Displacement nodes that may touch an obstacle.
 
+    A node in a corner between two frictionless obstacles stands in two rows, one for each direction of contact. Both
+    displacements are unknowns; their tangents follow.
+
     Parameters
     ----------
     nodes : (n_contact,) array
@@ -54,6 +57,18 @@ class ContactNodes:
     def directions(self) -> FloatArray:
         """(n_contact, 2) unit vectors: the directions of contact, of u_n and of sigma_n."""
         return self.frame[:, 0]
+
+    @property
+    def is_second(self) -> BoolArray:
+        """(n_contact,) bool: the second rows of nodes that stand in two."""
+        repeated = np.ones(self.nodes.size, bool)
+        repeated[np.unique(self.nodes, return_index=True)[1]] = False
+        return repeated
+
+    @property
+    def is_shared(self) -> BoolArray:
+        """(n_contact,) bool: both rows of nodes that stand in two."""
+        return np.isin(self.nodes, self.nodes[self.is_second])
 
     def take(self, rows: IntArray | BoolArray) -> ContactNodes:
         """Return some of the nodes."""
@@ -131,9 +146,8 @@ def contact_conditions(
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
     approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
     contact = candidates.take(approach > APPROACH_TOLERANCE)
-    is_supported = held_nodes(conditions, contact)
     motions = free_motions(conditions, contact, space)
-    has_tangent = retained_tangents(motions, contact.is_frictionless, is_supported)
+    has_tangent = retained_tangents(motions, contact.is_frictionless, bound_tangents(conditions, contact))
     return _opened(conditions, contact, has_tangent), contact
 
 
@@ -142,37 +156,57 @@ def held_nodes(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
     return np.asarray(np.any(conditions.is_fixed[contact.nodes], axis=1))
 
 
+def bound_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+    """Return (n_contact,) bool: nodes without a tangential displacement of their own.
+
+    A support holds it, or it is given by the displacements towards two obstacles.
+    """
+    return held_nodes(conditions, contact) | contact.is_shared
+
+
 def _opened(conditions: NodalConditions, contact: ContactNodes, has_tangent: BoolArray) -> NodalConditions:
     """Open the directions of contact of the contact nodes, and the tangential ones of some, that no support fixes."""
     frame, is_retained = conditions.frame.copy(), conditions.is_retained.copy()
     unsupported = ~held_nodes(conditions, contact)
-    frame[contact.nodes[unsupported]] = contact.frame[unsupported]
+    is_first = unsupported & ~contact.is_second
+    frame[contact.nodes[is_first]] = contact.frame[is_first]
     is_retained[contact.nodes] = ~conditions.is_fixed[contact.nodes]
-    is_retained[contact.nodes[unsupported & ~has_tangent], 1] = False
+    is_retained[contact.nodes[unsupported & ~has_tangent & ~contact.is_shared], 1] = False
     return replace(conditions, frame=frame, is_retained=is_retained)
 
 
 def free_motions(conditions: NodalConditions, contact: ContactNodes, space: BoundarySpace) -> FloatArray:
     """Return the rigid motions (n_motions, n_contact, 2) that no support resists, in (n, t) components.
 
-    Tangential components that a support holds are zero. An exterior, at rest far away, has none of these motions.
+    Bound tangential components are zero. An exterior, at rest far away, has none of these motions.
     """
     motions = free_modes(space, conditions)[:, contact.nodes]
     at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
-    at_contact[:, held_nodes(conditions, contact), 1] = 0.0
+    at_contact[:, bound_tangents(conditions, contact), 1] = 0.0
     return at_contact
 
 
 def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
     """Return (n_contact,) bool: where the tangential displacement is eliminated, and follows the unknowns.
 
-    That is at nodes without friction, but for the few that are retained, and wherever a support holds the node: what
-    acts there along the tangent cannot be told from the reaction of the support.
+    That is at nodes without friction, but for the few that are retained, wherever a support holds the node (what acts
+    there along the tangent cannot be told from the reaction of the support), and between two obstacles.
     """
-    return np.asarray(~np.all(conditions.is_retained[contact.nodes], axis=1))
+    return np.asarray(~np.all(conditions.is_retained[contact.nodes], axis=1)) | contact.is_shared
 
 
-def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_supported: BoolArray) -> BoolArray:
+def unknown_directions(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:
+    """Return (n_contact, 2) bool: which direction of the frame of its node makes each unknown.
+
+    Of a node that stands in two rows the first direction belongs to the first row, the second one to the other.
+    """
+    is_unknown = conditions.is_retained[contact.nodes]
+    is_unknown[contact.is_shared, 1] = False
+    is_unknown[contact.is_second] = (False, True)
+    return is_unknown
+
+
+def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_bound: BoolArray) -> BoolArray:
     """Return (n_contact,) bool: the contact nodes whose tangential displacement is an unknown.
 
     These are all nodes with friction, and at most as many others as there are `motions` (n_motions, n_contact, 2) that
@@ -183,12 +217,12 @@ def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_suppor
         return is_retained
     motions = _of_unit_size(motions)
     normal, tangential = motions[:, :, 0].T, motions[:, :, 1].T  # (n_contact, n_motions)
-    held = np.concatenate([normal, tangential[is_retained & ~is_supported]])
+    held = np.concatenate([normal, tangential[is_retained & ~is_bound]])
     _, singular, directions = np.linalg.svd(np.linalg.qr(held, mode="r"), full_matrices=True)
     sizes = np.zeros(len(motions))
     sizes[: singular.size] = singular
     weak = directions[sizes < LEAST_RETAINED_SHARE * np.sqrt(len(held))]
-    along = np.where((is_frictionless & ~is_supported)[:, None], tangential @ weak.T, 0.0)
+    along = np.where((is_frictionless & ~is_bound)[:, None], tangential @ weak.T, 0.0)
     for _ in weak:  # the tangents that feel most of what is still free
         sizes = np.linalg.norm(along, axis=1)
         if sizes.max(initial=0.0) < LEAST_RETAINED_SHARE:

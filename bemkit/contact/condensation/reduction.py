@@ -12,10 +12,12 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
 from bemkit.contact.condensation.nodes import (
     ContactNodes,
+    bound_tangents,
     contact_conditions,
     find_tangents,
     free_motions,
     held_nodes,
+    unknown_directions,
 )
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
@@ -34,46 +36,71 @@ class NoContactNodesError(InputError):
 class Unknowns:
     """The displacements of the contact nodes that the contact system solves for, among the directions of a map.
 
-    Each retained direction of the map is one unknown: ``displacement[order] = factor * unknowns + offset``.
+    Each retained direction of the map is one unknown: ``displacement[order] = factor * unknowns + offset``. At a node
+    between two obstacles the unknowns are the displacements towards them, which need not be at right angles: to its
+    second direction comes ``coupling`` times the unknown of the first.
 
     Parameters
     ----------
     order : (n_unknowns,) array
         Where each unknown stands among the retained directions.
     factor, offset : (n_unknowns,) arrays [-], [m]
-        One and zero, but where a support holds the node: there the unknown is the normal displacement.
+        One and zero, but where a support or a second obstacle takes a direction of the node.
+    first, second : (n_shared,) arrays
+        The two unknowns of each node between two obstacles.
+    coupling : (n_shared,) array [-]
     """
 
     order: IntArray
     factor: FloatArray
     offset: FloatArray
+    first: IntArray
+    second: IntArray
+    coupling: FloatArray
 
     @classmethod
     def of(cls, conditions: NodalConditions, contact: ContactNodes) -> Unknowns:
         """Return the unknowns under the conditions of all displacement nodes, ascending by contact node."""
-        row, component = np.nonzero(conditions.is_retained[contact.nodes])
+        row, component = np.nonzero(unknown_directions(conditions, contact))
         node, is_held = contact.nodes[row], held_nodes(conditions, contact)[row]
         position = np.cumsum(conditions.is_retained).reshape(-1, 2) - 1
         along = np.einsum("nkc,nc->nk", conditions.frame[node], contact.directions[row])
-        each = np.arange(row.size)
-        factor = 1.0 / np.where(is_held, along[each, component], 1.0)
+        each, is_second = np.arange(row.size), contact.is_second[row]
+        factor = 1.0 / np.where(is_held | is_second, along[each, component], 1.0)
         held_part = along[each, 1 - component] * conditions.displacement[node, 1 - component]
-        return cls(position[node, component], factor, np.where(is_held, -held_part * factor, 0.0))
+        first_of = np.zeros(len(position), np.intp)
+        first_of[node[~is_second]] = each[~is_second]
+        return cls(
+            order=position[node, component],
+            factor=factor,
+            offset=np.where(is_held, -held_part * factor, 0.0),
+            first=first_of[node[is_second]],
+            second=each[is_second],
+            coupling=-along[is_second, 0] * factor[is_second],
+        )
 
     def directions(self, unknowns: FloatArray) -> FloatArray:
         """Return the displacements of the retained directions (n_retained,)."""
         displacement = np.empty(self.order.size)
         displacement[self.order] = self.factor * unknowns + self.offset
+        displacement[self.order[self.second]] += self.coupling * unknowns[self.first]
         return displacement
+
+    def forces(self, forces: FloatArray) -> FloatArray:
+        """Return what forces (n_retained, ...) along the retained directions do on the unknowns, (n_unknowns, ...)."""
+        ordered = forces[self.order]
+        on_unknowns: FloatArray = (self.factor * ordered.T).T
+        on_unknowns[self.first] += (self.coupling * ordered[self.second].T).T
+        return on_unknowns
 
     def stiffness(self, condensed: CondensedMap) -> FloatArray:
         """Return the stiffness of a map in the unknowns."""
-        return self.factor[:, None] * condensed.stiffness[np.ix_(self.order, self.order)] * self.factor
+        return self.forces(self.forces(condensed.stiffness.T).T)
 
     def load(self, condensed: CondensedMap) -> FloatArray:
         """Return the load of a map on the unknowns."""
         at_zero = self.directions(np.zeros(self.order.size))
-        return self.factor * (condensed.load - condensed.stiffness @ at_zero)[self.order]
+        return self.forces(condensed.load - condensed.stiffness @ at_zero)
 
     def tangents(
         self, condensed: CondensedMap, conditions: NodalConditions, contact: ContactNodes
@@ -84,9 +111,10 @@ class Unknowns:
             return None
         nodes, is_held = contact.nodes[chosen], held_nodes(conditions, contact)[chosen]
         response, at_rest = np.zeros((chosen.size, self.order.size)), np.zeros(chosen.size)
-        followed, rest = condensed.follow(2 * nodes[~is_held] + 1)
-        response[~is_held] = followed[:, self.order] * self.factor
-        at_rest[~is_held] = rest + followed @ self.directions(np.zeros(self.order.size))
+        is_free = ~bound_tangents(conditions, contact)[chosen]
+        followed, rest = condensed.follow(2 * nodes[is_free] + 1)
+        response[is_free] = self.forces(followed.T).T
+        at_rest[is_free] = rest + followed @ self.directions(np.zeros(self.order.size))
         # where a support holds the node, its frame leads from the one component that moves to the other
         held = np.flatnonzero(is_held)
         node = nodes[held]
@@ -94,10 +122,17 @@ class Unknowns:
         free = np.argmax(conditions.is_retained[node], axis=1)
         moving, fixed = along[np.arange(held.size), free], along[np.arange(held.size), 1 - free]
         slope = moving[:, 1] / moving[:, 0]
-        n_before = np.cumsum(np.count_nonzero(conditions.is_retained[contact.nodes], axis=1)) - 1
+        n_before = np.cumsum(np.count_nonzero(unknown_directions(conditions, contact), axis=1)) - 1
         response[held, n_before[chosen[held]]] = slope
         given = conditions.displacement[node, 1 - free]
         at_rest[held] = (fixed[:, 1] - slope * fixed[:, 0]) * given
+        # between two obstacles both directions of the node are retained
+        shared = np.flatnonzero(contact.is_shared[chosen])
+        tangent = np.einsum("nkc,nc->kn", conditions.frame[nodes[shared]], contact.frame[chosen[shared], 1])
+        position = np.cumsum(conditions.is_retained).reshape(-1, 2) - 1
+        on_directions = np.zeros((self.order.size, shared.size))
+        on_directions[position[nodes[shared]].T, np.arange(shared.size)] = tangent
+        response[shared] = self.forces(on_directions).T
         return EliminatedTangents(chosen, response, at_rest)
 
 
@@ -139,8 +174,9 @@ class CondensedBody(DenseBody):
 
     @property
     def moves(self) -> BoolArray:
-        """(n_contact, 2) bool array: where `rigid_motions` are known; not along tangents that supports hold."""
-        return np.stack([np.ones_like(self.is_held), ~self.is_held], axis=1)
+        """(n_contact, 2) bool array: where `rigid_motions` are known; not along tangents that are bound."""
+        is_bound = bound_tangents(self.conditions, self.nodes)
+        return np.stack([np.ones_like(is_bound), ~is_bound], axis=1)
 
     @property
     def is_held(self) -> BoolArray:

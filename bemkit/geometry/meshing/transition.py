@@ -12,7 +12,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 
-LARGEST_JUMP = 2.0
+ALIKE = 1.2
 """Ratio of two neighbouring element lengths up to which nothing is done."""
 GROWTH = 0.3
 """Growth of the element length per length of boundary, unless there are too few elements for so little."""
@@ -37,12 +37,13 @@ def gradual_positions(n: int, before: float, after: float) -> FloatArray:
 
     Notes
     -----
-    At the distances s and 1 - s from its ends the elements have the length ``min(H, a + g s, b + g (1 - s))``.
+    At the distances s and 1 - s from its ends the elements have the length ``min(H, a + g s, b + g (1 - s))``, where a
+    and b are those of the neighbours: with constant tractions, twice that length at a roller costs the pressure there
+    an order.
     """
-    allowed = [LARGEST_JUMP * length for length in (before, after)]
-    if n == 1 or min(allowed) >= 1.0 / n:
+    if n == 1 or min(before, after) >= 1.0 / (ALIKE * n):
         return np.arange(n + 1) / n
-    start, end = (length if length < 1.0 / n else LARGEST_STRETCH / n for length in allowed)
+    start, end = (length if length < 1.0 / n else LARGEST_STRETCH / n for length in (before, after))
     growth = GROWTH
     while _count(LARGEST_STRETCH / n, start, end, growth) > n:
         growth *= 1.5
