@@ -67,10 +67,6 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
 def replacing(target: Path) -> Iterator[Path]:
     """Give the name of a temporary file in the same folder, which replaces the target if all goes well.
 
-    Parameters
-    ----------
-    target : Path
-
     Yields
     ------
     Path

@@ -75,10 +75,6 @@ def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py
     n_bytes : int
         Size of large content, if it is known.
 
-    Yields
-    ------
-    h5py.File
-
     Raises
     ------
     OutputFileError
@@ -141,10 +137,6 @@ def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> It
         The command that writes such files, for messages.
     mark : bytes
         First line of the user block.
-
-    Yields
-    ------
-    Reader
 
     Raises
     ------

@@ -79,10 +79,6 @@ class Outputs:
     def write(self, solution: Solution) -> None:
         """Write everything that is wanted.
 
-        Parameters
-        ----------
-        solution : Solution
-
         Raises
         ------
         OutputFileError

@@ -32,11 +32,6 @@ class OverResolutionError(InputError):
 def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
     """Evaluate a solution as its elements represent it.
 
-    Parameters
-    ----------
-    solution : Solution
-    places : sequence of Places
-
     Returns
     -------
     Answer
@@ -64,11 +59,6 @@ def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
 
 def over_resolved(scene: Scene, most_elements: int) -> Reference:
     """Solve a scene as finely as a number of elements allows and estimate the error of that.
-
-    Parameters
-    ----------
-    scene : Scene
-    most_elements : int
 
     Returns
     -------

@@ -18,16 +18,7 @@ _WORDS = {"gap": "separated", "slip-": "slip", "slip+": "slip", "stick": "stick"
 
 
 def paper_reference(number: int) -> Reference:
-    """Return the reference of example 1 or 2 along the part ``foundation``.
-
-    Parameters
-    ----------
-    number : int
-
-    Returns
-    -------
-    Reference
-    """
+    """Return the reference of example 1 or 2 along the part ``foundation``."""
     folder = resources.files("bemkit") / "reference" / "data"
     table = np.genfromtxt(io.StringIO((folder / f"paper-{number}.csv").read_text("utf-8")), delimiter=",", names=True)
     data = json.loads((folder / f"paper-{number}.json").read_text("utf-8"))

@@ -82,10 +82,6 @@ def solve_pressure(
         Even functions of the place.
     n_terms : int
         Coefficients of the pressure.
-
-    Returns
-    -------
-    tuple of EvenPressure and float
     """
     n = n_terms
     x = half_width * np.cos((np.arange(n + 1) + 0.5) * np.pi / (2 * n + 2))

@@ -27,10 +27,6 @@ def find_reference(scene: Scene) -> Reference | None:
     scene : Scene
         Has one if it poses the problem of a shipped scene that has one, whatever its mesh, its discretisation and its
         solver are. A number that differs makes another problem.
-
-    Returns
-    -------
-    Reference or None
     """
     for name, make in _REFERENCES.items():
         if _problem(scene) == _problem(load_scene(name)):

@@ -38,12 +38,7 @@ _EXAGGERATION = 0.08
 
 @dataclass(frozen=True)
 class Units:
-    """Names of units on the axes.
-
-    Parameters
-    ----------
-    length, stress : str
-    """
+    """Names of units on the axes."""
 
     length: str = "m"
     stress: str = "Pa"
@@ -86,17 +81,7 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -
 
 
 def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
-    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
-
-    Parameters
-    ----------
-    solution : Solution
-    units : Units
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells."""
     mesh = solution.mesh.whole
     displacement = node_displacement(solution)
     factor = exaggeration(mesh.diameter, displacement)
@@ -130,10 +115,6 @@ def draw_contact_displacement(solution: Solution, part: str, *, units: Units = S
     part : str
         Name of the contact part.
     units : Units
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
@@ -205,10 +186,6 @@ def exaggeration(diameter: float, displacement: FloatArray) -> float:
 
 def node_displacement(solution: Solution) -> FloatArray:
     """Return the displacement at the mesh nodes.
-
-    Parameters
-    ----------
-    solution : Solution
 
     Returns
     -------

@@ -61,14 +61,6 @@ _BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs")
 def check_result_target(path: str | Path) -> Path:
     """Find out, before any work is done, whether a result can be written to a file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Path
-
     Raises
     ------
     OutputFileError
@@ -79,11 +71,6 @@ def check_result_target(path: str | Path) -> Path:
 
 def write_result(path: str | Path, solution: Solution) -> None:
     """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    solution : Solution
 
     Raises
     ------
@@ -116,14 +103,6 @@ def write_result(path: str | Path, solution: Solution) -> None:
 
 def read_result(path: str | Path) -> Solution:
     """Read a solution from a result file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------

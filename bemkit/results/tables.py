@@ -51,16 +51,7 @@ def to_csv(solution: Solution, table: str) -> str:
 
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
-    """Return the convergence history as columns, the certificate's entries among them.
-
-    Parameters
-    ----------
-    history : sequence of StepRecord
-
-    Returns
-    -------
-    dict of str to array or list of str
-    """
+    """Return the convergence history as columns, the certificate's entries among them."""
     columns: dict[str, Any] = {
         name: np.array([getattr(record, name) for record in history], dtype=np.int64) for name in RECORD_COUNTS
     }
@@ -78,10 +69,6 @@ def to_json(solution: Solution) -> str:
 
 def element_displacement(solution: Solution) -> FloatArray:
     """Return the displacement at the element centres.
-
-    Parameters
-    ----------
-    solution : Solution
 
     Returns
     -------

@@ -114,10 +114,6 @@ def paper_tables(
     run : callable, optional
         Computes the 50 cells here, such as `bemkit.studies.engine.compute_with_progress`.
 
-    Returns
-    -------
-    tuple of two PaperTable
-
     Raises
     ------
     PaperTableError

@@ -33,10 +33,6 @@ _COARSE = 0.05
 def check_discretisation(discretisation: Discretisation) -> None:
     """Check everything that `Discretisation` promises, by running small scenes; call it on your own discretisation.
 
-    Parameters
-    ----------
-    discretisation : Discretisation
-
     Raises
     ------
     CheckFailed

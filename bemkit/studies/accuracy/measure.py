@@ -31,10 +31,6 @@ def error_tasks(runs: Sequence[Run], reference: Reference, repeat: int | None = 
         Timed repetitions of each run, after one that warms up and before one that measures the memory; by default run
         times and memory are not measured and are nan: runs at the same time would disturb each other.
 
-    Returns
-    -------
-    tuple of Task
-
     Raises
     ------
     StudyError

@@ -35,10 +35,6 @@ def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, titl
     measures : sequence of str
         One panel for each.
     title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     n_columns = min(len(measures), 2)
     n_rows = -(-len(measures) // n_columns)

@@ -128,11 +128,6 @@ def _slope(records: Sequence[ErrorRecord], measure: str) -> float:
 def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorRecord]:
     """Return the records that no other record beats or equals in both run time and error, from fast to accurate.
 
-    Parameters
-    ----------
-    records : sequence of ErrorRecord
-    measure : str
-
     Returns
     -------
     list of ErrorRecord

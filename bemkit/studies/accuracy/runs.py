@@ -36,14 +36,7 @@ class MeshSequence(Protocol):
 
 @dataclass(frozen=True)
 class GivenMeshes:
-    """Meshes of given numbers of elements with one grading; densities of sides are those of the scene.
-
-    Parameters
-    ----------
-    name : str
-    grading : Grading
-    elements : tuple of int
-    """
+    """Meshes of given numbers of elements with one grading; densities of sides are those of the scene."""
 
     name: str
     grading: Grading
@@ -165,10 +158,6 @@ def all_runs(
     scene : Scene
         The problem; its own mesh, discretisation and solver do not matter.
     discretisations, meshes, solvers : sequences
-
-    Returns
-    -------
-    tuple of Run
 
     Raises
     ------

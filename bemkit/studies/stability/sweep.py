@@ -44,10 +44,6 @@ def sweep(
     run_tasks : callable, optional
         Computes the tasks of one axis, such as `bemkit.studies.engine.compute` with records of an earlier sweep.
 
-    Yields
-    ------
-    StabilityRecord
-
     Raises
     ------
     StabilityError
@@ -82,10 +78,6 @@ def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> Stabil
     case : Case
     reference : Solution or None
         What the drift is measured against; None if the reference itself has no solution.
-
-    Returns
-    -------
-    StabilityRecord
     """
     twin_scene = TWIN.apply(case.scene)
     first, second = _attempt(case.scene, case), _attempt(twin_scene, case)

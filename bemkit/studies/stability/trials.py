@@ -90,10 +90,6 @@ def solved_steps(case: RandomCase) -> tuple[Solution, ...]:
 def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
     """Judge the steps of a load history, each by the independent check.
 
-    Parameters
-    ----------
-    steps : iterable of Solution
-
     Returns
     -------
     outcome : Outcome

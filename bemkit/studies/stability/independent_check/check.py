@@ -134,10 +134,6 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
     before : Solution, optional
         The load step before, from whose end slip counts. Without it friction against slip is not checked at the end of
         a load history.
-
-    Returns
-    -------
-    IndependentCheck
     """
     if not _is_finite(solution):
         return IndependentCheck(float("inf"), *(float("nan"),) * 16)
