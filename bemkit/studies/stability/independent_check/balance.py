@@ -1,4 +1,4 @@
-"""Balance of forces and moments, and of energy and work."""
+"""Supports and loads as the scene gives them; balance of forces and moments, and of energy and work."""
 
 from __future__ import annotations
 
@@ -6,10 +6,32 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.independent_check.boundary import Boundary
-from bemkit.studies.stability.independent_check.nodes import Nodes
-from bemkit.studies.stability.independent_check.scales import Scales, trusted_stress
-from bemkit.studies.stability.independent_check.supports import held_directions
+from bemkit.studies.stability.independent_check.boundary import Boundary, beyond, largest, trusted_stress
+from bemkit.studies.stability.independent_check.nodes import Fields
+
+
+def support_mismatch(fields: Fields) -> float:
+    """Return the largest difference [-] of a held displacement from what is prescribed, symmetry lines included."""
+    mesh, boundary, scales = fields.solution.mesh, fields.boundary, fields.scales
+    displacement = fields.solution.boundary.displacement
+    worst = [0.0]
+    for elements, directions, values in boundary.held:
+        motion = np.einsum("enc,enc->en", displacement[boundary.nodes[elements]], directions)
+        worst.append(beyond(np.abs(motion - values), scales.turned, scales.length))
+    if mesh.symmetry is not None and boundary.nodes.shape[1] > 1:
+        across = displacement[: mesh.n_nodes][mesh.on_symmetry_lines]
+        worst.append(largest(np.abs(across)) / scales.length)
+    return float(np.max(worst))
+
+
+def load_mismatch(fields: Fields) -> float:
+    """Return the largest difference [-] of mean tractions from the loads, on loaded and on free elements."""
+    solution, boundary = fields.solution, fields.boundary
+    is_contact = np.zeros(solution.mesh.n_elements, bool)
+    for part in solution.scene.contact_parts:
+        is_contact[solution.mesh.part(part.name)] = True
+    mean = np.einsum("eqc,eq->ec", boundary.traction, boundary.shares) / boundary.lengths[:, None]
+    return largest(np.abs(mean - solution.boundary.traction)[~is_contact] / fields.scales.stress)
 
 
 def motions_at(solution: Solution, points: FloatArray) -> FloatArray:
@@ -30,23 +52,19 @@ def admissible_modes_of(solution: Solution) -> list[int]:
     return [k for k, place in enumerate((mesh.symmetry.x, mesh.symmetry.y)) if place is None]
 
 
-def imbalance(solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray) -> float:
+def imbalance(fields: Fields) -> float:
     """Return the work of loads and contact tractions on free rigid motions over that of all forces on the body.
 
     To these belong the reactions of supports, which squeeze a body by forces of any size without work on free motions.
-
-    Parameters
-    ----------
-    traction : (n_elements, n_places, 2) array [Pa]
-        At the quadrature points; contact and supports are left to nodal forces.
     """
+    solution, _, boundary, nodes, _ = fields
     mesh, table = solution.mesh, solution.contact
     contact = table.weight[:, None] * nodes.acting
     motions = motions_at(solution, solution.boundary.points)
     work = np.einsum("nc,ncm->m", contact, motions[nodes.nodes])
     # what the elements make of a rotation: on curved ones it is not one exactly
     interpolated = np.einsum("encm,nq->eqcm", motions[boundary.nodes], boundary.basis)
-    loads = _loads(solution, boundary, traction)
+    loads = _loads(solution, boundary)
     work = work + np.einsum("eqc,eqcm->m", loads, interpolated)
     size = float(np.abs(contact).sum()) + float(np.abs(loads).sum()) + trusted_stress(solution) * mesh.diameter
     size += float(np.abs(solution.boundary.traction * mesh.lengths[:, None]).sum())
@@ -54,22 +72,22 @@ def imbalance(solution: Solution, boundary: Boundary, nodes: Nodes, traction: Fl
     return float(np.abs(work @ free.T).max(initial=0.0)) / size if size > 0.0 else 0.0
 
 
-def _loads(solution: Solution, boundary: Boundary, traction: FloatArray) -> FloatArray:
+def _loads(solution: Solution, boundary: Boundary) -> FloatArray:
     """Return (n_elements, n_places, 2) forces [N/m] of given loads."""
     is_load = np.ones(solution.mesh.n_elements, bool)
     for part in solution.scene.parts:
         if part in solution.scene.contact_parts:
             is_load[solution.mesh.part(part.name)] = False
-    for elements, _, _ in held_directions(solution, boundary):
+    for elements, _, _ in boundary.held:
         is_load[elements] = False
-    return np.where(is_load[:, None], boundary.shares, 0.0)[:, :, None] * traction
+    return np.where(is_load[:, None], boundary.shares, 0.0)[:, :, None] * boundary.traction
 
 
 def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
     """Return (n_free, 3) coefficients of the rigid motions that no support resists."""
     admissible = admissible_modes_of(solution)
     rows = [np.eye(3)[[mode for mode in range(3) if mode not in admissible]], np.zeros((1, 3))]
-    for elements, directions, _ in held_directions(solution, boundary):
+    for elements, directions, _ in boundary.held:
         motions = motions_at(solution, boundary.node_points[elements])
         rows.append(np.einsum("enc,encm->enm", directions, motions).reshape(-1, 3))
     held = np.concatenate(rows)
@@ -77,33 +95,32 @@ def _free_motions(solution: Solution, boundary: Boundary) -> FloatArray:
     return np.asarray(directions[singular <= 1e-12 * max(singular.max(), 1e-30)])
 
 
-def negative_energy(
-    solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray, scales: Scales
-) -> float:
+def negative_energy(fields: Fields) -> float:
     """Return by how much the elastic energy is negative, over the work of the sizes of tractions and strains.
 
     To these belong the tractions of which nothing but round-off is known, on the displacement of the whole body.
     """
-    size = _work_of_sizes(solution, boundary, nodes, traction, strained_displacement(solution))
-    size += _trusted_work(solution, boundary)
+    solution, scales = fields.solution, fields.scales
+    size = _work_of_sizes(fields, strained_displacement(solution)) + _trusted_work(fields)
     size += 1e-6 * scales.stress * scales.length * solution.mesh.diameter
     return max(-solution.energy, 0.0) / size if np.isfinite(solution.energy) else float("nan")
 
 
-def energy_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray) -> float:
+def energy_mismatch(fields: Fields) -> float:
     """Return the difference of the elastic energy from half the work of all external forces, over that of their sizes.
 
     Held components without prescribed displacement do no work; where one is prescribed, the mean reactions of elements
     tell the work up to the discretisation error only, and nothing is compared.
     """
-    if any(np.any(values != 0.0) for _, _, values in held_directions(solution, boundary)):
+    solution, _, boundary, nodes, _ = fields
+    if any(np.any(held.values != 0.0) for held in boundary.held):
         return 0.0
     displacement = solution.boundary.displacement
     contact = solution.contact.weight[:, None] * nodes.acting
-    loads = _loads(solution, boundary, traction)
+    loads = _loads(solution, boundary)
     work = 0.5 * float(np.sum(contact * nodes.displacement))
     work += 0.5 * float(np.sum(loads * boundary.interpolated(displacement)))
-    size = _work_of_sizes(solution, boundary, nodes, traction, displacement) + _trusted_work(solution, boundary)
+    size = _work_of_sizes(fields, displacement) + _trusted_work(fields)
     return abs(solution.energy - work) / size if size > 0.0 else 0.0
 
 
@@ -117,17 +134,16 @@ def strained_displacement(solution: Solution) -> FloatArray:
     return np.asarray(fields.displacement - (motions @ rigid).reshape(-1, 2))
 
 
-def _trusted_work(solution: Solution, boundary: Boundary) -> float:
+def _trusted_work(fields: Fields) -> float:
     """Return the work [J/m] of tractions of which nothing but round-off is known, on the motion of the whole body."""
-    motion = float(np.abs(solution.boundary.displacement).max())
-    return trusted_stress(solution) * motion * float(boundary.lengths.sum())
+    motion = float(np.abs(fields.solution.boundary.displacement).max())
+    return trusted_stress(fields.solution) * motion * float(fields.boundary.lengths.sum())
 
 
-def _work_of_sizes(
-    solution: Solution, boundary: Boundary, nodes: Nodes, traction: FloatArray, displacement: FloatArray
-) -> float:
+def _work_of_sizes(fields: Fields, displacement: FloatArray) -> float:
     """Return half the work [J/m] that tractions did if each had the direction of its displacement (n_nodes, 2)."""
+    solution, _, boundary, nodes, _ = fields
     motion = boundary.interpolated(displacement)
-    sizes = np.hypot(traction[..., 0], traction[..., 1]) * np.hypot(motion[..., 0], motion[..., 1])
+    sizes = np.hypot(boundary.traction[..., 0], boundary.traction[..., 1]) * np.hypot(motion[..., 0], motion[..., 1])
     contact = np.hypot(*nodes.acting.T) * np.hypot(*displacement[nodes.nodes].T)
     return 0.5 * float(np.sum(sizes * boundary.shares) + contact @ solution.contact.weight)

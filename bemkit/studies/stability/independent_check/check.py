@@ -7,10 +7,15 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from bemkit.results.solution import Solution
-from bemkit.studies.stability.independent_check.balance import energy_mismatch, imbalance, negative_energy
-from bemkit.studies.stability.independent_check.boundary import boundary_of
+from bemkit.studies.stability.independent_check.balance import (
+    energy_mismatch,
+    imbalance,
+    load_mismatch,
+    negative_energy,
+    support_mismatch,
+)
+from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, largest
 from bemkit.studies.stability.independent_check.contact import (
-    largest,
     measured_contact,
     obstacle_mismatch,
     resultant_mismatch,
@@ -19,11 +24,8 @@ from bemkit.studies.stability.independent_check.contact import (
     table_mismatch,
     traction_mismatch,
 )
-from bemkit.studies.stability.independent_check.nodes import contact_nodes_of, hidden_overlap
+from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
 from bemkit.studies.stability.independent_check.reciprocity import reciprocity_mismatch
-from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT as CONTACT_LIMIT
-from bemkit.studies.stability.independent_check.scales import scales_of
-from bemkit.studies.stability.independent_check.supports import load_mismatch, support_mismatch, tractions_of
 
 COARSE_LIMIT = 0.1
 """Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
@@ -137,33 +139,27 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
     """
     if not _is_finite(solution):
         return IndependentCheck(float("inf"), *(float("nan"),) * 16)
-    scales, boundary = scales_of(solution, before), boundary_of(solution)
-    nodes = contact_nodes_of(solution, boundary)
-    measured = measured_contact(solution, before, nodes, scales)
-    traction = tractions_of(solution, boundary)
+    fields = Fields.of(solution, before)
+    measured = measured_contact(fields)
     has_history = before is None and len(solution.scene.load_factors) > 1
-    held = np.minimum(measured.held, np.abs(measured.clearance))
-    excess = (np.abs(measured.shear) - measured.bound)[measured.obeys_friction]
     return IndependentCheck(
         numbers=0.0,
-        obstacle=obstacle_mismatch(solution, nodes, scales),
-        table=max(table_mismatch(solution, nodes, scales), resultant_mismatch(solution)),
-        tractions=max(
-            traction_mismatch(solution, boundary, nodes, scales), load_mismatch(solution, boundary, traction, scales)
-        ),
-        supports=support_mismatch(solution, boundary, scales),
+        obstacle=obstacle_mismatch(fields),
+        table=max(table_mismatch(fields), resultant_mismatch(solution)),
+        tractions=max(traction_mismatch(fields), load_mismatch(fields)),
+        supports=support_mismatch(fields),
         penetration=largest(-measured.clearance),
         tension=largest(-measured.pressure),
-        complementarity=largest(held),
-        cone_excess=largest(excess),
+        complementarity=largest(np.minimum(measured.held, np.abs(measured.clearance))),
+        cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
         slip_opposition=0.0 if has_history else slip_opposition(measured),
         status=0.0 if has_history else status_mismatch(solution, measured),
-        equilibrium=imbalance(solution, boundary, nodes, traction),
-        negative_energy=negative_energy(solution, boundary, nodes, traction, scales),
-        energy=energy_mismatch(solution, boundary, nodes, traction),
-        reciprocity=reciprocity_mismatch(solution, boundary, nodes, traction, scales.stress),
-        coarseness=float(boundary.lengths.max()) / solution.mesh.diameter,
-        hidden_overlap=hidden_overlap(solution, boundary, nodes),
+        equilibrium=imbalance(fields),
+        negative_energy=negative_energy(fields),
+        energy=energy_mismatch(fields),
+        reciprocity=reciprocity_mismatch(fields),
+        coarseness=float(fields.boundary.lengths.max()) / solution.mesh.diameter,
+        hidden_overlap=hidden_overlap(fields),
     )
 
 

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.laws import FrictionLaw
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
-from bemkit.studies.stability.independent_check.boundary import Boundary
-from bemkit.studies.stability.independent_check.nodes import Nodes
-from bemkit.studies.stability.independent_check.scales import CONTACT_LIMIT, Scales, scales_of
+from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
+from bemkit.studies.stability.independent_check.nodes import Fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,17 +36,15 @@ class Measured:
     obeys_friction: BoolArray
 
 
-def measured_contact(solution: Solution, before: Solution | None, nodes: Nodes, scales: Scales) -> Measured:
+def measured_contact(fields: Fields) -> Measured:
     """Return the contact quantities that the laws speak of.
 
-    Displacements are those of the boundary field, tractions those of the table.
-
-    Parameters
-    ----------
-    before : Solution or None
-        The state that slip counts from; the undeformed body if there is none.
+    Displacements are those of the boundary field, tractions those of the table. Slip counts from the load step before,
+    and from the undeformed body if there is none.
     """
-    table, law = solution.contact, law_of(solution)
+    solution, before, _, nodes, scales = fields
+    table = solution.contact
+    law = solution.scene.law_at(table.part, np.column_stack([table.x, table.y]))
     motion = nodes.components(nodes.displacement)
     slip = motion[:, 1]
     if before is not None:
@@ -63,28 +59,21 @@ def measured_contact(solution: Solution, before: Solution | None, nodes: Nodes, 
     # cohesion acts shall not depend on a traction of 1e-16.
     acts = (held > np.abs(clearance)) | acts_across_gap
     bound = np.where(acts, law.bound(np.minimum(table.sigma_n, 0.0)), 0.0) / scales.stress
-    obeys_friction = ~nodes.is_supported
-    return Measured(pressure, shear, clearance, slip / scales.length, held, bound, obeys_friction)
+    return Measured(pressure, shear, clearance, slip / scales.length, held, bound, ~nodes.is_supported)
 
 
-def law_of(solution: Solution) -> FrictionLaw:
-    """Return the friction law of each contact node, in numbers."""
-    table = solution.contact
-    return solution.scene.law_at(table.part, np.column_stack([table.x, table.y]))
-
-
-def obstacle_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
+def obstacle_mismatch(fields: Fields) -> float:
     """Return the largest difference [-] of the table's gaps from distances measured again."""
-    gap = solution.contact.gap
+    gap, nodes, scales = fields.solution.contact.gap, fields.nodes, fields.scales
     if np.any((np.isfinite(gap) != np.isfinite(nodes.distance)) & ~nodes.is_grazing):
         return float("inf")
     known = np.isfinite(gap) & np.isfinite(nodes.distance)
     return beyond(np.abs(gap[known] - nodes.distance[known]), scales.coordinates, scales.length)
 
 
-def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
+def table_mismatch(fields: Fields) -> float:
     """Return the largest difference [-] of the table's displacements from those of the boundary at the same points."""
-    table = solution.contact
+    table, nodes, scales = fields.solution.contact, fields.nodes, fields.scales
     rows = np.column_stack([table.u_n, table.u_t])
     motion = nodes.components(nodes.displacement)
     known = np.isfinite(table.gap)
@@ -97,11 +86,12 @@ def table_mismatch(solution: Solution, nodes: Nodes, scales: Scales) -> float:
     return max(beyond(difference, round_off, scales.length) for difference in differences)
 
 
-def traction_mismatch(solution: Solution, boundary: Boundary, nodes: Nodes, scales: Scales) -> float:
+def traction_mismatch(fields: Fields) -> float:
     """Return the largest difference [-] of mean tractions of contact elements from those that nodes interpolate.
 
     Elements at a corner that share a node with another contact part are left out: the node belongs to one of them.
     """
+    solution, _, boundary, nodes, scales = fields
     nodal, owner = np.zeros_like(solution.boundary.points), np.full(len(solution.boundary.points), "", dtype=object)
     nodal[nodes.nodes], owner[nodes.nodes] = nodes.traction, solution.contact.part
     worst = [0.0]
@@ -139,18 +129,4 @@ def status_mismatch(solution: Solution, measured: Measured) -> float:
     is_open, sticks = status == NodeStatus.SEPARATED, status == NodeStatus.STICK
     friction = np.where(sticks, np.abs(measured.slip), np.where(is_open, 0.0, np.maximum(against, unopposed)))
     friction[~measured.obeys_friction] = 0.0
-    return max(
-        largest(measured.held[is_open]),
-        largest(np.abs(measured.clearance)[~is_open]),
-        largest(friction),
-    )
-
-
-def largest(values: FloatArray) -> float:
-    """Return the largest value, at least zero; nan if there is one."""
-    return float(np.max(np.maximum(values, 0.0), initial=0.0))
-
-
-def beyond(differences: FloatArray, allowed: float, unit: float) -> float:
-    """Return the largest difference beyond what is allowed, in units; nan if there is one."""
-    return max(largest(differences) - allowed, 0.0) / unit if not np.isnan(differences).any() else float("nan")
+    return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
