@@ -10,12 +10,11 @@ from rich.table import Table
 from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
-from bemkit.errors import InputError
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
-from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Registry
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS = 12
@@ -169,7 +168,7 @@ def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
     status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
-    discretisation = _word(DISCRETISATIONS, solution.scene.discretisation)
+    discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
     if (degree := solution.scene.discretisation.displacement_space(solution.mesh).degree) > 2:
         discretisation += f", degree {degree}"
     rows = [
@@ -216,7 +215,7 @@ def _contact(solution: Solution) -> list[tuple[str, Text]]:
 def _solve(solution: Solution) -> list[tuple[str, Text]]:
     if not solution.contact.n_contact:
         return []
-    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_word(SOLVERS, solution.scene.solver)})"
+    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({SOLVERS.word_of(solution.scene.solver)})"
     return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
 
 
@@ -227,13 +226,6 @@ def _estimate(solution: Solution) -> list[tuple[str, Text]]:
 
 def _nan_first(value: float) -> float:
     return value if value == value else float("inf")
-
-
-def _word(registry: Registry, value: object) -> str:
-    try:
-        return registry.kind_of(value)
-    except InputError:  # a class of one's own
-        return type(value).__name__
 
 
 def _transition_lines(solution: Solution) -> list[str]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
+MEASURES = "energy,sigma_n,displacement,transitions"
 NOT_CONVERGED = 1
 
 
@@ -54,7 +55,7 @@ def study() -> None:
 @click.option("--over-resolve", type=click.IntRange(40), metavar="N", help="Measure against up to N fine elements.")
 @click.option("--repeat", type=click.IntRange(1), metavar="N", help="Timed repetitions of each run (3).")
 @click.option("--jobs", type=click.IntRange(1), default=1, metavar="N", help="Processes; more than one: no times.")
-@click.option("--errors", "measures", metavar="WORD,...", help="Errors to show and draw.")
+@click.option("--errors", "measures", default=MEASURES, metavar="WORD,...", help="Errors to show and draw.")
 @click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the rows as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw error-against-run-time.png into a folder.")
@@ -71,7 +72,7 @@ def errors(
     over_resolve: int | None,
     repeat: int | None,
     jobs: int,
-    measures: str | None,
+    measures: str,
     output: str | None,
     csv_file: str | None,
     folder: str | None,
@@ -85,11 +86,11 @@ def errors(
     from bemkit.atomic_files import reserved
     from bemkit.results.outputs import STDOUT
     from bemkit.scene.toml import load_scene
-    from bemkit.studies.accuracy.options import DEFAULT_MEASURES, StudyOptions, read_measures
+    from bemkit.studies.accuracy.options import StudyOptions, read_measures
 
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
-    shown = read_measures(measures or DEFAULT_MEASURES)
+    shown = read_measures(measures)
     problem = load_scene(scene)
     outputs = _error_outputs(problem.title, shown, output, csv_file, folder)
     click.get_current_context().with_resource(reserved(outputs.check()))
@@ -141,7 +142,7 @@ def _error_records(
     shown: Sequence[str],
 ) -> list[ErrorRecord]:
     """Compute what is missing, keep every record at once, and print some of the errors."""
-    from bemkit.studies.accuracy.measure import error_tasks
+    from bemkit.studies.accuracy.runs import error_tasks
     from bemkit.studies.accuracy.table import print_reference, print_study
     from bemkit.studies.engine import compute_with_progress
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 FIGURE = "error-against-run-time"
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-_FRONT = "#D8D8D8"
+_FRONT, _DARK = "#D8D8D8", "#444444"
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 _MESHES = ("adaptive", "uniform", "graded")
@@ -49,15 +49,14 @@ def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, titl
     return figure
 
 
-def is_timed(records: Sequence[ErrorRecord]) -> bool:
-    """Whether run times were measured."""
+def _is_timed(records: Sequence[ErrorRecord]) -> bool:
     return any(np.isfinite(record.seconds) for record in records)
 
 
 def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    abscissa = "seconds" if is_timed(records) else "elements"
+    abscissa = "seconds" if _is_timed(records) else "elements"
     front = pareto_front(records, measure)
     if front:
         x, y = _points(front, "seconds", measure)
@@ -111,21 +110,13 @@ def _style(records: Sequence[ErrorRecord], record: ErrorRecord) -> tuple[str, An
 def _legend(records: Sequence[ErrorRecord]) -> list[Any]:
     from matplotlib.lines import Line2D
 
-    handles: dict[str, Line2D] = {}
+    elements, meshes, drivers = {}, {}, {}
     for record in records:
         colour, line, marker = _style(records, record)
-        handles.setdefault(
-            f"{record.discretisation} elements ({record.map})", Line2D([], [], color=colour, linewidth=3)
-        )
-        handles.setdefault(f"{record.meshes} meshes", Line2D([], [], color="#444444", linestyle=line, linewidth=1.2))
-        handles.setdefault(
-            record.solver, Line2D([], [], color="#444444", marker=marker, linestyle="none", markersize=5)
-        )
-    if is_timed(records):
-        handles["no run is faster and more accurate"] = Line2D([], [], color=_FRONT, linewidth=5)
-    for name, handle in handles.items():
-        handle.set_label(name)
-    order = ("elements (", "meshes", "")
-    return sorted(
-        handles.values(), key=lambda handle: next(k for k, word in enumerate(order) if word in str(handle.get_label()))
-    )
+        elements[f"{record.discretisation} elements ({record.map})"] = {"color": colour, "linewidth": 3}
+        meshes[f"{record.meshes} meshes"] = {"color": _DARK, "linestyle": line, "linewidth": 1.2}
+        drivers[record.solver] = {"color": _DARK, "marker": marker, "linestyle": "none", "markersize": 5}
+    styles: dict[str, dict[str, Any]] = elements | meshes | drivers
+    if _is_timed(records):
+        styles["no run is faster and more accurate"] = {"color": _FRONT, "linewidth": 5}
+    return [Line2D([], [], label=name, **style) for name, style in styles.items()]

@@ -37,7 +37,21 @@ def print_reference(title: str, reference: Reference, console: Console | None = 
     console.print()
 
 
-def print_series(
+def print_study(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console | None = None) -> None:
+    """Print all series, their fitted orders, and what is fastest for which error."""
+    console = _console(console)
+    fronts = {measure: pareto_front(records, measure) for measure in measures}
+    marked: dict[str, set[object]] = {measure: {record.key for record in front} for measure, front in fronts.items()}
+    for series in by_series(records):
+        _print_series(series, measures, marked, console)
+    _print_orders(records, measures, console)
+    if any(fronts.values()):
+        console.print(Text("* no other run of this study is both faster and more accurate", style="dim"))
+    elif records:
+        console.print(Text("run times and memory were not measured: the runs were spread over processes", style="dim"))
+
+
+def _print_series(
     records: Sequence[ErrorRecord], measures: Sequence[str], marked: dict[str, set[object]], console: Console
 ) -> None:
     """Print the records of one series; each error is followed by its order against the mesh before."""
@@ -64,20 +78,6 @@ def print_series(
     console.print()
 
 
-def print_study(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console | None = None) -> None:
-    """Print all series, their fitted orders, and what is fastest for which error."""
-    console = _console(console)
-    fronts = {measure: pareto_front(records, measure) for measure in measures}
-    marked: dict[str, set[object]] = {measure: {record.key for record in front} for measure, front in fronts.items()}
-    for series in by_series(records):
-        print_series(series, measures, marked, console)
-    _print_orders(records, measures, console)
-    if any(fronts.values()):
-        console.print(Text("* no other run of this study is both faster and more accurate", style="dim"))
-    elif records:
-        console.print(Text("run times and memory were not measured: the runs were spread over processes", style="dim"))
-
-
 def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console) -> None:
     console.print(Text("observed orders in N, fitted to the last meshes", style="bold"))
     table = plain_table(("elements", "map", "meshes", "driver"), [SHORT[measure] for measure in measures])
@@ -92,26 +92,15 @@ def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], conso
 
 def _costs(record: ErrorRecord, *, is_wide: bool) -> dict[str, str]:
     """Return what stands before the errors, by the heads of the columns."""
-    aim = {"aim": _aim(record.size)} if record.meshes == "adaptive" else {}
-    always = {"N": str(record.elements or "-"), "it": str(record.linear_solves)}
-    seconds = {"total s": _number(record.seconds, ".3f")}
-    if not is_wide:
-        return aim | always | seconds
-    stages = {
-        "assem.": _number(record.seconds_assemble, ".3f"),
-        "cond.": _number(record.seconds_condense, ".3f"),
-        "solve": _number(record.seconds_solve, ".3f"),
-    }
-    return (
-        aim
-        | always
-        | stages
-        | seconds
-        | {
-            "MB": _number(record.peak_memory / 1e6, ".3g"),
-            "estim.": _short(record.estimated_error),
-        }
-    )
+    costs = {"aim": _aim(record.size)} if record.meshes == "adaptive" else {}
+    costs |= {"N": str(record.elements or "-"), "it": str(record.linear_solves)}
+    if is_wide:
+        stages = {"assem.": record.seconds_assemble, "cond.": record.seconds_condense, "solve": record.seconds_solve}
+        costs |= {head: _number(seconds, ".3f") for head, seconds in stages.items()}
+    costs["total s"] = _number(record.seconds, ".3f")
+    if is_wide:
+        costs |= {"MB": _number(record.peak_memory / 1e6, ".3g"), "estim.": _short(record.estimated_error)}
+    return costs
 
 
 def _error(record: ErrorRecord, measure: str, order: float, is_best: bool) -> Text:

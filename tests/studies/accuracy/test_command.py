@@ -17,11 +17,10 @@ from bemkit.errors import BemkitError, one_line
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES, find_reference
 from bemkit.results import outputs as outputs_module
-from bemkit.studies.accuracy import measure as measure_module
-from bemkit.studies.accuracy.measure import error_tasks
+from bemkit.studies.accuracy import runs as runs_module
 from bemkit.studies.accuracy.plots import draw_errors
 from bemkit.studies.accuracy.records import FILE, to_csv
-from bemkit.studies.accuracy.runs import all_runs, uniform
+from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
 from bemkit.studies.accuracy.table import WIDE, print_study
 from bemkit.studies.engine import compute_with_progress
 from tests.studies.accuracy.records import row
@@ -78,7 +77,7 @@ def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
     assert more.return_value == 0
     assert FILE.read(path)[1][:2] == before
     assert len(FILE.read(path)[1]) == 4
-    monkeypatch.setattr(measure_module, "measure", int)  # calling it would fail
+    monkeypatch.setattr(runs_module, "measure", int)  # calling it would fail
     assert call(*FAST, "-q", "-o", path).return_value == 0
     assert len(FILE.read(path)[1]) == 4
 
