@@ -67,10 +67,10 @@ def stability(
         raise click.UsageError("--csv - and --markdown - both print to standard output: give one of them")
     from bemkit.atomic_files import reserved
     from bemkit.scene.toml import load_scene, with_overrides
-    from bemkit.studies.stability.axes import all_axes
+    from bemkit.studies.stability.axes import AXES
     from bemkit.studies.stability.cases import find_axes
 
-    axes = find_axes(all_axes(), names)
+    axes = find_axes(AXES, names)
     outputs = _outputs(axes, output, csv_file, markdown, folder)
     click.get_current_context().with_resource(reserved(outputs.check()))
     chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
@@ -120,8 +120,8 @@ def _outputs(
 ) -> StudyOutputs[StabilityRecord]:
     from bemkit.results.outputs import TextFile
     from bemkit.studies.engine import StudyOutputs
-    from bemkit.studies.stability.plots import draw_axes, figure_name
     from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
+    from bemkit.studies.stability.report import draw_axes, figure_name
 
     texts = (
         TextFile(csv_file, "CSV file of stability rows", CSV_START, to_csv),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 from bemkit.formulas import closest
 from bemkit.plan import make_plan
@@ -119,7 +119,8 @@ def read_measures(text: str) -> tuple[str, ...]:
 
 
 def _solver(word: str) -> ContactSolver:
-    return structure(word, ContactSolver)
+    solver: ContactSolver = structure(word, cast(Any, ContactSolver))
+    return solver
 
 
 def _words(text: str, option: str) -> tuple[str, ...]:

@@ -1,17 +1,23 @@
-"""What ``bemkit stability`` prints."""
+"""What ``bemkit stability`` prints and draws."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.stability.cases import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 from bemkit.studies.stability.trials import Outcome, Trial
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 
@@ -75,3 +81,53 @@ def print_trials(trials: Sequence[Trial], console: Console | None = None) -> Non
     for trial in [trial for trial in trials if trial.is_failure]:
         console.print(Text(f"{trial.outcome.value}: {trial.reason}: {trial.message.strip().splitlines()[-1]}"))
         console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))
+
+
+_SERIES = (
+    ("certificate", "certificate of the driver", BLUE, "o"),
+    ("check", "independent check", GREEN, "s"),
+    ("twin", "difference to the similar twin", ORANGE, "^"),
+    ("drift", "drift from the reference", GREY, "x"),
+)
+_FLOOR = 1e-18
+
+
+def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
+    """Draw one figure for each axis, by file names."""
+    return {figure_name(axis): draw_axis(axis, [one for one in records if one.axis == axis.name]) for axis in axes}
+
+
+def figure_name(axis: Axis) -> str:
+    """Return the name of the file, without ``.png``."""
+    return f"stability-{axis.name}"
+
+
+def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
+    """Draw one axis."""
+    figure = new_figure(6.4, 4.0)
+    plot = figure.add_subplot()
+    values = np.array([record.value for record in records])
+    is_logarithmic = axis.is_logarithmic and bool((values > 0.0).any())
+    for name, label, colour, marker in _SERIES:
+        numbers = np.maximum([getattr(record, name) for record in records], _FLOOR)
+        shown = np.isfinite(numbers) & ((values > 0.0) | (not is_logarithmic))
+        plot.plot(
+            values[shown], numbers[shown], marker, color=colour, label=label, markersize=5, linestyle="-", linewidth=0.8
+        )
+    for verdict, colour in ((Verdict.NAMED, SKY), (Verdict.WRONG, VERMILION)):
+        marked = [
+            record.value
+            for record in records
+            if record.verdict == verdict.value and (record.value > 0.0 or not is_logarithmic)
+        ]
+        for k, value in enumerate(marked):
+            plot.axvline(value, color=colour, linewidth=4, alpha=0.35, label=verdict.value if k == 0 else None)
+    if is_logarithmic:
+        plot.set_xscale("log")
+    plot.set_yscale("log")
+    plot.set_xlabel(axis.label)
+    plot.set_ylabel("dimensionless")
+    plot.set_title(axis.name, loc="left")
+    show_grid(plot)
+    plot.legend(fontsize="small", frameon=False)
+    return figure
