@@ -48,28 +48,28 @@ SI = Units()
 
 
 def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -> tuple[Path, ...]:
-    """Draw all figures into a folder, which is made if need be.
-
-    Parameters
-    ----------
-    solution : Solution
-    folder : str or Path
-    units : Units
-        Metre and pascal by default.
-
-    Returns
-    -------
-    tuple of Path
-        ``deformation.png``, and for each contact part ``contact-displacement.png``, ``contact-traction.png`` and
-        ``contact-status.png``, numbered if there are several; without contact ``boundary-traction.png``.
+    """Draw all figures into a folder, which is made if need be, and return their paths; see `all_figures`.
 
     Raises
     ------
     OutputFileError
         If the folder or a file in it cannot be written.
     """
+    return write_figures(all_figures(solution, units=units), Path(folder))
+
+
+def all_figures(solution: Solution, *, units: Units = SI) -> dict[str, Figure]:
+    """Draw everything there is to show.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By file names without ``.png``: ``deformation``, and for each contact part ``contact-displacement``,
+        ``contact-traction`` and ``contact-status``, numbered if there are several; without contact
+        ``boundary-traction``.
+    """
     figures = {"deformation": draw_deformation(solution, units=units)}
-    parts = list(dict.fromkeys(solution.contact.part))
+    parts = solution.contact.parts
     if not parts:
         figures["boundary-traction"] = draw_boundary_traction(solution, length=units.length, stress=units.stress)
     for number, part in enumerate(parts, start=1):
@@ -77,7 +77,7 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -
         figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
         figures[f"contact-traction{suffix}"] = draw_contact_traction(solution, part, units=units)
         figures[f"contact-status{suffix}"] = draw_contact_status(solution, part, units=units)
-    return write_figures(figures, Path(folder))
+    return figures
 
 
 def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, get_type_hints
@@ -51,9 +51,18 @@ class RecordFile(Generic[R]):
     record: type[R]
     labels: tuple[str, ...]
 
-    def check_target(self, path: str | Path) -> Path:
-        """Find out, before any work is done, whether records can be written; see `bemkit.atomic_files.check_target`."""
-        return check_target(Path(path), f"{self.command} file", self._is_own)
+    def check(self, path: str | Path | None) -> list[Path]:
+        """Find out, before any work is done, whether records can be written; return the file, if there is one to write.
+
+        Raises
+        ------
+        OutputFileError, ResultFileError
+        """
+        if path is None:
+            return []
+        if Path(path).is_file():
+            self.read(path)  # says more about a broken file than that it stands in the way
+        return [check_target(Path(path), f"{self.command} file", self._is_own)]
 
     def write(self, path: str | Path, labels: Mapping[str, str], records: Sequence[R]) -> None:
         """Write labels and records, replacing an older file at once or not at all.
@@ -63,7 +72,7 @@ class RecordFile(Generic[R]):
         OutputFileError
             If the file cannot be written, or a file of another kind stands in the way.
         """
-        target = self.check_target(path)
+        target = check_target(Path(path), f"{self.command} file", self._is_own)
         with created(target) as file:
             write_attributes(file, {"format": self.format, "schema_version": self.version})
             for name in self.labels:
@@ -98,7 +107,7 @@ class RecordFile(Generic[R]):
             )
         return labels, records
 
-    def finished(self, path: str | Path, labels: Mapping[str, str]) -> dict[Hashable, R]:
+    def finished(self, path: str | Path | None, labels: Mapping[str, str]) -> dict[Hashable, R]:
         """Return the records of an earlier study under the same labels by their keys, nothing if there is no file.
 
         Raises
@@ -106,7 +115,7 @@ class RecordFile(Generic[R]):
         ResultFileError
             If the file cannot be read, or its labels differ.
         """
-        if not Path(path).exists():
+        if path is None or not Path(path).exists():
             return {}
         earlier, records = self.read(path)
         for name in self.labels:
@@ -116,6 +125,17 @@ class RecordFile(Generic[R]):
                 what = f"of another {name}" if is_long else f"with {name} {earlier[name]}, not {labels[name]}"
                 raise ResultFileError(f"{path}: holds the sweep {what}: choose another name or delete it first")
         return {record.key: record for record in records}
+
+    def keep(
+        self, path: str | Path | None, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]
+    ) -> Iterator[R]:
+        """Hand records on after those that are new were added to the finished ones and written to the file, if any."""
+        for record in records:
+            if record.key not in finished:
+                finished[record.key] = record
+                if path is not None:
+                    self.write(path, labels, list(finished.values()))
+            yield record
 
     @property
     def _types(self) -> dict[str, Any]:

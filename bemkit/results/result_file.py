@@ -35,6 +35,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.outputs import STDOUT
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.scene import Scene
@@ -66,6 +67,8 @@ def check_result_target(path: str | Path) -> Path:
     OutputFileError
         If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
     """
+    if str(path) == STDOUT:
+        raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
     return check_target(Path(path), "bemkit result", _is_result)
 
 

@@ -9,19 +9,14 @@ import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
-from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Generic, NamedTuple
+from typing import Generic, NamedTuple
 
 from bemkit.errors import BemkitError, InputError
-from bemkit.results.outputs import TextFile, check_figures, write_figures
-from bemkit.results.record_file import R, RecordFile
+from bemkit.results.record_file import R
 from bemkit.results.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 REFUSED = "refused"
 """Status of a scene that is refused by a named error before any step."""
@@ -76,82 +71,6 @@ class Task(Generic[R]):
     key: Hashable
     label: str
     compute: Callable[[], R]
-
-
-@dataclass(frozen=True)
-class StudyOutputs(Generic[R]):
-    """Where the records of a study go; each may be left out.
-
-    Parameters
-    ----------
-    file : RecordFile
-    path : str or None
-        File that is complete after every record.
-    texts : tuple of TextFile
-        Tables of all records.
-    folder : str or None
-        For figures.
-    figures : callable (records) -> mapping of str to Figure
-        By file names without ``.png``.
-    figure : str
-        Name of one of them.
-    dots_per_inch : int
-    """
-
-    file: RecordFile[R]
-    path: str | None = None
-    texts: tuple[TextFile[Sequence[R]], ...] = ()
-    folder: str | None = None
-    figures: Callable[[Sequence[R]], Mapping[str, Figure]] = field(default=lambda records: {})
-    figure: str = ""
-    dots_per_inch: int = 150
-
-    def check(self) -> list[Path]:
-        """Find out, before any work is done, whether everything can be written.
-
-        Returns
-        -------
-        list of Path
-            The file of records, to be reserved.
-
-        Raises
-        ------
-        OutputFileError, ResultFileError
-        """
-        if self.path is not None and Path(self.path).is_file():
-            self.file.read(self.path)  # says more about a broken file than that it stands in the way
-        target = [] if self.path is None else [self.file.check_target(self.path)]
-        for text in self.texts:
-            text.check()
-        if self.folder is not None:
-            check_figures(Path(self.folder), self.figure)
-        return target
-
-    def finished(self, labels: Mapping[str, str]) -> dict[Hashable, R]:
-        """Return the records that an earlier study under the same labels has left in the file, by their keys.
-
-        Raises
-        ------
-        ResultFileError
-            If the file belongs to another study.
-        """
-        return {} if self.path is None else self.file.finished(self.path, labels)
-
-    def keep(self, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]) -> Iterator[R]:
-        """Hand records on after those that are new were added to the finished ones and written to the file."""
-        for record in records:
-            if record.key not in finished:
-                finished[record.key] = record
-                if self.path is not None:
-                    self.file.write(self.path, labels, list(finished.values()))
-            yield record
-
-    def write(self, records: Sequence[R]) -> None:
-        """Write tables and figures of all records."""
-        for text in self.texts:
-            text.write(records)
-        if self.folder is not None:
-            write_figures(self.figures(records), Path(self.folder), self.dots_per_inch)
 
 
 def compute(

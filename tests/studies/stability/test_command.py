@@ -69,7 +69,7 @@ def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> 
     [
         (("stability", "paper-3"), "no such file or shipped scene"),
         (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
-        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "both print to standard output"),
+        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same place"),
         (("stability", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
         (("stability", "--random", "3", "--axis", "gap"), "--axis goes with a sweep of one scene"),
         (("stability", "paper-1", "--random", "3"), "SCENE goes with a sweep of one scene"),
