@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
 from io import BufferedRandom, BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.atomic_files import check_room, replacing
+from bemkit.atomic_files import check_room, check_target, replacing
 from bemkit.errors import InputError, printable, shown_path
+from bemkit.version import __version__
 
 if TYPE_CHECKING:
     import h5py
@@ -43,11 +48,6 @@ def write_attributes(group: h5py.Group, values: Mapping[str, Any]) -> None:
 def write_text(group: h5py.Group, name: str, text: str) -> None:
     """Write a text of any length as a scalar dataset of fixed size."""
     group.create_dataset(name, data=np.array(text.encode("utf-8"), dtype=_text_type([text])))
-
-
-def write_texts(group: h5py.Group, name: str, texts: Sequence[str]) -> None:
-    """Write texts of any length as a dataset."""
-    write_table(group, {name: list(texts)})
 
 
 def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
@@ -96,15 +96,7 @@ def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py
 
 
 def seal(path: Path, mark: bytes) -> None:
-    """Write the checksum of the HDF5 content of a file into the block before it.
-
-    Parameters
-    ----------
-    path : Path
-        A file with a user block.
-    mark : bytes
-        First line of the block, by which such files are known.
-    """
+    """Write the mark and the checksum of the HDF5 content of a file into the user block before it."""
     with path.open("r+b") as stream:
         stream.write(_user_block(stream, mark))
 
@@ -115,6 +107,86 @@ def _user_block(stream: BufferedReader | BufferedRandom, mark: bytes) -> bytes:
     digest = hashlib.file_digest(stream, "sha256").hexdigest()
     stream.seek(0)
     return (mark + digest.encode()).ljust(USER_BLOCK, b"\0")
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """A kind of HDF5 files, which say what they are, which layout they have, and what they were made with.
+
+    Parameters
+    ----------
+    name : str
+        Mark by which such files are recognised.
+    version : int
+        Of the layout.
+    kind : str
+        In words, for messages: "bemkit result".
+    command : str
+        That writes such files, for messages.
+    """
+
+    name: str
+    version: int
+    kind: str
+    command: str
+
+    def check_target(self, path: str | Path) -> Path:
+        """Find out, before any work is done, whether a file can be written; see `bemkit.atomic_files.check_target`."""
+        return check_target(Path(path), self.kind, self._is_own)
+
+    @contextmanager
+    def created(self, path: str | Path) -> Iterator[h5py.File]:
+        """Give a marked file that replaces one of its kind at once or not at all.
+
+        Raises
+        ------
+        OutputFileError
+            If the file cannot be written, or a file of another kind stands in the way.
+        """
+        with created(self.check_target(path)) as file:
+            write_attributes(file, {"format": self.name, "schema_version": self.version})
+            write_attributes(file.create_group("provenance"), provenance())
+            yield file
+
+    @contextmanager
+    def opened(self, path: str | Path) -> Iterator[Reader]:
+        """Open a file of this kind for careful reading; see `opened`.
+
+        Raises
+        ------
+        ResultFileError
+            If the file is not a complete file of this kind and version.
+        """
+        with opened(Path(path), made_by=self.command) as reader:
+            marks = reader.attributes("/")
+            if marks.get("format") != self.name:
+                raise reader.error(
+                    f"an HDF5 file, but not a {self.kind}: give a file written by '{self.command}', or choose another name"
+                )
+            if marks.get("schema_version") != self.version:
+                raise reader.error(
+                    f"has layout version {marks.get('schema_version')}, this bemkit {__version__} reads version "
+                    f"{self.version}: use the bemkit that wrote it, or write it anew"
+                )
+            yield reader
+
+    def _is_own(self, path: Path) -> bool:
+        try:
+            with self.opened(path):
+                return True
+        except ResultFileError:
+            return False
+
+
+def provenance() -> dict[str, str]:
+    """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
+    return {
+        "bemkit": __version__,
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
+        "platform": f"{platform.system()} {platform.machine()}",
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:

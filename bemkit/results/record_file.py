@@ -9,9 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
-from bemkit.atomic_files import check_target
-from bemkit.hdf5 import ResultFileError, created, opened, write_attributes, write_table, write_text
-from bemkit.results.result_file import provenance
+from bemkit.hdf5 import FileFormat, ResultFileError, write_table, write_text
 
 _MAX_LABEL = 1_000_000
 
@@ -33,21 +31,14 @@ class RecordFile(Generic[R]):
 
     Parameters
     ----------
-    format : str
-        Mark by which such files are recognised.
-    version : int
-        Of the layout.
-    command : str
-        That writes such files, for messages.
+    format : FileFormat
     record : type
         Of the records.
     labels : tuple of str
         Names of the texts.
     """
 
-    format: str
-    version: int
-    command: str
+    format: FileFormat
     record: type[R]
     labels: tuple[str, ...]
 
@@ -62,7 +53,7 @@ class RecordFile(Generic[R]):
             return []
         if Path(path).is_file():
             self.read(path)  # says more about a broken file than that it stands in the way
-        return [check_target(Path(path), f"{self.command} file", self._is_own)]
+        return [self.format.check_target(path)]
 
     def write(self, path: str | Path, labels: Mapping[str, str], records: Sequence[R]) -> None:
         """Write labels and records, replacing an older file at once or not at all.
@@ -72,12 +63,9 @@ class RecordFile(Generic[R]):
         OutputFileError
             If the file cannot be written, or a file of another kind stands in the way.
         """
-        target = check_target(Path(path), f"{self.command} file", self._is_own)
-        with created(target) as file:
-            write_attributes(file, {"format": self.format, "schema_version": self.version})
+        with self.format.created(path) as file:
             for name in self.labels:
                 write_text(file, name, labels[name])
-            write_attributes(file.create_group("provenance"), provenance())
             write_table(file.create_group("rows"), {name: self._column(name, records) for name in self._types})
 
     def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
@@ -88,15 +76,7 @@ class RecordFile(Generic[R]):
         ResultFileError
             If the file is not a complete file of this kind and version.
         """
-        with opened(Path(path), made_by=f"{self.command} -o") as reader:
-            marks = reader.attributes("/")
-            if marks.get("format") != self.format:
-                raise reader.error(f"an HDF5 file, but not of '{self.command} -o': choose another name")
-            if marks.get("schema_version") != self.version:
-                raise reader.error(
-                    f"has layout version {marks.get('schema_version')}, this bemkit reads version {self.version}: "
-                    "use the bemkit that wrote it, or delete it to begin anew"
-                )
+        with self.format.opened(path) as reader:
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
             texts, floats, integers = ([name for name in types if types[name] is kind] for kind in (str, float, int))
@@ -145,10 +125,3 @@ class RecordFile(Generic[R]):
         values = [getattr(record, name) for record in records]
         kind = self._types[name]
         return values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)
-
-    def _is_own(self, path: Path) -> bool:
-        try:
-            self.read(path)
-        except ResultFileError:
-            return False
-        return True

@@ -18,21 +18,18 @@ stranger runs no code. The layout, version 2:
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemkit.atomic_files import OutputFileError, check_target
+from bemkit.atomic_files import OutputFileError
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_attributes, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import STDOUT
@@ -42,15 +39,13 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure, unstructure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
-from bemkit.version import __version__
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
-FORMAT = "bemkit-result"
-SCHEMA_VERSION = 2
+FORMAT = FileFormat("bemkit-result", 2, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
 
 _COUNTS = ("linear_solves", "outer_steps")
@@ -69,7 +64,7 @@ def check_result_target(path: str | Path) -> Path:
     """
     if str(path) == STDOUT:
         raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
-    return check_target(Path(path), "bemkit result", _is_result)
+    return FORMAT.check_target(path)
 
 
 def write_result(path: str | Path, solution: Solution) -> None:
@@ -82,12 +77,9 @@ def write_result(path: str | Path, solution: Solution) -> None:
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """
-    target = check_result_target(path)
     text = scene_to_toml(solution.scene)
-    with created(target) as file:
-        write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
+    with FORMAT.created(path) as file:
         write_text(file, "scene", text)
-        write_attributes(file.create_group("provenance"), provenance())
         write_attributes(file.create_group("summary"), _summary(solution))
         write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
         write_attributes(file.create_group("timings", track_order=True), solution.timings)
@@ -101,7 +93,7 @@ def write_result(path: str | Path, solution: Solution) -> None:
         for name in ("plan", "work"):
             write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
         write_attributes(file.create_group("memory"), solution.memory)
-        write_texts(file, "warnings", solution.warnings)
+        write_table(file, {"warnings": list(solution.warnings)})
 
 
 def read_result(path: str | Path) -> Solution:
@@ -112,8 +104,7 @@ def read_result(path: str | Path) -> Solution:
     ResultFileError
         If the file is not a complete bemkit result of a known version.
     """
-    with opened(Path(path)) as reader:
-        _check_version(reader)
+    with FORMAT.opened(path) as reader:
         try:
             scene = scene_from_toml(reader.text("scene", MAX_BYTES), name="scene inside")
         except SceneError as error:
@@ -123,38 +114,6 @@ def read_result(path: str | Path) -> Solution:
         except (ValueError, KeyError, OverflowError, RecursionError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
     return solution
-
-
-def provenance() -> dict[str, str]:
-    """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
-    return {
-        "bemkit": __version__,
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
-        "platform": f"{platform.system()} {platform.machine()}",
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def _is_result(path: Path) -> bool:
-    try:
-        with opened(path) as reader:
-            _check_version(reader)
-    except ResultFileError:
-        return False
-    return True
-
-
-def _check_version(reader: Reader) -> None:
-    marks = reader.attributes("/")
-    if marks.get("format") != FORMAT:
-        raise reader.error("an HDF5 file, but not a bemkit result: give a file written by 'bemkit run -o'")
-    version = marks.get("schema_version")
-    if version != SCHEMA_VERSION:
-        raise reader.error(
-            f"has layout version {version}, this bemkit {__version__} reads version {SCHEMA_VERSION}: "
-            "use the bemkit that wrote it, or run its scene again"
-        )
 
 
 def _summary(solution: Solution) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bemkit.hdf5 import ResultFileError
+from bemkit.hdf5 import FileFormat, ResultFileError
 from bemkit.results.outputs import Outputs, TextFile
 from bemkit.results.record_file import RecordFile
 from bemkit.studies.engine import Task, compute, compute_with_progress
@@ -30,7 +30,8 @@ class Square:
         return self.number
 
 
-FILE = RecordFile("bemkit-squares", 1, "bemkit squares", Square, ("title",))
+FORMAT = FileFormat("bemkit-squares", 1, "bemkit squares file", "bemkit squares -o")
+FILE = RecordFile(FORMAT, Square, ("title",))
 LABELS = {"title": "squares"}
 
 

@@ -8,6 +8,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
+from bemkit.hdf5 import FileFormat
 from bemkit.reference.values import MEASURES
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
@@ -141,9 +142,8 @@ def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorReco
     return front
 
 
-FILE = RecordFile(
-    "bemkit-study", 1, "bemkit study errors", ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions")
-)
+FORMAT = FileFormat("bemkit-study", 1, "bemkit study errors file", "bemkit study errors -o")
+FILE = RecordFile(FORMAT, ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions"))
 CSV_START = "discretisation,map,meshes,solver,size,"
 
 

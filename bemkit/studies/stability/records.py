@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from bemkit.hdf5 import FileFormat
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
 from bemkit.studies.stability.cases import Axis
@@ -76,7 +77,8 @@ class StabilityRecord:
         return self.axis, self.value
 
 
-FILE = RecordFile("bemkit-stability", 1, "bemkit stability", StabilityRecord, ("scene",))
+FORMAT = FileFormat("bemkit-stability", 1, "bemkit stability file", "bemkit stability -o")
+FILE = RecordFile(FORMAT, StabilityRecord, ("scene",))
 CSV_START = "axis,value,verdict,status,"
 MARKDOWN_START = "### "
 
