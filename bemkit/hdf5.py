@@ -160,9 +160,8 @@ class FileFormat:
         with opened(Path(path), made_by=self.command) as reader:
             marks = reader.attributes("/")
             if marks.get("format") != self.name:
-                raise reader.error(
-                    f"an HDF5 file, but not a {self.kind}: give a file written by '{self.command}', or choose another name"
-                )
+                remedy = f"give a file written by '{self.command}', or choose another name"
+                raise reader.error(f"an HDF5 file, but not a {self.kind}: {remedy}")
             if marks.get("schema_version") != self.version:
                 raise reader.error(
                     f"has layout version {marks.get('schema_version')}, this bemkit {__version__} reads version "

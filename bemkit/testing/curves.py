@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.vectors import cross, norms
-from bemkit.testing.failure import demand
+from bemkit.testing.failure import demand, evaluated
 
 
 def check_curve(curve: Curve, *, seed: int = 0) -> None:
@@ -47,12 +47,7 @@ def check_curve(curve: Curve, *, seed: int = 0) -> None:
 
 def _evaluated(method: Callable[[FloatArray], FloatArray], name: str, s: FloatArray) -> FloatArray:
     label = f"{name}.{method.__name__}"
-    given = s.copy()
-    values = method(s)
-    demand(np.array_equal(s, given), f"{label} changes its argument")
-    demand(np.shape(values) == (s.size, 2), f"{label} returns the shape {np.shape(values)}, not {(s.size, 2)}")
-    demand(bool(np.isfinite(values).all()), f"{label} is not finite on [0, 1]")
-    demand(np.array_equal(values, method(s)), f"{label} gives two answers to one question")
+    values = evaluated(label, method, s, (s.size, 2))
     one_by_one = np.concatenate([method(s[k : k + 1]) for k in range(s.size)])
     difference = float(np.abs(one_by_one - values).max())
     # vectorised functions may round differently from their scalar form

@@ -115,17 +115,11 @@ def lifted() -> KnownProblem:
 
 KNOWN_PROBLEMS: Mapping[str, Callable[[], KnownProblem]] = MappingProxyType(
     {
-        "three solutions": three_solutions,
-        "nothing to do": nothing_to_do,
-        "overlap": overlap,
-        "out of reach": out_of_reach,
-        "tie": tie,
-        "slide backward": slide_backward,
-        "incremental": incremental,
-        "smooth floor": smooth_floor,
-        "given friction": given_friction,
-        "floating": floating,
-        "lifted": lifted,
+        make.__name__.replace("_", " "): make
+        for make in (
+            *(three_solutions, nothing_to_do, overlap, out_of_reach, tie, slide_backward, incremental),
+            *(smooth_floor, given_friction, floating, lifted),
+        )
     }
 )
 """By name; each call makes a new problem."""
