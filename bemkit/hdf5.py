@@ -39,12 +39,6 @@ class ResultFileError(InputError):
     """A result file that cannot be read; one line with its name and the remedy."""
 
 
-def write_attributes(group: h5py.Group, values: Mapping[str, Any]) -> None:
-    """Write texts and numbers as attributes of a group."""
-    for name, value in values.items():
-        group.attrs[name] = value
-
-
 def write_text(group: h5py.Group, name: str, text: str) -> None:
     """Write a text of any length as a scalar dataset of fixed size."""
     group.create_dataset(name, data=np.array(text.encode("utf-8"), dtype=_text_type([text])))
@@ -58,6 +52,12 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
         else:
             data = column.astype(np.int64) if column.dtype.kind == "i" else column
         group.create_dataset(name, data=data)
+
+
+def rows_of(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of a table that a `Reader` has read, as plain texts and numbers."""
+    plain = [column if isinstance(column, list) else column.tolist() for column in columns.values()]
+    return [dict(zip(columns, values, strict=True)) for values in zip(*plain, strict=True)]
 
 
 @contextmanager
@@ -144,8 +144,8 @@ class FileFormat:
             If the file cannot be written, or a file of another kind stands in the way.
         """
         with created(self.check_target(path)) as file:
-            write_attributes(file, {"format": self.name, "schema_version": self.version})
-            write_attributes(file.create_group("provenance"), provenance())
+            file.attrs.update({"format": self.name, "schema_version": self.version})
+            file.create_group("provenance").attrs.update(provenance())
             yield file
 
     @contextmanager
@@ -221,34 +221,28 @@ def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> It
     """
     import h5py
 
-    name = shown_path(path)
+    name, remedy = shown_path(path), f"give a file written by '{made_by}'"
+    broken = "not an HDF5 file, or a broken one"
     try:
-        size = path.stat().st_size if path.is_file() else None
-        if size is None:
-            problem = "not a file" if path.exists() else "no such file"
-            raise ResultFileError(f"{name}: {problem}: give a file written by '{made_by}'")
-        _check_seal(path, mark, made_by)
+        if not path.is_file():
+            raise ResultFileError(f"{name}: {'not a file' if path.exists() else 'no such file'}: {remedy}")
+        size = path.stat().st_size
+        with path.open("rb") as stream:
+            block = stream.read(USER_BLOCK)
+            if not block.startswith(mark):
+                kind = "an HDF5 file, but not of bemkit" if block.startswith(_HDF5) else broken
+                raise ResultFileError(f"{name}: {kind}: {remedy}")
+            if block != _user_block(stream, mark):
+                damage = "its content does not match its checksum: the file is damaged, run its scene again"
+                raise ResultFileError(f"{name}: {damage}")
         file = h5py.File(str(path), "r", locking=False)  # files are replaced as a whole, never changed
+    except ResultFileError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, ResultFileError):
-            raise
-        reason = error.strerror if isinstance(error, PermissionError) else "not an HDF5 file, or a broken one"
-        raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by '{made_by}'") from error
+        reason = error.strerror if isinstance(error, PermissionError) else broken
+        raise ResultFileError(f"{name}: cannot be read ({reason}): {remedy}") from error
     with file:
         yield Reader(name, size, file)
-
-
-def _check_seal(path: Path, mark: bytes, made_by: str) -> None:
-    name = shown_path(path)
-    with path.open("rb") as stream:
-        block = stream.read(USER_BLOCK)
-        if not block.startswith(mark):
-            kind = "an HDF5 file, but not of bemkit" if block.startswith(_HDF5) else "not an HDF5 file, or a broken one"
-            raise ResultFileError(f"{name}: {kind}: give a file written by '{made_by}'")
-        if block != _user_block(stream, mark):
-            raise ResultFileError(
-                f"{name}: its content does not match its checksum: the file is damaged, run its scene again"
-            )
 
 
 class Reader:
@@ -280,26 +274,23 @@ class Reader:
         """Return the texts and numbers attached to a group."""
         import h5py
 
-        try:
-            attributes = self._group(group).attrs
-            if len(attributes) > _MAX_ENTRIES_PER_GROUP:
+        found = self._follow(group)
+        if not isinstance(found, h5py.Group):
+            raise self.error(f"{group} is not a group")
+        with self._named_failures(f"attributes of {group}"):
+            if len(found.attrs) > _MAX_ENTRIES_PER_GROUP:
                 raise self.error(f"too many attributes in {group}")
-            for name in attributes:
-                stored = attributes.get_id(name)
+            for name in found.attrs:
+                stored = found.attrs.get_id(name)
                 is_text = h5py.check_string_dtype(stored.dtype) is not None  # type: ignore[attr-defined]  # stubs
                 if stored.shape != () or not (is_text or stored.dtype.kind in "if"):
                     raise self.error(f"attribute {name!r} of {group} is not a single text or number")
-            values = dict(attributes.items())
-        except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
-            raise self.error(f"attributes of {group} cannot be read") from error
-        return {name: _plain(value) for name, value in values.items()}
+            return {name: _plain(value) for name, value in found.attrs.items()}
 
     def has(self, path: str) -> bool:
         """Whether there is something at a path."""
-        try:
+        with self._named_failures(path):
             return path in self._file
-        except (OSError, RuntimeError, KeyError) as error:
-            raise self.error(f"{path} cannot be read") from error
 
     def floats(self, path: str) -> FloatArray:
         """Return an array of floats."""
@@ -342,52 +333,41 @@ class Reader:
         except UnicodeDecodeError as error:
             raise self.error(f"{path} is not UTF-8 text") from error
 
-    def _group(self, path: str) -> h5py.Group:
+    def _array(self, path: str, kind: str) -> npt.NDArray[Any]:
+        """Return an array of numbers of 8 bytes, of the kind "f" or "i", or of texts, of the kind "S"."""
         import h5py
 
         found = self._follow(path)
-        if not isinstance(found, h5py.Group):
-            raise self.error(f"{path} is not a group")
-        return found
-
-    def _array(self, path: str, kind: str | None) -> npt.NDArray[Any]:
-        """Return an array of some kind of numbers or texts, of any kind if that is None."""
-        import h5py
-
-        found: Any = self._follow(path)
-        try:
+        with self._named_failures(path):
             is_dataset = isinstance(found, h5py.Dataset)
             if not is_dataset or found.shape is None:
                 raise self.error(f"{path} is not an array")
             # compressed, virtual or never written data take less room in the file than in memory
             if found.external is not None or found.nbytes > min(self._size, found.id.get_storage_size()):
                 raise self.error(f"{path} is not stored plainly in the file")
-            kind = found.dtype.kind if kind is None else kind
-            if (
-                found.dtype.kind != kind
-                or kind not in "fiS"
-                or (kind != "S" and found.dtype.itemsize != 8)
-                or found.ndim > 2
-            ):
+            if found.dtype.kind != kind or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
                 raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")
             return np.asarray(found[()])
-        except (OSError, RuntimeError, TypeError, MemoryError) as error:
-            raise self.error(f"{path} cannot be read") from error
 
     def _follow(self, path: str) -> Any:
         """Return the object at a path, through hard links only."""
         import h5py
 
         found: Any = self._file
-        try:
+        with self._named_failures(path):
             for name in filter(None, path.split("/")):
                 is_group = isinstance(found, h5py.Group)
                 if not is_group or type(found.get(name, getlink=True)).__name__ != "HardLink":
                     raise self.error(f"{path} is missing")
                 found = found[name]
-        except (OSError, RuntimeError, KeyError) as error:
-            raise self.error(f"{path} cannot be read") from error
         return found
+
+    @contextmanager
+    def _named_failures(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, RuntimeError, KeyError, TypeError, MemoryError, UnicodeDecodeError) as error:
+            raise self.error(f"{what} cannot be read") from error
 
 
 def _plain(value: Any) -> Any:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
-from bemkit.contact.certificate import Certificate
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
@@ -21,20 +21,13 @@ _MANY_TRANSITIONS = 12
 
 
 def print_summary(solution: Solution, console: Console | None = None) -> None:
-    """Print a solution as a compact table.
-
-    Parameters
-    ----------
-    solution : Solution
-    console : rich.console.Console, optional
-        Standard output by default.
-    """
+    """Print a solution as a compact table, to standard output by default."""
     console = stdout_console(console)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in _summary_rows(solution):
-        table.add_row(name, value)
+        table.add_row(name, Text(value) if isinstance(value, str) else value)
     console.print(Text(solution.scene.title, style="bold"))
     console.print(table)
     _print_warnings(solution.warnings, console)
@@ -61,13 +54,7 @@ def _print_warnings(warnings: Sequence[str], console: Console) -> None:
 
 
 class ConvergenceTable:
-    """Prints one line per step of the solver as it happens; give it to `bemkit.run` as callback.
-
-    Parameters
-    ----------
-    console : rich.console.Console, optional
-        Standard error by default.
-    """
+    """A callback of `bemkit.run` that prints one line per step of the solver, to standard error by default."""
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = Console(stderr=True, highlight=False) if console is None else console
@@ -76,9 +63,7 @@ class ConvergenceTable:
     def __call__(self, record: StepRecord) -> None:
         """Print a line."""
         if not self._has_header:
-            header = (
-                f"{'step':>4}  {'solves':>6}  {'separated':>9}  {'stick':>6}  {'slip':>6}  {'changed':>7}  {'worst':>8}"
-            )
+            header = "step  solves  separated   stick    slip  changed     worst"
             self._console.print(Text(header, style="bold"))
             self._has_header = True
         line = (
@@ -162,70 +147,42 @@ def format_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
-def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
-    timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
+def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
+    mesh, contact, timings = solution.mesh, solution.contact, solution.timings
     colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
     status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
+    yield "status", status
     discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
-    if (degree := solution.scene.discretisation.displacement_space(solution.mesh).degree) > 2:
+    if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
-    rows = [
-        ("status", status),
-        ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
-        *_symmetry(solution),
-        *_contact(solution),
-        ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
-        *_estimate(solution),
-        *_solve(solution),
-        ("certificate", Text(_certificate_line(solution.certificate))),
-        ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
-    ]
-    return rows
-
-
-def _certificate_line(certificate: Certificate) -> str:
-    violations = certificate.violations
-    worst = max(violations, key=lambda name: _nan_first(violations[name]))
+    yield "elements", f"{mesh.n_elements} ({discretisation})"
+    if mesh.symmetry is not None:
+        values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
+        yield "symmetry", f"about {mesh.symmetry}: {values}"
+    if contact.n_contact:
+        counts = Counter(contact.status_words())
+        nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+        yield "contact nodes", f"{contact.n_contact}: {nodes}"
+        yield "normal force", f"{solution.force_normal:.8g}  pressing, per unit thickness"
+        yield "friction force", f"{solution.force_tangential:.8g}  on the body, along the boundary"
+    else:
+        yield "contact", "none"
+    yield "elastic energy", f"{solution.energy:.8g}  per unit thickness"
+    if solution.estimated_error is not None:
+        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"
+    if contact.n_contact:
+        yield "transitions", "\n".join(_transition_lines(solution))
+        solver = SOLVERS.word_of(solution.scene.solver)
+        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
+    certificate, violations = solution.certificate, solution.certificate.violations
+    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
     name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
-    return f"worst entry {certificate.worst:.1e}{name}; round-off of the forces up to {certificate.round_off:.1e}"
-
-
-def _symmetry(solution: Solution) -> list[tuple[str, Text]]:
-    mesh = solution.mesh
-    if mesh.symmetry is None:
-        return []
-    values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
-    return [("symmetry", Text(f"about {mesh.symmetry}: {values}"))]
-
-
-def _contact(solution: Solution) -> list[tuple[str, Text]]:
-    if not solution.contact.n_contact:
-        return [("contact", Text("none"))]
-    counts = Counter(solution.contact.status_words())
-    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
-    return [
-        ("contact nodes", Text(f"{solution.contact.n_contact}: {nodes}")),
-        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
-        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
-    ]
-
-
-def _solve(solution: Solution) -> list[tuple[str, Text]]:
-    if not solution.contact.n_contact:
-        return []
-    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({SOLVERS.word_of(solution.scene.solver)})"
-    return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
-
-
-def _estimate(solution: Solution) -> list[tuple[str, Text]]:
-    error = solution.estimated_error
-    return [] if error is None else [("estimated error", Text(f"{error:.1e}  relative, in the energy norm"))]
-
-
-def _nan_first(value: float) -> float:
-    return value if value == value else float("inf")
+    round_off = f"round-off of the forces up to {certificate.round_off:.1e}"
+    yield "certificate", f"worst entry {certificate.worst:.1e}{name}; {round_off}"
+    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
+    yield "time", f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
 
 
 def _transition_lines(solution: Solution) -> list[str]:

@@ -11,7 +11,7 @@ import time
 import tracemalloc
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -113,15 +113,10 @@ def run(
     json_file: str | None,
     csv_file: str | None,
     folder: str | None,
-    elements: int | None,
-    accuracy: float | None,
-    discretisation: str | None,
-    degree: int | None,
-    solver: str | None,
-    rho: float | None,
     cascade: bool,
     explain: bool,
     quiet: bool,
+    **overrides: Any,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     from bemkit.atomic_files import reserved
@@ -129,15 +124,7 @@ def run(
 
     outputs = _outputs(json_file, csv_file, folder)
     click.get_current_context().with_resource(reserved(outputs.check(_result_target(output))))
-    chosen = with_overrides(
-        load_scene(scene),
-        elements=elements,
-        accuracy=accuracy,
-        discretisation=discretisation,
-        degree=degree,
-        solver=solver,
-        rho=rho,
-    )
+    chosen = with_overrides(load_scene(scene), **overrides)
     is_live = not quiet and sys.stderr.isatty()
     with concerning(scene):
         if explain:
@@ -208,13 +195,13 @@ def scenes() -> None:
 @click.option("--discretisation", metavar="WORD", help="linear, quadratic or constant, instead of the scene's.")
 @click.option("--degree", type=int, metavar="P", help="Galerkin elements of degree P, instead of the scene's.")
 @click.option("--json", "is_json", is_flag=True, help="Print the plan as JSON.")
-def plan(scene: str, elements: int | None, discretisation: str | None, degree: int | None, is_json: bool) -> None:
+def plan(scene: str, is_json: bool, **overrides: Any) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
     from bemkit.plan import check_elements, make_plan
     from bemkit.scene.symmetry import find_symmetry
     from bemkit.scene.toml import load_scene, with_overrides
 
-    chosen = with_overrides(load_scene(scene), elements=elements, discretisation=discretisation, degree=degree)
+    chosen = with_overrides(load_scene(scene), **overrides)
     with concerning(scene):
         check_elements(chosen)
         proposal = find_symmetry(chosen) if chosen.symmetry is None else None

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic
 from bemkit.geometry.meshing.order import along_boundary
@@ -16,13 +15,11 @@ from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
 from bemkit.results.solution import Solution
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import Contact, QuadraticGalerkin, Scene
+from bemkit.scene.scene import QuadraticGalerkin, Scene
 
 FINEST = 1e-12
 """An accuracy that no mesh reaches, so that the number of elements alone ends the search."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
-CORNERS = Algebraic(3.0)
-"""Grading where meshes cannot follow the solution."""
 
 
 class OverResolutionError(InputError):
@@ -38,7 +35,7 @@ def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
         Of a frictionless scene every node in contact counts as slipping.
     """
     u_n, u_t, sigma_n, sigma_t = np.concatenate([_along(solution, each) for each in places], axis=1)
-    is_frictionless = all(law.is_frictionless for law in _laws(solution.scene))
+    is_frictionless = all(law.is_frictionless for law in solution.scene.laws.values())
     zones = []
     for item in solution.transitions:
         words = (item.from_status, item.to_status)
@@ -92,12 +89,8 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
     if len(scene.load_factors) == 1:
         return list(run_adaptive(replace(scene, mesh=MeshOptions(accuracy=FINEST, most_elements=most_elements))))
     counts = (most_elements // 2, most_elements)
-    return [run(replace(scene, mesh=MeshOptions(elements=n, grading=CORNERS))) for n in counts]
-
-
-def _laws(scene: Scene) -> list[FrictionLaw]:
-    own = [part.condition.law for part in scene.contact_parts if isinstance(part.condition, Contact)]
-    return [scene.law if law is None else law for law in own]
+    grading = Algebraic(3.0)  # where meshes cannot follow the solution
+    return [run(replace(scene, mesh=MeshOptions(elements=n, grading=grading))) for n in counts]
 
 
 def _along(solution: Solution, places: Places) -> FloatArray:

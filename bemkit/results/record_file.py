@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
-from bemkit.hdf5 import FileFormat, ResultFileError, write_table, write_text
+from bemkit.hdf5 import FileFormat, ResultFileError, rows_of, write_table, write_text
 
 _MAX_LABEL = 1_000_000
 
@@ -66,7 +66,11 @@ class RecordFile(Generic[R]):
         with self.format.created(path) as file:
             for name in self.labels:
                 write_text(file, name, labels[name])
-            write_table(file.create_group("rows"), {name: self._column(name, records) for name in self._types})
+            columns: dict[str, Any] = {}
+            for name, kind in self._types.items():
+                values = [getattr(record, name) for record in records]
+                columns[name] = values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)
+            write_table(file.create_group("rows"), columns)
 
     def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
         """Read labels and records.
@@ -80,11 +84,8 @@ class RecordFile(Generic[R]):
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
             texts, floats, integers = ([name for name in types if types[name] is kind] for kind in (str, float, int))
-            columns = reader.table("rows", texts=texts, floats=floats, integers=integers)
-            records = tuple(
-                self.record(**{name: types[name](value) for name, value in zip(columns, values, strict=True)})
-                for values in zip(*columns.values(), strict=True)
-            )
+            rows = rows_of(reader.table("rows", texts=texts, floats=floats, integers=integers))
+            records = tuple(self.record(**row) for row in rows)
         return labels, records
 
     def finished(self, path: str | Path | None, labels: Mapping[str, str]) -> dict[Hashable, R]:
@@ -120,8 +121,3 @@ class RecordFile(Generic[R]):
     @property
     def _types(self) -> dict[str, Any]:
         return get_type_hints(self.record)
-
-    def _column(self, name: str, records: Sequence[R]) -> Any:
-        values = [getattr(record, name) for record in records]
-        kind = self._types[name]
-        return values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)

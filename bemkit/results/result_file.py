@@ -18,7 +18,6 @@ stranger runs no code. The layout, version 2:
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +28,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_attributes, write_table, write_text
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import STDOUT
@@ -80,19 +79,24 @@ def write_result(path: str | Path, solution: Solution) -> None:
     text = scene_to_toml(solution.scene)
     with FORMAT.created(path) as file:
         write_text(file, "scene", text)
-        write_attributes(file.create_group("summary"), _summary(solution))
-        write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
-        write_attributes(file.create_group("timings", track_order=True), solution.timings)
+        numbers = {name: getattr(solution, name) for name in (*_COUNTS, *_FORCES)}
+        summary = {"status": solution.status.name, "message": solution.message, **numbers}
+        file.create_group("summary").attrs.update(summary)
+        file.create_group("certificate").attrs.update(solution.certificate.as_dict())
+        file.create_group("timings", track_order=True).attrs.update(solution.timings)
         _write_mesh(file.create_group("mesh"), solution.mesh)
         for name in _BOUNDARY:
             file.create_dataset(f"boundary/{name}", data=getattr(solution.boundary, name))
         contact = {"part": list(solution.contact.part), **solution.contact.columns()}
         write_table(file.create_group("contact"), contact)
-        write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
+        rows = [transition.as_dict() for transition in solution.transitions]
+        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in ("part", "from", "to")}
+        columns |= {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
+        write_table(file.create_group("transitions"), columns)
         write_table(file.create_group("history"), history_columns(solution.history))
         for name in ("plan", "work"):
             write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
-        write_attributes(file.create_group("memory"), solution.memory)
+        file.create_group("memory").attrs.update(solution.memory)
         write_table(file, {"warnings": list(solution.warnings)})
 
 
@@ -116,15 +120,10 @@ def read_result(path: str | Path) -> Solution:
     return solution
 
 
-def _summary(solution: Solution) -> dict[str, Any]:
-    numbers = {name: getattr(solution, name) for name in (*_COUNTS, *_FORCES)}
-    return {"status": solution.status.name, "message": solution.message, **numbers}
-
-
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
     lines = {} if mesh.symmetry is None else {"symmetry_x": mesh.symmetry.x, "symmetry_y": mesh.symmetry.y}
     lines = {name: place for name, place in lines.items() if place is not None}
-    write_attributes(group, {"is_exterior": int(mesh.is_exterior), **lines})
+    group.attrs.update({"is_exterior": int(mesh.is_exterior), **lines})
     group["nodes"] = mesh.nodes
     group["elements"] = mesh.elements.astype(np.int64)
     if mesh.element_curve is not None and mesh.element_span is not None:
@@ -156,7 +155,9 @@ def _read_mesh(reader: Reader, scene: Scene) -> BoundaryMesh:
 
 
 def _read_solution(reader: Reader, scene: Scene) -> Solution:
-    summary = reader.attributes("summary")
+    summary, certificate = reader.attributes("summary"), reader.attributes("certificate")
+    numbers: dict[str, Any] = {name: int(summary[name]) for name in _COUNTS}
+    numbers |= {name: float(summary[name]) for name in _FORCES}
     mesh = _read_mesh(reader, scene)
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
     boundary = BoundaryFields(**{name: reader.floats(f"boundary/{name}") for name in _BOUNDARY})
@@ -166,15 +167,11 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         scene=scene,
         mesh=mesh,
         status=Status[str(summary["status"])],
-        certificate=Certificate(**_numbers(reader, "certificate", CERTIFICATE_ENTRIES)),
+        certificate=Certificate(**{name: float(certificate[name]) for name in CERTIFICATE_ENTRIES}),
         contact=ContactTable(**{**columns, "part": tuple(columns["part"])}),
         boundary=boundary,
         history=_read_history(reader),
-        linear_solves=int(summary["linear_solves"]),
-        outer_steps=int(summary["outer_steps"]),
-        force_normal=float(summary["force_normal"]),
-        force_tangential=float(summary["force_tangential"]),
-        energy=float(summary["energy"]),
+        **numbers,
         transitions=_read_transitions(reader),
         timings={name: float(value) for name, value in reader.attributes("timings").items()},
         plan=structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
@@ -185,38 +182,13 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     )
 
 
-def _numbers(reader: Reader, group: str, names: Sequence[str]) -> dict[str, float]:
-    attributes = reader.attributes(group)
-    return {name: float(attributes[name]) for name in names}
-
-
-def _transition_columns(transitions: Sequence[Transition]) -> dict[str, Any]:
-    rows = [transition.as_dict() for transition in transitions]
-    texts = {name: [str(row[name]) for row in rows] for name in ("part", "from", "to")}
-    return texts | {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
-
-
 def _read_transitions(reader: Reader) -> tuple[Transition, ...]:
-    columns = reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s"))
-    return tuple(
-        Transition(row["part"], float(row["x"]), float(row["y"]), float(row["s"]), row["from"], row["to"])
-        for row in _rows(columns)
-    )
+    rows = rows_of(reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s")))
+    return tuple(Transition(row["part"], row["x"], row["y"], row["s"], row["from"], row["to"]) for row in rows)
 
 
 def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
     floats = ("relative_change", *CERTIFICATE_ENTRIES)
-    columns = reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS)
-    return tuple(
-        StepRecord(
-            **{name: int(row[name]) for name in RECORD_COUNTS},
-            certificate=Certificate(**{name: float(row[name]) for name in CERTIFICATE_ENTRIES}),
-            relative_change=float(row["relative_change"]),
-            message=row["message"],
-        )
-        for row in _rows(columns)
-    )
-
-
-def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    rows = rows_of(reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS))
+    certificates = [Certificate(**{name: row.pop(name) for name in CERTIFICATE_ENTRIES}) for row in rows]
+    return tuple(StepRecord(**row, certificate=each) for row, each in zip(rows, certificates, strict=True))

@@ -47,7 +47,7 @@ def to_csv(solution: Solution, table: str) -> str:
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     columns = _columns(solution, table)
-    return csv_text(columns, zip(*(_plain(column) for column in columns.values()), strict=True))
+    return csv_text(columns, zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
 
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
@@ -111,11 +111,6 @@ def _boundary_columns(solution: Solution) -> dict[str, Any]:
         "t_x": traction[:, 0],
         "t_y": traction[:, 1],
     }
-
-
-def _plain(column: Any) -> list[Any]:
-    values: list[Any] = column.tolist() if isinstance(column, np.ndarray) else list(column)
-    return values
 
 
 def finite_only(value: Any) -> Any:

@@ -52,7 +52,10 @@ def _error(solution: Solution) -> Iterator[str]:
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
     elif error > LARGEST_ERROR:
         yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
-    if (share := _share_alone(solution.mesh)) > LARGEST_SHARE_ALONE:
+    # elements without a neighbour on their piece: their strains meet no others
+    whole = solution.mesh.whole
+    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
+    if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
         yield (
             f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
             "no error can be estimated: use more elements."
@@ -66,13 +69,6 @@ def _error(solution: Solution) -> Iterator[str]:
                 f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
                 "use more elements there."
             )
-
-
-def _share_alone(mesh: BoundaryMesh) -> float:
-    """Return the share of the boundary on elements without a neighbour on their piece, whose strains meet no others."""
-    whole = mesh.whole
-    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
-    return float(whole.lengths[is_alone].sum() / whole.lengths.sum())
 
 
 def _turned(solution: Solution) -> Iterator[str]:

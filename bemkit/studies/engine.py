@@ -8,7 +8,7 @@ import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from threading import Thread
@@ -139,7 +139,11 @@ def compute_with_progress(
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with ExitStack() as stack:
-        executor = stack.enter_context(worker_processes(processes)) if processes > 1 else None
+        executor = None
+        if processes > 1:
+            # spawned processes do not inherit threads that hold locks
+            executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
+            stack.callback(executor.shutdown, cancel_futures=True)  # what has not begun is left out
         bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=not is_live)
         row = stack.enter_context(bar).add_task(name, total=len(tasks))
         for record in compute(
@@ -147,20 +151,6 @@ def compute_with_progress(
         ):
             bar.advance(row)
             yield record
-
-
-@contextmanager
-def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Give an executor of several processes; what has not begun when the ``with`` statement ends is left out.
-
-    The processes end at once when the one that started them ends, however that is killed, and on Ctrl-C.
-    """
-    # spawned processes do not inherit threads that hold locks
-    executor = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_prepare_process)
-    try:
-        yield executor
-    finally:
-        executor.shutdown(cancel_futures=True)
 
 
 def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterator[R]:
@@ -186,6 +176,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterato
 
 
 def _prepare_process() -> None:
+    """Let a worker end at once on Ctrl-C, and when the process that started it ends, however that is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     Thread(target=_end_after_parent, daemon=True).start()
 
