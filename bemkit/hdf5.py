@@ -199,15 +199,7 @@ def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
 
 @contextmanager
 def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> Iterator[Reader]:
-    """Open an HDF5 file for careful reading.
-
-    Parameters
-    ----------
-    path : Path
-    made_by : str
-        The command that writes such files, for messages.
-    mark : bytes
-        First line of the user block.
+    """Open an HDF5 file, written by a command under a mark, for careful reading.
 
     Raises
     ------

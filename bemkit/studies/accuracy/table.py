@@ -69,9 +69,8 @@ def _print_series(
     console.print(table)
     for record in records:
         if not record.is_certified:
-            console.print(
-                Text(f"  {_aim(record.size)}: {record.status.replace('_', ' ')}: {record.message}", style="red")
-            )
+            status = record.status.replace("_", " ")
+            console.print(Text(f"  {_aim(record.size)}: {status}: {record.message}", style="red"))
         elif record.message:
             # the first sentence; the rest is in the files
             console.print(Text(f"  {record.message.split('. ')[0]}", style="yellow"))

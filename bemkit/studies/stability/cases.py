@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import break_nodes
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
@@ -83,7 +84,7 @@ class Case:
         """Divide the boundary of `scene`, which is this case's or similar to it."""
         mesh = scene.build_mesh()
         for _ in range(self.levels):
-            mesh = mesh.refined(elements_at_ends(mesh))
+            mesh = mesh.refined(np.unique(mesh.node_elements[break_nodes(mesh)]))
         return mesh
 
 
@@ -116,19 +117,6 @@ class Axis:
         """Whether the values span decades."""
         size = [abs(value) for value in self.values if value]
         return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
-
-
-def elements_at_ends(mesh: BoundaryMesh) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-    """Return the elements beside corners, ends of parts and changes between parts."""
-    incoming, outgoing = mesh.node_elements.T
-    part = np.full(mesh.n_elements, -1)
-    for number, elements in enumerate(mesh.parts.values()):
-        part[elements] = number
-    ends = np.array([1.0]), np.array([-1.0])
-    arriving, leaving = (mesh.normals_at(e, xi)[:, 0] for e, xi in zip((incoming, outgoing), ends, strict=True))
-    is_end = (np.abs(arriving - leaving).max(axis=1) > 1e-6) | (part[incoming] != part[outgoing])
-    is_end &= incoming != outgoing  # not on a symmetry line
-    return np.unique(np.concatenate([incoming[is_end], outgoing[is_end]]))
 
 
 def find_axes(axes: Sequence[Axis], names: Sequence[str]) -> tuple[Axis, ...]:
