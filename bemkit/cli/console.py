@@ -76,14 +76,7 @@ class ConvergenceTable:
 def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
     """Print planned against measured time and memory, the counts, and what was left out.
 
-    Parameters
-    ----------
-    solution : Solution
-        Of a run whose memory was traced, which makes small scenes about twice as slow.
-    output_seconds : float [s]
-        What writing its outputs took.
-    to_stderr : bool
-        Whether standard output is taken by data.
+    Memory was traced in the run, which makes small scenes about twice as slow. Standard output may be taken by data.
     """
     console = Console(stderr=to_stderr, highlight=False)
     console.print(Group(_stages(solution, output_seconds), _counts(solution.plan.work, solution.work)))

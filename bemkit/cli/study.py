@@ -81,10 +81,9 @@ def errors(
     The exit code is 1 if a run did not converge.
     """
     from bemkit.studies.accuracy.options import StudyOptions, read_measures
-    from bemkit.studies.accuracy.plots import FIGURE, draw_errors
     from bemkit.studies.accuracy.records import CSV_START, FILE, to_csv
+    from bemkit.studies.accuracy.report import FIGURE, draw_errors, print_reference, print_study
     from bemkit.studies.accuracy.runs import error_tasks
-    from bemkit.studies.accuracy.table import print_reference, print_study
 
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")

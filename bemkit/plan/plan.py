@@ -103,16 +103,8 @@ def plan_items(
 ) -> tuple[PlanItem, ...]:
     """Say what a scene needs and what it leaves out, in the order in which it is used.
 
-    Parameters
-    ----------
-    scene : Scene
-    sizes : Sizes
-    of_body : tuple of PlanItem
-        What the discretisation says of its map.
-    n_steps : int
-        Load steps.
-    proposal : Symmetry, optional
-        A symmetry that the scene has but does not use.
+    Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
+    scene has but does not use.
     """
     history = "the whole load comes in one step"
     if n_steps > 1:
@@ -302,10 +294,7 @@ def check_memory(plan: Plan) -> None:
 def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
-    Parameters
-    ----------
-    scene : Scene
-        Memory grows with the square of the number of elements: the plan for a small mesh tells what a large one takes.
+    Memory grows with the square of that number: the plan for a small mesh tells what a large one takes.
 
     Raises
     ------

@@ -173,12 +173,9 @@ def exaggeration(diameter: float, displacement: FloatArray) -> float:
 
 
 def node_displacement(solution: Solution) -> FloatArray:
-    """Return the displacement at the mesh nodes.
+    """Return the displacement at the nodes of ``solution.mesh.whole``, (n_nodes, 2) array [m].
 
-    Returns
-    -------
-    (n_nodes, 2) array [m]
-        At the nodes of ``solution.mesh.whole``, interpolated between the two elements that meet where they differ.
+    It is interpolated between the two elements that meet where they differ.
     """
     mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
     space = make_space(mesh)

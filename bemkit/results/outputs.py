@@ -171,14 +171,9 @@ class Outputs(Generic[Content]):
 
 
 def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: int = 150) -> tuple[Path, ...]:
-    """Write figures as PNG, each all or nothing, into a folder that is made if need be; return their paths.
+    """Write figures, by file names without ``.png``, each all or nothing, into a folder that is made if need be.
 
-    Parameters
-    ----------
-    figures : mapping of str to matplotlib.figure.Figure
-        By file names without ``.png``.
-    folder : Path
-    dots_per_inch : int
+    Returns the paths.
 
     Raises
     ------
@@ -195,12 +190,7 @@ def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: in
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if need be.
-
-    Raises
-    ------
-    OutputFileError
-    """
+    """Make a folder if need be; OutputFileError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -358,12 +348,7 @@ def stdout_console(console: Console | None = None, *, width: int | None = None) 
 def plain_table(left: Sequence[str] = (), right: Sequence[str] = (), *, gap: int = 1) -> Table:
     """Return a table of rich without frame: columns of texts, which may be folded, then columns of numbers.
 
-    Parameters
-    ----------
-    left, right : sequence of str
-        Heads of the columns that are justified to the left and to the right.
-    gap : int
-        Spaces between columns.
+    Columns are named and have some spaces between them.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

@@ -191,15 +191,9 @@ class Solution:
 
 
 def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence[str]) -> Solution:
-    """Return a solution with the steps, linear solves, times and memory of all that led to it.
+    """Return a solution with the steps, linear solves, times and memory of all that led to it, in their order.
 
-    Parameters
-    ----------
-    result : Solution
-    solutions : sequence of Solution
-        All of them, in the order in which they were solved.
-    names : sequence of str
-        What each of them is, for the remarks of its steps: "load step 1 of 3".
+    The names say what each of them is, for the remarks of its steps: "load step 1 of 3".
     """
     records: list[StepRecord] = []
     for name, solution in zip(names, solutions, strict=True):

@@ -68,13 +68,7 @@ def to_json(solution: Solution) -> str:
 
 
 def element_displacement(solution: Solution) -> FloatArray:
-    """Return the displacement at the element centres.
-
-    Returns
-    -------
-    (n_elements, 2) array [m]
-        Given there directly, or interpolated.
-    """
+    """Return the displacement at the element centres, (n_elements, 2) array [m], interpolated if need be."""
     space = solution.scene.discretisation.displacement_space(solution.mesh)
     at_centre = space.basis(np.zeros(1))[:, 0]
     return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))

@@ -86,8 +86,7 @@ def compute(
     ----------
     tasks : sequence of Task
     executor : Executor, optional
-        For example a `ProcessPoolExecutor`, or the executor of a `distributed` client; without one the tasks are
-        computed here, one after the other.
+        Such as a `ProcessPoolExecutor` or that of a `distributed` client; by default tasks are computed here, in turn.
     finished : mapping of keys to records, optional
         Of an earlier study; they are handed on instead of computed again.
     begins : callable, optional
@@ -124,15 +123,7 @@ def compute_with_progress(
 ) -> Iterator[R]:
     """Compute records as `compute` does, here or in several processes, while a bar on standard error shows how far.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-    name : str
-        Of the study, at the bar.
-    is_live : bool
-        Whether the bar is shown.
-    processes : int
-    finished : mapping of keys to records, optional
+    The bar bears a name, and is shown only if it is live.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn

@@ -107,12 +107,7 @@ class PaperTable:
 def paper_tables(
     run: Callable[[Sequence[Task[PaperCell]]], Iterable[PaperCell]] = compute,
 ) -> tuple[PaperTable, PaperTable]:
-    """Compute both tables; about a second.
-
-    Parameters
-    ----------
-    run : callable, optional
-        Computes the 50 cells here, such as `bemkit.studies.engine.compute_with_progress`.
+    """Compute both tables, about a second; their 50 cells by `compute` or `compute_with_progress` of the engine.
 
     Raises
     ------

@@ -96,19 +96,7 @@ def by_series(records: Iterable[ErrorRecord]) -> list[list[ErrorRecord]]:
 
 
 def orders(records: Sequence[ErrorRecord], measure: str) -> list[float]:
-    """Return the order of an error between each mesh and the one before it; nan where there is none.
-
-    Parameters
-    ----------
-    records : sequence of ErrorRecord
-        Of one series.
-    measure : str
-
-    Returns
-    -------
-    list of float
-        p in error ~ N**-p.
-    """
+    """Return the orders p, error ~ N**-p, between each mesh of a series and the one before; nan where there is none."""
     return [float("nan"), *(_slope((before, after), measure) for before, after in pairwise(records))][: len(records)]
 
 
@@ -129,10 +117,7 @@ def _slope(records: Sequence[ErrorRecord], measure: str) -> float:
 def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorRecord]:
     """Return the records that no other record beats or equals in both run time and error, from fast to accurate.
 
-    Returns
-    -------
-    list of ErrorRecord
-        Empty if no run time was measured.
+    There are none if no run time was measured.
     """
     known = [record for record in records if np.isfinite(record.seconds) and np.isfinite(getattr(record, measure))]
     front: list[ErrorRecord] = []

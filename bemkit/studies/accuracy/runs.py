@@ -176,13 +176,8 @@ def all_runs(
 def error_tasks(runs: Sequence[Run], reference: Reference, repeat: int | None = None) -> tuple[Task[ErrorRecord], ...]:
     """Return the tasks of a study, for `bemkit.studies.engine.compute`.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-    reference : Reference
-    repeat : int, optional
-        Timed repetitions of each run, after one that warms up and before one that measures the memory; by default run
-        times and memory are not measured and are nan: runs at the same time would disturb each other.
+    Each run is timed `repeat` times, after one that warms up and before one that measures the memory. By default
+    neither is measured, and both are nan: runs at the same time would disturb each other.
 
     Raises
     ------

@@ -146,18 +146,9 @@ def _graded(baseline: Solution, value: float) -> Case:
 
 
 def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
-    """Return the diameters at which the kernel with log|r|, lengths as plain numbers, has no inverse.
+    """Return the two diameters [m], ascending, at which the kernel with log|r| of plain numbers has no inverse.
 
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-        Of a body of any size.
-    material : Material
-
-    Returns
-    -------
-    (2,) array [m]
-        In ascending order.
+    The mesh may be that of a body of any size.
 
     Notes
     -----

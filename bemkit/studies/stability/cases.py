@@ -124,8 +124,8 @@ def find_axes(axes: Sequence[Axis], names: Sequence[str]) -> tuple[Axis, ...]:
 
     Raises
     ------
-    ValueError
-        If there is no axis of a name; the message lists the names.
+    UnknownAxisError
+        The message lists the names.
     """
     known = {axis.name: axis for axis in axes}
     for name in names:

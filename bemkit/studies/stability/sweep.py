@@ -34,15 +34,9 @@ def sweep(
     axes: Sequence[Axis],
     run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
 ) -> Iterator[StabilityRecord]:
-    """Compute the records of some axes, one axis after the other.
+    """Compute the records of some axes from a baseline scene, one axis after the other.
 
-    Parameters
-    ----------
-    scene : Scene
-        The baseline.
-    axes : sequence of Axis
-    run_tasks : callable, optional
-        Computes the tasks of one axis, such as `bemkit.studies.engine.compute` with records of an earlier sweep.
+    `run_tasks` computes the tasks of one axis, such as `compute` of the engine with records of an earlier sweep.
 
     Raises
     ------
@@ -69,15 +63,9 @@ def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
 
 
 def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> StabilityRecord:
-    """Solve a case and its twin, and judge them.
+    """Solve a case of an axis and its twin, and judge them.
 
-    Parameters
-    ----------
-    axis : str
-        Name of the axis, for the record.
-    case : Case
-    reference : Solution or None
-        What the drift is measured against; None if the reference itself has no solution.
+    The drift is measured against the reference, which is None if it has no solution itself.
     """
     twin_scene = TWIN.apply(case.scene)
     first, second = _attempt(case.scene, case), _attempt(twin_scene, case)
@@ -122,14 +110,14 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
     similarity : Similarity
         Leads from the reference to the solution.
     in_mean : bool
-        Take the mean along each contact part instead of the largest entry; always on other meshes,
-        because single nodes at corners see singular tractions.
+        Take the mean along each contact part instead of the largest entry; always on other meshes, because single nodes
+        at corners see singular tractions. On different meshes the coarser one is interpolated to the finer one.
 
     Returns
     -------
     float
         Of clearances and tangential displacements relative to the largest displacement, of tractions relative to the
-        largest traction of the reference. On different meshes the coarser one is interpolated to the finer one.
+        largest traction of the reference.
     """
     one, other = reference.contact, solution.contact
     unit = max(float(np.abs(one.u_n).max()), float(np.abs(one.u_t).max())) or 1.0

@@ -18,10 +18,9 @@ from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES, find_reference
 from bemkit.results import outputs as outputs_module
 from bemkit.studies.accuracy import runs as runs_module
-from bemkit.studies.accuracy.plots import draw_errors
 from bemkit.studies.accuracy.records import FILE, to_csv
+from bemkit.studies.accuracy.report import WIDE, draw_errors, print_study
 from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
-from bemkit.studies.accuracy.table import WIDE, print_study
 from bemkit.studies.engine import compute_with_progress
 from tests.studies.accuracy.records import row
 

@@ -159,21 +159,15 @@ _ROUND_OFF = 1e-12
 
 
 def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Measure the way from points of the body to an obstacle.
+    """Measure distances (n,) [m] of points to an obstacle, negative inside it, and unit vectors (n, 2) towards it.
+
+    The vectors point into the obstacle at its nearest point. An obstacle that is not built in is asked itself.
 
     Parameters
     ----------
     obstacle : Obstacle
-        One that is not built in is asked itself.
     points, normals : (n, 2) arrays [m], [-]
         Of the body; the normals point out of it.
-
-    Returns
-    -------
-    distance : (n,) array [m]
-        To the nearest point of the obstacle, negative inside it.
-    direction : (n, 2) array [-]
-        Unit vectors into the obstacle at its nearest point.
     """
     match obstacle:
         case HalfPlane(point, normal):
