@@ -45,27 +45,10 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = MappingProxyType(
 )
 
 _FUNCTIONS: Mapping[str, np.ufunc] = MappingProxyType(
-    {
-        "sin": np.sin,
-        "cos": np.cos,
-        "tan": np.tan,
-        "asin": np.arcsin,
-        "acos": np.arccos,
-        "atan": np.arctan,
-        "atan2": np.arctan2,
-        "sinh": np.sinh,
-        "cosh": np.cosh,
-        "tanh": np.tanh,
-        "sqrt": np.sqrt,
-        "exp": np.exp,
-        "log": np.log,
-        "abs": np.abs,
-        "sign": np.sign,
-        "floor": np.floor,
-        "hypot": np.hypot,
-        "min": np.minimum,
-        "max": np.maximum,
-    }
+    {name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "exp", "log")}
+    | {name: getattr(np, name) for name in ("abs", "sign", "floor", "hypot")}
+    | {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2}
+    | {"min": np.minimum, "max": np.maximum}
 )
 _NAMES = ("x", "y", *_CONSTANTS, *_FUNCTIONS, "where")
 

@@ -16,9 +16,9 @@ from types import MappingProxyType
 
 import numpy as np
 
+from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
-from bemkit.reference.values import Answer, Places, Reference, Zone
 from bemkit.reference.wavy import WavyObstacle
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import LinearGalerkin, Scene

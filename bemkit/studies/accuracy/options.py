@@ -8,9 +8,8 @@ from typing import Any, TypeVar, cast
 
 from bemkit.formulas import closest
 from bemkit.plan import make_plan
-from bemkit.reference.compare import over_resolved
+from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
-from bemkit.reference.values import MEASURES, Reference
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import QuadraticGalerkin, Scene
 from bemkit.scene.serialisation import structure

@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from bemkit.hdf5 import FileFormat
-from bemkit.reference.values import MEASURES
+from bemkit.reference.compare import MEASURES
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
 

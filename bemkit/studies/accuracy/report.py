@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from bemkit.reference.values import MEASURES, Reference
+from bemkit.reference.compare import MEASURES, Reference
 from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, orders, pareto_front

@@ -15,8 +15,7 @@ import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
-from bemkit.reference.compare import answer_of
-from bemkit.reference.values import MEASURES, Reference, errors_of
+from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
 from bemkit.runs.run import run as solve
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS

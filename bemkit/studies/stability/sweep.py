@@ -8,7 +8,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
@@ -139,16 +138,11 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
                 before = np.interp(scaled_places, places, before)
             elif not is_same_mesh:
                 scaled = np.interp(places, scaled_places, scaled)
-            gone = _apart(before, scaled)
+            is_known = np.isfinite(before) | np.isfinite(scaled)  # infinite clearances agree with each other only
+            gone = np.abs(np.where(is_known, scaled, 0.0) - np.where(is_known, before, 0.0))
             size = gone.max() if is_same_mesh and not in_mean else weight @ gone / weight.sum()
             worst = max(worst, float(size) / (stress if is_stress else unit))
     return worst
-
-
-def _apart(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the distances of two columns; infinite clearances agree with each other only."""
-    known = np.isfinite(before) | np.isfinite(after)
-    return np.asarray(np.abs(np.where(known, after, 0.0) - np.where(known, before, 0.0)))
 
 
 def condition_number(scene: Scene, case: Case) -> float:
