@@ -54,15 +54,6 @@ def _problem(scene: Scene) -> Scene:
     )
 
 
-def _wavy(scene: Scene) -> Reference:
-    return WavyObstacle(0.0172614981, 0.01, wavelength=1.0, height=1.5, material=scene.material).reference()
-
-
-def _disc(scene: Scene) -> Reference:
-    disc = DiscBetweenPlates(radius=1.0, approach=0.0160343377, material=scene.material)
-    return disc.reference("plate", length=np.pi / 6.0)
-
-
 def _uniform_slip(scene: Scene) -> Reference:
     """Return the linear field of the shipped scene; its strains are 0.1, -11/14 and 0.78 (engineering shear)."""
     s, weight = places_along(2.0, ())
@@ -76,8 +67,10 @@ _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
     {
         "paper-1": lambda _: paper_reference(1),
         "paper-2": lambda _: paper_reference(2),
-        "wavy-obstacle": _wavy,
-        "disc-between-plates": _disc,
+        "wavy-obstacle": lambda scene: WavyObstacle(0.0172614981, 0.01, 1.0, 1.5, scene.material).reference(),
+        "disc-between-plates": lambda scene: DiscBetweenPlates(1.0, 0.0160343377, scene.material).reference(
+            "plate", length=np.pi / 6.0
+        ),
         "uniform-slip": _uniform_slip,
     }
 )

@@ -87,43 +87,28 @@ class Run:
 
     Parameters
     ----------
-    meshes : str
-        Name of the sequence.
+    discretisation, map, meshes, solver : str
+        Element type, Steklov-Poincare map, sequence of meshes, driver.
     size : float
         Number of elements, or asked-for accuracy.
     problem : Scene
         Its own mesh, elements and driver do not matter.
-    element : Discretisation
-    options : MeshOptions
-    driver : ContactSolver
+    changes : mapping
+        Those that do.
     """
 
+    discretisation: str
+    map: str
     meshes: str
+    solver: str
     size: float
     problem: Scene = field(repr=False)
-    element: Discretisation
-    options: MeshOptions
-    driver: ContactSolver
+    changes: Mapping[str, Any] = field(repr=False)
 
     @property
     def scene(self) -> Scene:
         """Made ready to run; InputError if it does not allow the element type or the mesh."""
-        return replace(self.problem, discretisation=self.element, mesh=self.options, solver=self.driver)
-
-    @property
-    def discretisation(self) -> str:
-        """The word for its elements."""
-        return DISCRETISATIONS.kind_of(self.element)
-
-    @property
-    def map(self) -> str:
-        """Name of the Steklov-Poincare map that belongs to the elements."""
-        return self.element.method
-
-    @property
-    def solver(self) -> str:
-        """Its word, or the name of its class if it has none."""
-        return SOLVERS.word_of(self.driver)
+        return replace(self.problem, **self.changes)
 
     @property
     def key(self) -> tuple[str, str, str, float]:
@@ -151,7 +136,15 @@ def all_runs(
         raise StudyError("no part of the scene is in contact: errors are measured along the contact boundary")
     try:
         runs = tuple(
-            Run(sequence.name, size, scene, element, sequence.options(scene, size), solver)
+            Run(
+                DISCRETISATIONS.kind_of(element),
+                element.method,
+                sequence.name,
+                SOLVERS.word_of(solver),
+                float(size),
+                scene,
+                {"discretisation": element, "mesh": sequence.options(scene, size), "solver": solver},
+            )
             for element in discretisations
             for sequence in meshes
             if element.estimates_error or not sequence.needs_estimate
@@ -231,7 +224,7 @@ def _record(run: Run, found: Attempt, reference: Reference, measured: Mapping[st
         map=run.map,
         meshes=run.meshes,
         solver=run.solver,
-        size=float(run.size),
+        size=run.size,
         status=found.status,
         elements=0 if solution is None else solution.mesh.n_elements,
         contact_nodes=0 if solution is None else solution.contact.n_contact,

@@ -109,9 +109,5 @@ def cells(record: StabilityRecord) -> list[str]:
         record.verdict,
         record.status.replace("_", " "),
         solves,
-        *(_short(x) for x in numbers),
+        *("" if np.isnan(number) else f"{number:.0e}" for number in numbers),
     ]
-
-
-def _short(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.0e}"

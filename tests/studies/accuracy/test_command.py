@@ -116,7 +116,9 @@ def test_files_of_others_and_damaged_ones_stay(tmp_path: Path) -> None:
     assert "rows.h5" in str(result.exception)
     assert len(str(result.exception).splitlines()) == 1
     call("run", "paper-1", "--elements", "12", "-q", "-o", tmp_path / "result.h5")
-    assert "not a bemkit study errors file: give a file written by" in str(call(*FAST, "-o", tmp_path / "result.h5").exception)
+    assert "not a bemkit study errors file: give a file written by" in str(
+        call(*FAST, "-o", tmp_path / "result.h5").exception
+    )
 
 
 def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:

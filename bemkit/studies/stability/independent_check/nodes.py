@@ -65,10 +65,6 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     """Find the contact nodes of a solution on its boundary and measure their obstacles."""
     table, fields = solution.contact, solution.boundary
     points = np.column_stack([table.x, table.y])
-    if not table.n_contact:
-        nothing, none = np.zeros((0, 2)), np.zeros(0, bool)
-        frame = np.zeros((0, 2, 2))
-        return Nodes(np.zeros(0, np.intp), nothing, none * 0.0, frame, none * 0.0, none, none, *(nothing,) * 3)
     offset, nodes = (np.asarray(each) for each in cKDTree(fields.points).query(points))
     normals, direction = np.zeros((2, table.n_contact, 2))
     distance = np.full(table.n_contact, np.inf)

@@ -171,13 +171,10 @@ def _mirrored(draw: Draw, modulus: float) -> dict[str, Any]:
     make = draw.one_of((_block, _round, _shrunk))
     shape, parts, symmetry = make(draw, size, stress, stress / modulus * size)
     law = random_law(draw, Body(shape, size, np.array([0.0, 0.0])), modulus)
-    return {"shape": shape, "parts": parts, "symmetry": symmetry, "law": _even(law)}
-
-
-def _even(law: Any) -> Any:
-    """Return a law whose coefficients do not vary with x: symmetric about every line."""
-    coefficients = {name: value for name, value in vars(law).items() if isinstance(value, Expression)}
-    return type(law)(**{**vars(law), **dict.fromkeys(coefficients, 0.3)}) if coefficients else law
+    # coefficients that vary with x are symmetric about no line
+    varying = [name for name, value in vars(law).items() if isinstance(value, Expression)]
+    law = type(law)(**{**vars(law), **dict.fromkeys(varying, 0.3)})
+    return {"shape": shape, "parts": parts, "symmetry": symmetry, "law": law}
 
 
 def _block(draw: Draw, size: float, stress: float, motion: float) -> _Layout:
