@@ -247,13 +247,12 @@ def _sweep(
     quiet: bool,
 ) -> int:
     """Compute what is missing, keep every record at once, and print each axis when it is complete."""
-    from bemkit.studies.stability.axes import AXES
-    from bemkit.studies.stability.cases import find_axes
+    from bemkit.studies.stability.axes import find_axes
     from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
     from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_verdicts
     from bemkit.studies.stability.sweep import sweep
 
-    axes = find_axes(AXES, axis)
+    axes = find_axes(axis)
     texts = (
         TextFile(csv, "CSV file of stability rows", CSV_START, to_csv),
         TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),

@@ -56,16 +56,9 @@ def attempt(solve: Callable[[], Solution]) -> Attempt:
 
 @dataclass(frozen=True)
 class Task(Generic[R]):
-    """One record to compute.
+    """One record to compute: its key, a label for the progress bar, and what computes it.
 
-    Parameters
-    ----------
-    key : hashable
-        That of the record.
-    label : str
-        For the progress bar.
-    compute : callable () -> record
-        To be sent to another process it must be picklable.
+    To be sent to another process that must be picklable.
     """
 
     key: Hashable

@@ -30,18 +30,8 @@ _MESHES_TOGETHER = 1.3
 class StudyOptions:
     """What is asked of an error study; lists are words and numbers with commas between them.
 
-    Parameters
-    ----------
-    elements, accuracies, discretisation, meshes, solver : str
-        What is combined.
-    exponent : float
-        Of graded meshes.
-    most_elements : int
-        Limit of adaptive meshes.
-    over_resolve : int or None
-        Elements of the over-resolved solution, if that is to be the reference.
-    repeat : int or None
-        Timed repetitions, None if no times are measured.
+    The exponent is that of graded meshes, the most elements are those of adaptive ones. The reference is a fine solution
+    if its number of elements is given; no run times are measured without a number of repetitions.
     """
 
     elements: str

@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 
 WIDE = 100
 """Width of a terminal from which on stages, memory and estimates are shown; the files hold them in any case."""
-SHORT = {
-    "energy": "energy",
-    "sigma_n": "sigma_n",
-    "sigma_t": "sigma_t",
+SHORT = {name: name for name in MEASURES} | {
     "displacement": "displ.",
     "force_normal": "force_n",
     "force_tangential": "force_t",

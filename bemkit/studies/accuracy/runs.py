@@ -83,18 +83,9 @@ def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MO
 
 @dataclass(frozen=True)
 class Run:
-    """One record to compute.
+    """One record to compute: what tells it apart, and a problem, of which mesh, elements and driver are changed.
 
-    Parameters
-    ----------
-    discretisation, map, meshes, solver : str
-        Element type, Steklov-Poincare map, sequence of meshes, driver.
-    size : float
-        Number of elements, or asked-for accuracy.
-    problem : Scene
-        Its own mesh, elements and driver do not matter.
-    changes : mapping
-        Those that do.
+    The size is a number of elements, or the accuracy that is asked for.
     """
 
     discretisation: str

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.hdf5 import FileFormat
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
-from bemkit.studies.stability.cases import Axis
+from bemkit.studies.stability.axes import Axis
 
 
 class Verdict(Enum):

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
-from bemkit.studies.stability.cases import Axis
+from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 from bemkit.studies.stability.trials import Outcome, Trial
 

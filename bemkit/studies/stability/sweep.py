@@ -16,7 +16,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.stability.cases import Axis, Case, Similarity
+from bemkit.studies.stability.axes import Axis, Case, Similarity
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 

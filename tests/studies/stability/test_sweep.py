@@ -12,8 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability import sweep as sweep_module
-from bemkit.studies.stability.axes import AXES
-from bemkit.studies.stability.cases import Axis, Case, UnknownAxisError, find_axes
+from bemkit.studies.stability.axes import AXES, Axis, Case, UnknownAxisError, find_axes
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
@@ -39,14 +38,14 @@ EXTREMES = {
 
 
 def shortened(name: str) -> Axis:
-    (axis,) = find_axes(AXES, [name])
+    (axis,) = find_axes([name])
     return dataclasses.replace(axis, values=EXTREMES[name])
 
 
 def test_every_axis_is_tested_here() -> None:
     assert {axis.name for axis in AXES} == set(EXTREMES)
     with pytest.raises(UnknownAxisError, match="'rho': the axes are youngs-modulus, load"):
-        find_axes(AXES, ["rho"])
+        find_axes(["rho"])
 
 
 @pytest.mark.parametrize("name", EXTREMES)

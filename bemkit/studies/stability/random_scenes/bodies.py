@@ -18,14 +18,7 @@ _SAMPLES = np.linspace(0.02, 0.98, 25)
 
 @dataclass(frozen=True, eq=False)
 class SideSample:
-    """Points along a side.
-
-    Parameters
-    ----------
-    name : str
-    points, normals : (n, 2) arrays [m], [-]
-        The normals point out of the body.
-    """
+    """Points along a side, (n, 2) arrays [m], and unit normals [-] that point out of the body."""
 
     name: str
     points: FloatArray

@@ -34,15 +34,7 @@ _NEARLY_INCOMPRESSIBLE = (0.45, 0.49, 0.4995, 0.499995, 0.49999995, 0.5, 0.5)
 
 @dataclass(frozen=True)
 class RandomCase:
-    """Scenes that follow each other in time, mostly a single one.
-
-    Parameters
-    ----------
-    seed, index : int
-        From which they were drawn.
-    scenes : tuple of Scene
-        For `bemkit.runs.history.run_history`.
-    """
+    """Scenes that follow each other in time, mostly a single one, and the numbers from which they were drawn."""
 
     seed: int
     index: int
