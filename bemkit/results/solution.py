@@ -21,7 +21,6 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.error_indicators import squared_errors
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
@@ -138,6 +137,8 @@ class Solution:
         discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
         if not discretisation.estimates_error:
             return None
+        from bemkit.results.error_indicators import squared_errors
+
         make_space = discretisation.displacement_space
         return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
 

@@ -12,7 +12,6 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.contact_table import ContactTable, are_neighbours
-from bemkit.results.error_indicators import blind_elements
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
@@ -60,6 +59,8 @@ def _error(solution: Solution) -> Iterator[str]:
             f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
             "no error can be estimated: use more elements."
         )
+    from bemkit.results.error_indicators import blind_elements
+
     is_blind = blind_elements(solution.mesh, discretisation.traction_space(solution.mesh).degree)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)

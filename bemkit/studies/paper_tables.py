@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,17 +92,6 @@ class PaperTable:
         """Printed outer steps, outer steps and linear solves."""
         return self.printed, self.outer_steps, self.linear_solves
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the table as JSON can hold it."""
-        return {
-            "table": self.number,
-            "rho": list(RHO),
-            "printed": self.printed.tolist(),
-            "outer_steps": self.outer_steps.tolist(),
-            "linear_solves": self.linear_solves.tolist(),
-            "newton_solves": self.newton_solves,
-        }
-
 
 def paper_tables(
     run: Callable[[Sequence[Task[PaperCell]]], Iterable[PaperCell]] = compute,
@@ -144,7 +133,16 @@ def paper_model(number: int) -> Model:
 
 def to_json(tables: Sequence[PaperTable]) -> str:
     """Return the tables as one JSON object."""
-    return json.dumps({"tables": [table.as_dict() for table in tables]}, indent=2) + "\n"
+    contents = [
+        {
+            "table": table.number,
+            "rho": RHO,
+            **{name: getattr(table, name).tolist() for name in ("printed", "outer_steps", "linear_solves")},
+            "newton_solves": table.newton_solves,
+        }
+        for table in tables
+    ]
+    return json.dumps({"tables": contents}, indent=2) + "\n"
 
 
 def to_csv(tables: Sequence[PaperTable]) -> str:
