@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -109,13 +109,10 @@ def plan_items(
     history = "the whole load comes in one step"
     if n_steps > 1:
         history = f"{n_steps} load steps; slip counts from the end of the step before"
-    no_contact = PlanItem("contact system", False, "no part may touch an obstacle: the body is solved at once")
     return (
-        *_mesh_items(scene, sizes),
-        _symmetry(scene, sizes, proposal),
-        _spaces(scene, sizes),
+        *_mesh_items(scene, sizes, proposal),
         *of_body,
-        *(_contact_items(scene, sizes, n_steps) if scene.contact_parts else (no_contact,)),
+        *_contact_items(scene, sizes, n_steps),
         PlanItem("load history", n_steps > 1, history),
         PlanItem("fields on the boundary", True, "part of every result"),
         PlanItem("displacement inside the body", False, "not asked for; see interior_fields"),
@@ -125,33 +122,25 @@ def plan_items(
     )
 
 
-def _mesh_items(scene: Scene, sizes: Sizes) -> tuple[PlanItem, ...]:
+def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
+    """Yield what elements, symmetry and spaces need."""
     n, n_curved, accuracy = sizes.n_elements, sizes.n_curved, scene.mesh.accuracy
+    yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
     further = "the number of elements is given"
     if accuracy is not None:
         further = f"until the estimated error is below {accuracy:g}; this plan is for the first mesh"
+    yield PlanItem("further meshes", accuracy is not None, further)
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
-    items = (
-        PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}"),
-        PlanItem("further meshes", accuracy is not None, further),
-        PlanItem("quadrature on curved elements", n_curved > 0, curved),
-    )
-    if sizes.n_motions or scene.symmetry is not None:
-        return items
-    return (*items, PlanItem("exterior domain", True, "the body fills the outside of the boundary"))
-
-
-def _symmetry(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> PlanItem:
+    yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
+    if not sizes.n_motions and scene.symmetry is None:
+        yield PlanItem("exterior domain", True, "the body fills the outside of the boundary")
     reason = "not asked for"
     if scene.symmetry is not None:
-        reason = f"about {scene.symmetry}: {sizes.n_elements} of {sizes.n_sources} elements carry unknowns"
+        reason = f"about {scene.symmetry}: {n} of {sizes.n_sources} elements carry unknowns"
     elif proposal is not None:
         share = "half" if proposal.n_images == 2 else "a quarter"
         reason = f"proposed: the scene is symmetric about {proposal}, and {share} of its unknowns would do"
-    return PlanItem("symmetry", scene.symmetry is not None, reason)
-
-
-def _spaces(scene: Scene, sizes: Sizes) -> PlanItem:
+    yield PlanItem("symmetry", scene.symmetry is not None, reason)
     displacements, tractions = (
         _DEGREES[degree] if degree < len(_DEGREES) else f"degree {degree}"
         for degree in (sizes.displacement_degree, sizes.traction_degree)
@@ -160,25 +149,28 @@ def _spaces(scene: Scene, sizes: Sizes) -> PlanItem:
         f"{scene.discretisation.method}: {sizes.n_displacements} displacements and {sizes.n_tractions} tractions, "
         f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
     )
-    return PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
+    yield PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
 
 
-def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> tuple[PlanItem, ...]:
+def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
+    """Yield what contact needs."""
     c, n, n_free = sizes.n_contact_unknowns, sizes.n_contact, sizes.n_free_motions
+    if not scene.contact_parts:
+        yield PlanItem("contact system", False, "no part may touch an obstacle: the body is solved at once")
+        return
+    yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
+    yield PlanItem("second elastic body", False, "the obstacles are rigid")
     names = ", ".join(dict.fromkeys(type(law).__name__ for law in scene.laws.values() if not law.is_frictionless))
     kind = "static" if n_steps == 1 else "incremental"
-    friction = f"law {names}, {kind}" if names else "the law allows no tangential traction"
+    yield PlanItem(
+        "friction", bool(names), f"law {names}, {kind}" if names else "the law allows no tangential traction"
+    )
     tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "frictionless"
+    yield PlanItem("tangential unknowns", c > n, tangential)
     modes = "the supports hold all rigid motions"
     if n_free:
         modes = f"{n_free} of {sizes.n_motions} rigid motions {'is' if n_free == 1 else 'are'} held by contact alone"
-    return (
-        PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns"),
-        PlanItem("second elastic body", False, "the obstacles are rigid"),
-        PlanItem("friction", bool(names), friction),
-        PlanItem("tangential unknowns", c > n, tangential),
-        PlanItem("rigid motions as unknowns", n_free > 0, modes),
-    )
+    yield PlanItem("rigid motions as unknowns", n_free > 0, modes)
 
 
 def _count(number: int, name: str) -> str:
