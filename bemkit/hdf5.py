@@ -119,10 +119,8 @@ class FileFormat:
         Mark by which such files are recognised.
     version : int
         Of the layout.
-    kind : str
-        In words, for messages: "bemkit result".
-    command : str
-        That writes such files, for messages.
+    kind, command : str
+        For messages: "bemkit result", and what writes such files.
     """
 
     name: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
-from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.scene import Clamped, Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.studies.stability.random_scenes.bodies import Body, SideSample, pair, turned
@@ -25,7 +25,7 @@ def random_contact(draw: Draw, body: Body, modulus: float) -> tuple[tuple[Part, 
     """Draw one or two contact parts, the direction in which loads press the body on them, and the law."""
     down = draw.direction()
     if body.hole is not None and draw.chance(0.45):
-        parts = [_shaft(draw, body)]
+        parts = [_shaft(draw, body, body.hole)]
     else:
         parts = _against(draw, body, down, "contact", ())
     if parts and draw.chance(0.2):
@@ -36,7 +36,8 @@ def random_contact(draw: Draw, body: Body, modulus: float) -> tuple[tuple[Part, 
         parts[0] = _narrowed(draw, body, parts[0])
     law = random_law(draw, body, modulus)
     if len(parts) > 1 and draw.chance(0.5):
-        parts[1] = _with_law(parts[1], random_law(draw, body, modulus))
+        own = replace(cast(Contact, parts[1].condition), law=random_law(draw, body, modulus))
+        parts[1] = replace(parts[1], condition=own)
     return tuple(parts), down, law
 
 
@@ -90,12 +91,10 @@ def _polygon(draw: Draw, body: Body, down: FloatArray, top: FloatArray) -> Polyg
     return PolygonalObstacle(tuple(pair(top + d * depth * down + s * width * across) for d, s in corners))
 
 
-def _shaft(draw: Draw, body: Body) -> Part:
+def _shaft(draw: Draw, body: Body, hole: tuple[float, float, float]) -> Part:
     """Draw a shaft in the round hole of a body, with play or shrunk on it, or a gap all around."""
-    if body.hole is None:
-        raise InputError(f"the shape {body.shape} has no round hole: draw another one")
-    x, y, radius = body.hole
-    names = [side.name for side in body.sides if _is_round(side, body.hole)]
+    x, y, radius = hole
+    names = [side.name for side in body.sides if _is_round(side, hole)]
     chosen = tuple(names) if draw.chance(0.6) else draw.some_of(names)
     play = radius * draw.decades(-6.0, -1.5) * draw.one_of((-1.0, 1.0, 1.0))
     if draw.chance(0.3):
@@ -148,12 +147,6 @@ def random_law(draw: Draw, body: Body, modulus: float) -> FrictionLaw:
                 coefficient, cohesion=draw.one_of((0.0, stress)), cap=draw.one_of((float("inf"), 10.0 * stress))
             )
     return Frictionless()
-
-
-def _with_law(part: Part, law: FrictionLaw) -> Part:
-    if not isinstance(part.condition, Contact):
-        raise TypeError(f"part {part.name!r} is no contact part: give one that is")
-    return replace(part, condition=replace(part.condition, law=law))
 
 
 def random_actions(draw: Draw, body: Body, taken: Sequence[str], down: FloatArray, modulus: float) -> tuple[Part, ...]:

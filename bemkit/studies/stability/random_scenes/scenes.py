@@ -73,7 +73,10 @@ def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Sc
     constant = ConstantCollocation(slopes=not draw.chance(0.2))
     discretisation = draw.one_of((LinearGalerkin(), QuadraticGalerkin(), constant))
     material = _material(draw, modulus)
-    mesh, factors = _mesh(draw, layout["shape"], discretisation), _load_factors(draw)
+    mesh = _mesh(draw, layout["shape"], discretisation)
+    factors: tuple[float, ...] = (1.0,)
+    if draw.chance(0.12):
+        factors = draw.one_of(((0.5, 1.0), (0.3, 0.6, 1.0), (1.0, 0.5), (1.0, -0.3, 0.7), (1.0, 0.0), (2.0,)))
     if mesh.accuracy is not None:
         factors = (1.0,)
     solver, linear_solver = _solver(draw), _linear_solver(draw, discretisation, material)
@@ -136,12 +139,6 @@ def _linear_solver(draw: Draw, discretisation: Discretisation, material: Materia
     if not discretisation.is_symmetric or is_too_inexact:  # scenes refuse both
         del weights[Krylov()]
     return draw.one_by_weight(weights)
-
-
-def _load_factors(draw: Draw) -> tuple[float, ...]:
-    if not draw.chance(0.12):
-        return (1.0,)
-    return draw.one_of(((0.5, 1.0), (0.3, 0.6, 1.0), (1.0, 0.5), (1.0, -0.3, 0.7), (1.0, 0.0), (2.0,)))
 
 
 def _history(draw: Draw, scene: Scene) -> tuple[Scene, ...]:
