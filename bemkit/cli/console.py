@@ -10,6 +10,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from bemkit.contact.certificate import Certificate
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.outputs import plain_table, stdout_console
@@ -169,13 +170,17 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
         yield "transitions", "\n".join(_transition_lines(solution))
         solver = SOLVERS.word_of(solution.scene.solver)
         yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
-    certificate, violations = solution.certificate, solution.certificate.violations
-    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
-    name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
-    round_off = f"round-off of the forces up to {certificate.round_off:.1e}"
-    yield "certificate", f"worst entry {certificate.worst:.1e}{name}; {round_off}"
+    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
+    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
     stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
     yield "time", f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
+
+
+def _worst_entry(certificate: Certificate) -> str:
+    violations = certificate.violations
+    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
+    name = f" ({worst.replace('_', ' ')})" if certificate.worst != 0.0 else ""  # where all are equal
+    return f"worst entry {certificate.worst:.1e}{name}"
 
 
 def _transition_lines(solution: Solution) -> list[str]:

@@ -17,8 +17,9 @@ from bemkit.geometry.grading import Algebraic
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.results.solution import Solution
+from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import QuadraticGalerkin, Scene
+from bemkit.scene.scene import Scene
 
 MEASURES: Mapping[str, str] = MappingProxyType(
     {

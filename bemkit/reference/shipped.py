@@ -20,8 +20,9 @@ from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
 from bemkit.reference.wavy import WavyObstacle
+from bemkit.scene.discretisation import LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import LinearGalerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.ssn import SemismoothNewton
 

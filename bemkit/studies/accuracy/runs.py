@@ -17,9 +17,10 @@ from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
 from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
 from bemkit.runs.run import run as solve
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.scene import Discretisation, Scene
+from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 from bemkit.studies.accuracy.records import STAGES, ErrorRecord
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 
 CONTACT_LIMIT = 1e-6
 """Largest violation of contact, friction, supports and equilibrium in a right answer. Drivers stop at 1e-9 of a

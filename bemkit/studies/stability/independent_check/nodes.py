@@ -13,7 +13,7 @@ from bemkit.contact.obstacle import Cavity, Circle, DirectedObstacle, Gap, HalfP
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import evaluate_field
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.studies.stability.independent_check.boundary import Boundary, Scales, boundary_of, scales_of
 
 _GRAZING_COSINE = 1e-6

@@ -13,7 +13,16 @@ from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionl
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import Expression
-from bemkit.scene.scene import Clamped, Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import (
+    Clamped,
+    Condition,
+    Contact,
+    Part,
+    PrescribedDisplacement,
+    Pressure,
+    Roller,
+    Traction,
+)
 from bemkit.studies.stability.random_scenes.bodies import Body, SideSample, pair, turned
 from bemkit.studies.stability.random_scenes.draw import Draw
 
