@@ -96,12 +96,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def reserved(targets: Iterable[Path]) -> Iterator[None]:
-    """Keep files for this process while it computes what it will write to them.
-
-    Parameters
-    ----------
-    targets : iterable of Path
-        From `check_target`.
+    """Keep files, from `check_target`, for this process while it computes what it will write to them.
 
     Raises
     ------

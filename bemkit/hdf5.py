@@ -65,15 +65,7 @@ def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py
     """Give an empty HDF5 file that replaces the target, with a checksum of its content, if all goes well.
 
     It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full. A file
-    whose size is known is written at once, after it was made sure that there is room for it.
-
-    Parameters
-    ----------
-    target : Path
-    mark : bytes
-        First line of the user block, by which files of this kind are known.
-    n_bytes : int
-        Size of large content, if it is known.
+    whose size is given is written at once, after it was made sure that there is room for it.
 
     Raises
     ------

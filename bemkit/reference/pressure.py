@@ -70,19 +70,10 @@ def solve_pressure(
     given: Callable[[FloatArray], FloatArray],
     n_terms: int = N_TERMS,
 ) -> tuple[EvenPressure, float]:
-    """Find the pressure on a zone and the size of one more field.
+    """Find the pressure p on a zone and the size c of one more field, an even function of the place.
 
-    Solves ``integral of kernel(x - y) p(y) dy + c unknown(x) = given(x)`` for p and c at the zeros of a Chebyshev
-    polynomial.
-
-    Parameters
-    ----------
-    kernel : callable
-    half_width : float [m]
-    unknown, given : callable
-        Even functions of the place.
-    n_terms : int
-        Coefficients of the pressure.
+    Solves ``integral of kernel(x - y) p(y) dy + c unknown(x) = given(x)`` at the zeros of a Chebyshev polynomial; p has
+    `n_terms` coefficients on a zone of a half-width [m].
     """
     n = n_terms
     x = half_width * np.cos((np.arange(n + 1) + 0.5) * np.pi / (2 * n + 2))

@@ -125,17 +125,7 @@ class Outputs(Generic[Content]):
         return any(text.place == STDOUT for text in self.texts)
 
     def check(self, others: Sequence[Path] = ()) -> list[Path]:
-        """Find out, before any work is done, whether everything can be written.
-
-        Parameters
-        ----------
-        others : sequence of Path
-            Files that are written besides.
-
-        Returns
-        -------
-        list of Path
-            All files, to be reserved.
+        """Find out, before any work is done, whether everything can be written, `others` besides; return all files.
 
         Raises
         ------
