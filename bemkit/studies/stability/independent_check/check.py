@@ -14,11 +14,11 @@ from bemkit.studies.stability.independent_check.balance import (
     imbalance,
     load_mismatch,
     negative_energy,
+    reciprocity_mismatch,
     support_mismatch,
 )
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
 from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
-from bemkit.studies.stability.independent_check.reciprocity import reciprocity_mismatch
 
 
 @dataclass(frozen=True, eq=False)

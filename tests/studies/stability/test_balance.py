@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.studies.stability.independent_check.reciprocity import (
+from bemkit.studies.stability.independent_check.balance import (
     State,
     centre_of_dilatation,
     point_force,
