@@ -168,9 +168,9 @@ def test_scene_files_say_nothing_of_friction_and_drivers() -> None:
 def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Path) -> None:
     paths = save_figures(bent, tmp_path / "figures")
     assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png"]
-    from bemkit.results.figures import draw_boundary_traction
+    from bemkit.results.figures import Units, draw_boundary_traction
 
-    axes, strip = draw_boundary_traction(bent, length="mm", stress="MPa").axes
+    axes, strip = draw_boundary_traction(bent, units=Units("mm", "MPa")).axes
     drawn = {patch.get_label(): patch.get_data().values for patch in axes.patches}
     largest = np.abs(bent.boundary.traction).max()
     assert drawn["normal $t_n$"].max() == pytest.approx(largest, rel=1e-12)
@@ -187,7 +187,7 @@ def test_holes_follow_the_outer_boundary_in_the_figure() -> None:
         shape=bk.Ring(1.0, 2.0),
     )
     solution = bk.run(scene)
-    from bemkit.results.figures import draw_boundary_traction
+    from bemkit.results.figures import Units, draw_boundary_traction
 
     axes, _ = draw_boundary_traction(solution).axes
     places = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] > 0]
