@@ -33,6 +33,9 @@ MEASURES: Mapping[str, str] = MappingProxyType(
     }
 )
 """The relative errors that `errors_of` measures, by name, with words for tables and figures."""
+FINEST = 1e-12
+"""An accuracy that no mesh reaches, so that the number of elements alone ends the search."""
+COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 
 
 @dataclass(frozen=True)
@@ -168,11 +171,6 @@ def _of_zones(answer: Answer, reference: Reference) -> float:
         distance = min(found, default=float("inf")) / lengths[zone.part]
         worst = distance if np.isnan(worst) else max(worst, distance)
     return worst
-
-
-FINEST = 1e-12
-"""An accuracy that no mesh reaches, so that the number of elements alone ends the search."""
-COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
 
 
 class OverResolutionError(InputError):

@@ -26,6 +26,9 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.ssn import SemismoothNewton
 
+_WORDS = {"gap": "separated", "slip-": "slip", "slip+": "slip", "stick": "stick"}
+_SCALARS = {"energy": "energy", "force_normal": "Fn", "force_tangential": "Ft"}
+
 
 def find_reference(scene: Scene) -> Reference | None:
     """Return the reference of a scene, None if there is none.
@@ -77,9 +80,6 @@ _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
 )
 
 
-_WORDS = {"gap": "separated", "slip-": "slip", "slip+": "slip", "stick": "stick"}
-
-
 def paper_reference(number: int) -> Reference:
     """Return the reference of example 1 or 2 along the part ``foundation``."""
     folder = resources.files("bemkit") / "reference" / "data"
@@ -113,6 +113,3 @@ def paper_reference(number: int) -> Reference:
     return Reference(
         "adaptive p-version of finite elements", (Places("foundation", table["x"].copy(), weight),), answer, own
     )
-
-
-_SCALARS = {"energy": "energy", "force_normal": "Fn", "force_tangential": "Ft"}

@@ -33,6 +33,12 @@ _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "sli
 
 _EXAGGERATION = 0.08
 """The largest displacement is drawn about this long, in diameters of the body."""
+_FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
+_SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
+_LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
+FREE, PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
+_READABLE = 0.06
+"""Share of the boundary from which on a piece is long enough for its name."""
 
 
 @dataclass(frozen=True)
@@ -186,11 +192,6 @@ def node_displacement(solution: Solution) -> FloatArray:
     return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])
 
 
-_FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
-_SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
-_LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
-
-
 def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
     """Blank out distances to the obstacle that would dwarf the displacements."""
     contact = solution.contact
@@ -278,11 +279,6 @@ def _draw_obstacles(axes: Axes, solution: Solution) -> None:
         is_labelled = True
     axes.set_xlim(*frame[0])
     axes.set_ylim(*frame[1])
-
-
-FREE, PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
-_READABLE = 0.06
-"""Share of the boundary from which on a piece is long enough for its name."""
 
 
 def draw_boundary_traction(solution: Solution, *, units: Units = SI) -> Figure:

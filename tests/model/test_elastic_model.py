@@ -187,7 +187,7 @@ def test_holes_follow_the_outer_boundary_in_the_figure() -> None:
         shape=bk.Ring(1.0, 2.0),
     )
     solution = bk.run(scene)
-    from bemkit.results.figures import Units, draw_boundary_traction
+    from bemkit.results.figures import draw_boundary_traction
 
     axes, _ = draw_boundary_traction(solution).axes
     places = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] > 0]

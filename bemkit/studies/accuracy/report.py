@@ -27,6 +27,14 @@ SHORT = {name: name for name in MEASURES} | {
     "force_tangential": "force_t",
     "transitions": "transit.",
 }
+FIGURE = "error-against-run-time"
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+_FRONT, _DARK = "#D8D8D8", "#444444"
+_MARKERS = ("o", "^", "s", "D", "v", "P")
+_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
+_MESHES = ("adaptive", "uniform", "graded")
+"""Which line belongs to which meshes, so that figures of several studies agree; others follow."""
+_ELEMENTS = ("constant", "linear", "quadratic")
 
 
 def print_reference(title: str, reference: Reference, console: Console | None = None) -> None:
@@ -128,17 +136,6 @@ def _number(value: float, form: str) -> str:
 def _console(console: Console | None) -> Console:
     # into a file or a pipe there is room
     return stdout_console(console, width=None if sys.stdout.isatty() else 120)
-
-
-FIGURE = "error-against-run-time"
-
-_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-_FRONT, _DARK = "#D8D8D8", "#444444"
-_MARKERS = ("o", "^", "s", "D", "v", "P")
-_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
-_MESHES = ("adaptive", "uniform", "graded")
-"""Which line belongs to which meshes, so that figures of several studies agree; others follow."""
-_ELEMENTS = ("constant", "linear", "quadratic")
 
 
 def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, title: str = "") -> Figure:

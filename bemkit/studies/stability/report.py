@@ -29,6 +29,13 @@ _OUTCOMES = {
     Outcome.TRACEBACK: ("tracebacks", "bold red"),
 }
 """What each outcome is called in the plural, and its style."""
+_SERIES = (
+    ("certificate", "certificate of the driver", BLUE, "o"),
+    ("check", "independent check", GREEN, "s"),
+    ("twin", "difference to the similar twin", ORANGE, "^"),
+    ("drift", "drift from the reference", GREY, "x"),
+)
+_FLOOR = 1e-18
 
 
 def print_axis(axis: Axis, records: Sequence[StabilityRecord], console: Console | None = None) -> None:
@@ -73,15 +80,6 @@ def print_trials(trials: Sequence[Trial], console: Console | None = None) -> Non
     for trial in filter(lambda trial: trial.is_failure, trials):
         console.print(Text(f"{trial.outcome.value}: {trial.reason}: {trial.message.strip().splitlines()[-1]}"))
         console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))
-
-
-_SERIES = (
-    ("certificate", "certificate of the driver", BLUE, "o"),
-    ("check", "independent check", GREEN, "s"),
-    ("twin", "difference to the similar twin", ORANGE, "^"),
-    ("drift", "drift from the reference", GREY, "x"),
-)
-_FLOOR = 1e-18
 
 
 def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:

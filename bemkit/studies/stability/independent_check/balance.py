@@ -23,6 +23,12 @@ from bemkit.results.solution import Solution
 from bemkit.studies.stability.independent_check.boundary import Boundary, beyond, largest, trusted_stress
 from bemkit.studies.stability.independent_check.nodes import Fields
 
+_N_OUTSIDE = 6
+_AWAY = 0.8
+"""Distance of sources outside from the centre, in diameters: the body ends at half of one."""
+State: TypeAlias = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""A state of stress: points (..., 2) and unit normals to displacements [m] and tractions [Pa], both (..., 2)."""
+
 
 def support_mismatch(fields: Fields) -> float:
     """Return the largest difference [-] of a held displacement from what is prescribed, symmetry lines included."""
@@ -163,11 +169,6 @@ def _work_of_sizes(fields: Fields, displacement: FloatArray) -> float:
     return 0.5 * float(np.sum(sizes * boundary.shares) + contact @ solution.contact.weight)
 
 
-_N_OUTSIDE = 6
-_AWAY = 0.8
-"""Distance of sources outside from the centre, in diameters: the body ends at half of one."""
-
-
 def reciprocity_mismatch(fields: Fields) -> float:
     """Return the largest mismatch of ``int t . u*`` and ``int t* . u`` over the work of their sizes.
 
@@ -237,10 +238,6 @@ def _inside_of_holes(solution: Solution) -> Iterator[FloatArray]:
         area = float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
         if area < 0.0:
             yield whole.start[loop].mean(axis=0)
-
-
-State: TypeAlias = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""A state of stress: points (..., 2) and unit normals to displacements [m] and tractions [Pa], both (..., 2)."""
 
 
 def point_force(source: FloatArray, direction: FloatArray, length: float, material: Material) -> State:

@@ -20,6 +20,17 @@ from bemkit.studies.stability.independent_check.balance import (
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
 from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
 
+COARSE_LIMIT = 0.1
+"""Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
+that of fields which do not belong to the body at all."""
+COARSE_SHARE = 2.0
+"""The same for each unit of `IndependentCheck.coarseness`: collocation with 35, 70 and 140 elements on a block between
+two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
+OVERLAP_LIMIT = 1e-5
+"""Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
+the warning takes for round-off."""
+_INEXACT = ("reciprocity", "coarseness", "hidden_overlap")
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -138,19 +149,6 @@ def status_mismatch(solution: Solution, measured: Measured) -> float:
     friction = np.where(sticks, np.abs(measured.slip), np.where(is_open, 0.0, np.maximum(against, unopposed)))
     friction[~measured.obeys_friction] = 0.0
     return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
-
-
-COARSE_LIMIT = 0.1
-"""Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
-that of fields which do not belong to the body at all."""
-COARSE_SHARE = 2.0
-"""The same for each unit of `IndependentCheck.coarseness`: collocation with 35, 70 and 140 elements on a block between
-two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
-OVERLAP_LIMIT = 1e-5
-"""Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
-the warning takes for round-off."""
-
-_INEXACT = ("reciprocity", "coarseness", "hidden_overlap")
 
 
 @dataclass(frozen=True)

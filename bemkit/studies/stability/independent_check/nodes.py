@@ -18,6 +18,8 @@ from bemkit.studies.stability.independent_check.boundary import Boundary, Scales
 
 _GRAZING_COSINE = 1e-6
 """Cosine between the body's normal and the direction of contact up to which a node may count as facing away."""
+_ROUND_OFF = 1e-12
+"""Distance from a corner, relative to the coordinates, that may be their round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +150,6 @@ def _supported_nodes(solution: Solution, boundary: Boundary) -> IntArray:
     if mesh.symmetry is not None and boundary.nodes.shape[1] > 1:  # midpoints of elements lie on no line
         found.append(np.flatnonzero(mesh.on_symmetry_lines.any(axis=1)))
     return np.unique(np.concatenate(found))
-
-
-_ROUND_OFF = 1e-12
-"""Distance from a corner, relative to the coordinates, that may be their round-off."""
 
 
 def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
