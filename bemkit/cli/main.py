@@ -269,6 +269,7 @@ def _start_tracing() -> None:
     """Trace memory from now on, with what every run loads on first use behind it."""
     import scipy.linalg  # noqa: F401
 
+    import bemkit.results.error_indicators
     import bemkit.runs.run  # noqa: F401
 
     tracemalloc.start()
