@@ -67,10 +67,6 @@ def check_target(path: Path, kind: str, is_own: Callable[[Path], bool]) -> Path:
 def replacing(target: Path) -> Iterator[Path]:
     """Give the name of a temporary file in the same folder, which replaces the target if all goes well.
 
-    Parameters
-    ----------
-    target : Path
-
     Yields
     ------
     Path
@@ -88,7 +84,8 @@ def replacing(target: Path) -> Iterator[Path]:
     try:
         with contextlib.closing(FileLock(temporary, waits=True)):
             yield temporary
-            _flush(temporary)
+            with temporary.open("r+b") as stream:
+                os.fsync(stream.fileno())  # the content is on the disk before the name points to it
             os.replace(temporary, target)
     except OSError as error:
         reason = error.strerror or str(error)
@@ -99,12 +96,7 @@ def replacing(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def reserved(targets: Iterable[Path]) -> Iterator[None]:
-    """Keep files for this process while it computes what it will write to them.
-
-    Parameters
-    ----------
-    targets : iterable of Path
-        From `check_target`.
+    """Keep files, from `check_target`, for this process while it computes what it will write to them.
 
     Raises
     ------
@@ -152,32 +144,16 @@ def _remove_leftovers(target: Path) -> None:
 
 
 def check_room(target: Path, n_bytes: int) -> None:
-    """Find out whether a large file fits on the disk, for libraries that do not survive when it runs full.
-
-    Parameters
-    ----------
-    target : Path
-    n_bytes : int
-        Size of the file.
+    """Refuse a file that does not fit on the disk, for libraries that do not survive when it runs full.
 
     Raises
     ------
     OutputFileError
-        If there is less room.
     """
     free = shutil.disk_usage(target.parent).free
     if free < n_bytes:
         sizes = f"{n_bytes / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB free"
         raise OutputFileError(f"{shown_path(target)}: {sizes}: choose another place")
-
-
-def _flush(path: Path) -> None:
-    """Make sure the content is on the disk before the name points to it."""
-    descriptor = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 class HeldElsewhereError(BemkitError, OSError):
@@ -212,8 +188,9 @@ class FileLock:
             except OSError:
                 self.close()
                 raise
-            if _is_same(self._descriptor, path):
-                return
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self._descriptor), path.stat()):
+                    return
             self.close()  # its holder removed the file between the two calls
 
     def close(self) -> None:
@@ -231,10 +208,3 @@ def _lock(descriptor: int, waits: bool) -> bool:
     except OSError:  # the file system knows no locks
         return False
     return True
-
-
-def _is_same(descriptor: int, path: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), path.stat())
-    except FileNotFoundError:
-        return False

@@ -44,30 +44,12 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = MappingProxyType(
     }
 )
 
-_FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
-    {
-        "sin": np.sin,
-        "cos": np.cos,
-        "tan": np.tan,
-        "asin": np.arcsin,
-        "acos": np.arccos,
-        "atan": np.arctan,
-        "atan2": np.arctan2,
-        "sinh": np.sinh,
-        "cosh": np.cosh,
-        "tanh": np.tanh,
-        "sqrt": np.sqrt,
-        "exp": np.exp,
-        "log": np.log,
-        "abs": np.abs,
-        "sign": np.sign,
-        "floor": np.floor,
-        "hypot": np.hypot,
-        "min": np.minimum,
-        "max": np.maximum,
-    }
+_FUNCTIONS: Mapping[str, np.ufunc] = MappingProxyType(
+    {name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "sqrt", "exp", "log")}
+    | {name: getattr(np, name) for name in ("abs", "sign", "floor", "hypot")}
+    | {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2}
+    | {"min": np.minimum, "max": np.maximum}
 )
-_TWO_ARGUMENTS = frozenset({"atan2", "hypot", "min", "max"})
 _NAMES = ("x", "y", *_CONSTANTS, *_FUNCTIONS, "where")
 
 # What people write by habit, and what to write instead.
@@ -144,14 +126,8 @@ class Expression:
         x_all, y_all = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         with np.errstate(all="ignore"):  # values that are not finite are reported below, with the point
             values = np.array(np.broadcast_to(self._compiled.value(x_all, y_all), x_all.shape))
-        is_finite = np.isfinite(values)
-        if not is_finite.all():
-            index = int(np.flatnonzero(~is_finite.ravel())[0])
-            place = f"({x_all.ravel()[index]:.6g}, {y_all.ravel()[index]:.6g})"
-            raise ExpressionError(
-                f"expression {shorten(self.text)} is {values.ravel()[index]} at (x, y) = {place}; "
-                "guard it with where(condition, a, b) or change the formula"
-            )
+        remedy = "guard it with where(condition, a, b) or change the formula"
+        _refuse_not_finite(values, x_all, y_all, f"expression {shorten(self.text)}", remedy)
         return values == 1.0 if self.is_condition else values
 
 
@@ -181,12 +157,15 @@ def evaluate_field(value: ScalarField, points: FloatArray) -> FloatArray:
     if values.shape not in ((), x.shape):
         raise ExpressionError(f"{value!r} returns the shape {values.shape} for {x.size} points: return one value each")
     result = np.array(np.broadcast_to(values, x.shape))
-    if not np.all(np.isfinite(result)):
-        index = int(np.flatnonzero(~np.isfinite(result))[0])
-        raise ExpressionError(
-            f"{value!r} is {result[index]} at (x, y) = ({x[index]:.6g}, {y[index]:.6g}); it must be finite on the part"
-        )
+    _refuse_not_finite(result, x, y, repr(value), "it must be finite on the part")
     return result
+
+
+def _refuse_not_finite(values: FloatArray, x: FloatArray, y: FloatArray, name: str, remedy: str) -> None:
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if wrong.size:
+        value, *place = (float(array.ravel()[wrong[0]]) for array in (values, x, y))
+        raise ExpressionError(f"{name} is {value} at (x, y) = ({place[0]:.6g}, {place[1]:.6g}); {remedy}")
 
 
 def check_field(value: object, name: str) -> None:
@@ -260,19 +239,18 @@ class _Compiler:
             self.refuse(node, f"nested more than {MAX_DEPTH} deep", "split or simplify it")
         match node:
             case ast.Constant(value=value):
-                return _Compiled(_constant(self.number(node, value)))
+                number = self.number(node, value)
+                return _Compiled(lambda x, y: np.full(x.shape, number))
             case ast.Name(id=name):
                 return _Compiled(self.name(node, name))
-            case ast.BinOp(left=left, op=op, right=right):
-                operator = self.operator(node, op)
-                return _Compiled(_applied(operator, self.numbers(node, [left, right], depth)))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return _Compiled(_applied(_negation, self.conditions(node, [operand], depth)), is_condition=True)
+                return _Compiled(_applied(_not, self.conditions(node, [operand], depth)), is_condition=True)
+            case ast.BinOp(op=op):
+                return _Compiled(_applied(self.operator(node, op), self.numbers(node, [node.left, node.right], depth)))
             case ast.UnaryOp(op=op, operand=operand):
-                operator = self.operator(node, op)
-                return _Compiled(_applied(operator, self.numbers(node, [operand], depth)))
+                return _Compiled(_applied(self.operator(node, op), self.numbers(node, [operand], depth)))
             case ast.BoolOp(op=op, values=values):
-                join = _both if isinstance(op, ast.And) else _either
+                join = _and if isinstance(op, ast.And) else _or
                 conditions = self.conditions(node, values, depth)
                 return _Compiled(reduce(lambda a, b: _applied(join, [a, b]), conditions), is_condition=True)
             case ast.Compare(left=left, ops=ops, comparators=comparators):
@@ -300,7 +278,7 @@ class _Compiler:
         if name not in _NAMES:
             self.refuse(node, "unknown name", f"the names are x, y, pi and e{closest(name, _NAMES)}")
         if name in _CONSTANTS:
-            return _constant(_CONSTANTS[name])
+            return lambda x, y: np.full(x.shape, _CONSTANTS[name])
         return (lambda x, y: x) if name == "x" else (lambda x, y: y)
 
     def operator(self, node: ast.expr, op: ast.AST) -> Callable[..., Any]:
@@ -313,14 +291,14 @@ class _Compiler:
             if len(arguments) != 3:
                 self.refuse(node, f"where takes 3 arguments, not {len(arguments)}", "write where(condition, a, b)")
             conditions = self.conditions(node, arguments[:1], depth)
-            return _applied(_choice, [*conditions, *self.numbers(node, arguments[1:], depth)])
+            return _applied(_where, [*conditions, *self.numbers(node, arguments[1:], depth)])
         if name not in _FUNCTIONS:
             names = (*_FUNCTIONS, "where")
             self.refuse(node, "unknown function", f"the functions are {', '.join(names)}{closest(name, names)}")
-        n_needed = 2 if name in _TWO_ARGUMENTS else 1
-        if len(arguments) != n_needed:
-            self.refuse(node, f"{name} takes {n_needed} argument(s), not {len(arguments)}", "check the brackets")
-        return _applied(_FUNCTIONS[name], self.numbers(node, arguments, depth))
+        function = _FUNCTIONS[name]
+        if len(arguments) != function.nin:
+            self.refuse(node, f"{name} takes {function.nin} argument(s), not {len(arguments)}", "check the brackets")
+        return _applied(function, self.numbers(node, arguments, depth))
 
     def numbers(self, node: ast.expr, operands: list[ast.expr], depth: int) -> list[_Value]:
         compiled = [self.compile(operand, depth + 1) for operand in operands]
@@ -339,28 +317,24 @@ class _Compiler:
         raise ExpressionError(f"expression {shorten(self.text)}: {shorten(piece, 40)}: {what}; {remedy}")
 
 
-def _constant(value: float) -> _Value:
-    return lambda x, y: np.full(x.shape, value)
-
-
 def _applied(function: Callable[..., Any], arguments: list[_Value]) -> _Value:
     return lambda x, y: np.asarray(function(*(argument(x, y) for argument in arguments)))
 
 
-def _negation(condition: FloatArray) -> FloatArray:
+def _where(condition: FloatArray, value: FloatArray, other_value: FloatArray) -> FloatArray:
+    return np.where(condition == 1.0, value, np.where(condition == 0.0, other_value, condition))
+
+
+def _not(condition: FloatArray) -> FloatArray:
     return np.where(np.isfinite(condition), 1.0 - condition, condition)
 
 
-def _both(first: FloatArray, second: FloatArray) -> FloatArray:
+def _and(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.where(first == 1.0, second, first)
 
 
-def _either(first: FloatArray, second: FloatArray) -> FloatArray:
+def _or(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.where(first == 0.0, second, first)
-
-
-def _choice(condition: FloatArray, value: FloatArray, other_value: FloatArray) -> FloatArray:
-    return np.where(condition == 1.0, value, np.where(condition == 0.0, other_value, condition))
 
 
 def _comparison(operators: list[Callable[..., Any]], *values: FloatArray) -> FloatArray:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
 from io import BufferedRandom, BufferedReader
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.atomic_files import check_room, replacing
+from bemkit.atomic_files import check_room, check_target, replacing
 from bemkit.errors import InputError, printable, shown_path
+from bemkit.version import __version__
 
 if TYPE_CHECKING:
     import h5py
@@ -34,20 +39,9 @@ class ResultFileError(InputError):
     """A result file that cannot be read; one line with its name and the remedy."""
 
 
-def write_attributes(group: h5py.Group, values: Mapping[str, Any]) -> None:
-    """Write texts and numbers as attributes of a group."""
-    for name, value in values.items():
-        group.attrs[name] = value
-
-
 def write_text(group: h5py.Group, name: str, text: str) -> None:
     """Write a text of any length as a scalar dataset of fixed size."""
     group.create_dataset(name, data=np.array(text.encode("utf-8"), dtype=_text_type([text])))
-
-
-def write_texts(group: h5py.Group, name: str, texts: Sequence[str]) -> None:
-    """Write texts of any length as a dataset."""
-    write_table(group, {name: list(texts)})
 
 
 def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
@@ -60,24 +54,18 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
         group.create_dataset(name, data=data)
 
 
+def rows_of(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of a table that a `Reader` has read, as plain texts and numbers."""
+    plain = [column if isinstance(column, list) else column.tolist() for column in columns.values()]
+    return [dict(zip(columns, values, strict=True)) for values in zip(*plain, strict=True)]
+
+
 @contextmanager
 def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py.File]:
     """Give an empty HDF5 file that replaces the target, with a checksum of its content, if all goes well.
 
     It is built in memory and written at the end: the HDF5 library itself does not survive a disk that runs full. A file
-    whose size is known is written at once, after it was made sure that there is room for it.
-
-    Parameters
-    ----------
-    target : Path
-    mark : bytes
-        First line of the user block, by which files of this kind are known.
-    n_bytes : int
-        Size of large content, if it is known.
-
-    Yields
-    ------
-    h5py.File
+    whose size is given is written at once, after it was made sure that there is room for it.
 
     Raises
     ------
@@ -100,15 +88,7 @@ def created(target: Path, mark: bytes = MARK, n_bytes: int = 0) -> Iterator[h5py
 
 
 def seal(path: Path, mark: bytes) -> None:
-    """Write the checksum of the HDF5 content of a file into the block before it.
-
-    Parameters
-    ----------
-    path : Path
-        A file with a user block.
-    mark : bytes
-        First line of the block, by which such files are known.
-    """
+    """Write the mark and the checksum of the HDF5 content of a file into the user block before it."""
     with path.open("r+b") as stream:
         stream.write(_user_block(stream, mark))
 
@@ -119,6 +99,83 @@ def _user_block(stream: BufferedReader | BufferedRandom, mark: bytes) -> bytes:
     digest = hashlib.file_digest(stream, "sha256").hexdigest()
     stream.seek(0)
     return (mark + digest.encode()).ljust(USER_BLOCK, b"\0")
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """A kind of HDF5 files, which say what they are, which layout they have, and what they were made with.
+
+    Parameters
+    ----------
+    name : str
+        Mark by which such files are recognised.
+    version : int
+        Of the layout.
+    kind, command : str
+        For messages: "bemkit result", and what writes such files.
+    """
+
+    name: str
+    version: int
+    kind: str
+    command: str
+
+    def check_target(self, path: str | Path) -> Path:
+        """Find out, before any work is done, whether a file can be written; see `bemkit.atomic_files.check_target`."""
+        return check_target(Path(path), self.kind, self._is_own)
+
+    @contextmanager
+    def created(self, path: str | Path) -> Iterator[h5py.File]:
+        """Give a marked file that replaces one of its kind at once or not at all.
+
+        Raises
+        ------
+        OutputFileError
+            If the file cannot be written, or a file of another kind stands in the way.
+        """
+        with created(self.check_target(path)) as file:
+            file.attrs.update({"format": self.name, "schema_version": self.version})
+            file.create_group("provenance").attrs.update(provenance())
+            yield file
+
+    @contextmanager
+    def opened(self, path: str | Path) -> Iterator[Reader]:
+        """Open a file of this kind for careful reading; see `opened`.
+
+        Raises
+        ------
+        ResultFileError
+            If the file is not a complete file of this kind and version.
+        """
+        with opened(Path(path), made_by=self.command) as reader:
+            marks = reader.attributes("/")
+            if marks.get("format") != self.name:
+                remedy = f"give a file written by '{self.command}', or choose another name"
+                raise reader.error(f"an HDF5 file, but not a {self.kind}: {remedy}")
+            if marks.get("schema_version") != self.version:
+                raise reader.error(
+                    f"has layout version {marks.get('schema_version')}, this bemkit {__version__} reads version "
+                    f"{self.version}: use the bemkit that wrote it, or write it anew"
+                )
+            yield reader
+
+    def _is_own(self, path: Path) -> bool:
+        try:
+            with self.opened(path):
+                return True
+        except ResultFileError:
+            return False
+
+
+def provenance() -> dict[str, str]:
+    """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
+    return {
+        "bemkit": __version__,
+        "python": platform.python_version(),
+        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
+        "platform": f"{platform.system()} {platform.machine()}",
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
@@ -132,19 +189,7 @@ def _text_type(texts: Sequence[str]) -> np.dtype[Any]:
 
 @contextmanager
 def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> Iterator[Reader]:
-    """Open an HDF5 file for careful reading.
-
-    Parameters
-    ----------
-    path : Path
-    made_by : str
-        The command that writes such files, for messages.
-    mark : bytes
-        First line of the user block.
-
-    Yields
-    ------
-    Reader
+    """Open an HDF5 file, written by a command under a mark, for careful reading.
 
     Raises
     ------
@@ -158,34 +203,28 @@ def opened(path: Path, made_by: str = "bemkit run -o", mark: bytes = MARK) -> It
     """
     import h5py
 
-    name = shown_path(path)
+    name, remedy = shown_path(path), f"give a file written by '{made_by}'"
+    broken = "not an HDF5 file, or a broken one"
     try:
-        size = path.stat().st_size if path.is_file() else None
-        if size is None:
-            problem = "not a file" if path.exists() else "no such file"
-            raise ResultFileError(f"{name}: {problem}: give a file written by '{made_by}'")
-        _check_seal(path, mark, made_by)
+        if not path.is_file():
+            raise ResultFileError(f"{name}: {'not a file' if path.exists() else 'no such file'}: {remedy}")
+        size = path.stat().st_size
+        with path.open("rb") as stream:
+            block = stream.read(USER_BLOCK)
+            if not block.startswith(mark):
+                kind = "an HDF5 file, but not of bemkit" if block.startswith(_HDF5) else broken
+                raise ResultFileError(f"{name}: {kind}: {remedy}")
+            if block != _user_block(stream, mark):
+                damage = "its content does not match its checksum: the file is damaged, run its scene again"
+                raise ResultFileError(f"{name}: {damage}")
         file = h5py.File(str(path), "r", locking=False)  # files are replaced as a whole, never changed
+    except ResultFileError:
+        raise
     except (OSError, ValueError) as error:
-        if isinstance(error, ResultFileError):
-            raise
-        reason = error.strerror if isinstance(error, PermissionError) else "not an HDF5 file, or a broken one"
-        raise ResultFileError(f"{name}: cannot be read ({reason}): give a file written by '{made_by}'") from error
+        reason = error.strerror if isinstance(error, PermissionError) else broken
+        raise ResultFileError(f"{name}: cannot be read ({reason}): {remedy}") from error
     with file:
         yield Reader(name, size, file)
-
-
-def _check_seal(path: Path, mark: bytes, made_by: str) -> None:
-    name = shown_path(path)
-    with path.open("rb") as stream:
-        block = stream.read(USER_BLOCK)
-        if not block.startswith(mark):
-            kind = "an HDF5 file, but not of bemkit" if block.startswith(_HDF5) else "not an HDF5 file, or a broken one"
-            raise ResultFileError(f"{name}: {kind}: give a file written by '{made_by}'")
-        if block != _user_block(stream, mark):
-            raise ResultFileError(
-                f"{name}: its content does not match its checksum: the file is damaged, run its scene again"
-            )
 
 
 class Reader:
@@ -217,26 +256,23 @@ class Reader:
         """Return the texts and numbers attached to a group."""
         import h5py
 
-        try:
-            attributes = self._group(group).attrs
-            if len(attributes) > _MAX_ENTRIES_PER_GROUP:
+        found = self._follow(group)
+        if not isinstance(found, h5py.Group):
+            raise self.error(f"{group} is not a group")
+        with self._named_failures(f"attributes of {group}"):
+            if len(found.attrs) > _MAX_ENTRIES_PER_GROUP:
                 raise self.error(f"too many attributes in {group}")
-            for name in attributes:
-                stored = attributes.get_id(name)
+            for name in found.attrs:
+                stored = found.attrs.get_id(name)
                 is_text = h5py.check_string_dtype(stored.dtype) is not None  # type: ignore[attr-defined]  # stubs
                 if stored.shape != () or not (is_text or stored.dtype.kind in "if"):
                     raise self.error(f"attribute {name!r} of {group} is not a single text or number")
-            values = dict(attributes.items())
-        except (OSError, RuntimeError, KeyError, UnicodeDecodeError) as error:
-            raise self.error(f"attributes of {group} cannot be read") from error
-        return {name: _plain(value) for name, value in values.items()}
+            return {name: _plain(value) for name, value in found.attrs.items()}
 
     def has(self, path: str) -> bool:
         """Whether there is something at a path."""
-        try:
+        with self._named_failures(path):
             return path in self._file
-        except (OSError, RuntimeError, KeyError) as error:
-            raise self.error(f"{path} cannot be read") from error
 
     def floats(self, path: str) -> FloatArray:
         """Return an array of floats."""
@@ -279,52 +315,41 @@ class Reader:
         except UnicodeDecodeError as error:
             raise self.error(f"{path} is not UTF-8 text") from error
 
-    def _group(self, path: str) -> h5py.Group:
+    def _array(self, path: str, kind: str) -> npt.NDArray[Any]:
+        """Return an array of numbers of 8 bytes, of the kind "f" or "i", or of texts, of the kind "S"."""
         import h5py
 
         found = self._follow(path)
-        if not isinstance(found, h5py.Group):
-            raise self.error(f"{path} is not a group")
-        return found
-
-    def _array(self, path: str, kind: str | None) -> npt.NDArray[Any]:
-        """Return an array of some kind of numbers or texts, of any kind if that is None."""
-        import h5py
-
-        found: Any = self._follow(path)
-        try:
+        with self._named_failures(path):
             is_dataset = isinstance(found, h5py.Dataset)
             if not is_dataset or found.shape is None:
                 raise self.error(f"{path} is not an array")
             # compressed, virtual or never written data take less room in the file than in memory
             if found.external is not None or found.nbytes > min(self._size, found.id.get_storage_size()):
                 raise self.error(f"{path} is not stored plainly in the file")
-            kind = found.dtype.kind if kind is None else kind
-            if (
-                found.dtype.kind != kind
-                or kind not in "fiS"
-                or (kind != "S" and found.dtype.itemsize != 8)
-                or found.ndim > 2
-            ):
+            if found.dtype.kind != kind or (kind != "S" and found.dtype.itemsize != 8) or found.ndim > 2:
                 raise self.error(f"{path} holds {found.ndim}-dimensional {found.dtype}, not what belongs there")
             return np.asarray(found[()])
-        except (OSError, RuntimeError, TypeError, MemoryError) as error:
-            raise self.error(f"{path} cannot be read") from error
 
     def _follow(self, path: str) -> Any:
         """Return the object at a path, through hard links only."""
         import h5py
 
         found: Any = self._file
-        try:
+        with self._named_failures(path):
             for name in filter(None, path.split("/")):
                 is_group = isinstance(found, h5py.Group)
                 if not is_group or type(found.get(name, getlink=True)).__name__ != "HardLink":
                     raise self.error(f"{path} is missing")
                 found = found[name]
-        except (OSError, RuntimeError, KeyError) as error:
-            raise self.error(f"{path} cannot be read") from error
         return found
+
+    @contextmanager
+    def _named_failures(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, RuntimeError, KeyError, TypeError, MemoryError, UnicodeDecodeError) as error:
+            raise self.error(f"{what} cannot be read") from error
 
 
 def _plain(value: Any) -> Any:

@@ -17,10 +17,9 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
-from bemkit.studies.accuracy.measure import error_tasks
-from bemkit.studies.accuracy.plots import draw_errors
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, pareto_front
-from bemkit.studies.accuracy.runs import AdaptiveMeshes, all_runs, graded, uniform
+from bemkit.studies.accuracy.report import draw_errors
+from bemkit.studies.accuracy.runs import adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import compute
 
 PAGE = Path(__file__).parent / "error-against-run-time.md"
@@ -62,9 +61,9 @@ def save_small(figure: Figure, path: Path) -> None:
 def study(scene: bk.Scene, reference: Reference) -> list[ErrorRecord]:
     """Return the rows: all elements and meshes by Newton, and the smaller ones by the augmented Lagrangian too."""
     elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
-    meshes = (uniform(ELEMENTS), graded(ELEMENTS), AdaptiveMeshes(ACCURACIES))
+    meshes = (uniform(ELEMENTS), graded(ELEMENTS), adaptive(ACCURACIES))
     newton = all_runs(scene, elements, meshes, [bk.SemismoothNewton()])
-    few = (uniform(ELEMENTS[:-1]), AdaptiveMeshes(ACCURACIES[:2]))
+    few = (uniform(ELEMENTS[:-1]), adaptive(ACCURACIES[:2]))
     augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
     # the finest meshes are for constant elements, which are fast and need them
     runs = [run for run in (*newton, *augmented) if run.discretisation == "constant" or run.size != ELEMENTS[-1]]

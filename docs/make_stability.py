@@ -9,7 +9,7 @@ from markers import between
 
 import bemkit as bk
 from bemkit.scene.toml import with_overrides
-from bemkit.studies.stability.axes import all_axes
+from bemkit.studies.stability.axes import AXES
 from bemkit.studies.stability.records import Verdict, to_markdown
 from bemkit.studies.stability.sweep import sweep
 
@@ -24,12 +24,12 @@ def main() -> None:
     summary = ["| scene | elements | rows | " + " | ".join(v.value for v in Verdict) + " |", "|---|---|" + "---:|" * 6]
     for number, (name, discretisation) in enumerate(RUNS):
         scene = with_overrides(bk.load_scene(name), discretisation=discretisation)
-        rows = list(sweep(scene, all_axes()))
+        rows = list(sweep(scene, AXES))
         counts = Counter(row.verdict for row in rows)
         numbers = " | ".join(str(counts[verdict.value]) for verdict in Verdict)
         summary.append(f"| `{name}` | {discretisation} | {len(rows)} | {numbers} |")
         if number < N_FULL:
-            text = between(text, f"{name}-{discretisation}", to_markdown(all_axes(), rows))
+            text = between(text, f"{name}-{discretisation}", to_markdown(AXES, rows))
     PAGE.write_text(between(text, "summary", "\n".join(summary)), "utf-8")
 
 

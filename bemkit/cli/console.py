@@ -5,38 +5,31 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
-from bemkit.errors import InputError
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
-from bemkit.scene.registry import DISCRETISATIONS, SOLVERS, Registry
+from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS = 12
 
 
 def print_summary(solution: Solution, console: Console | None = None) -> None:
-    """Print a solution as a compact table.
-
-    Parameters
-    ----------
-    solution : Solution
-    console : rich.console.Console, optional
-        Standard output by default.
-    """
+    """Print a solution as a compact table, to standard output by default."""
     console = stdout_console(console)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in _summary_rows(solution):
-        table.add_row(name, value)
+        table.add_row(name, Text(value) if isinstance(value, str) else value)
     console.print(Text(solution.scene.title, style="bold"))
     console.print(table)
     _print_warnings(solution.warnings, console)
@@ -63,13 +56,7 @@ def _print_warnings(warnings: Sequence[str], console: Console) -> None:
 
 
 class ConvergenceTable:
-    """Prints one line per step of the solver as it happens; give it to `bemkit.run` as callback.
-
-    Parameters
-    ----------
-    console : rich.console.Console, optional
-        Standard error by default.
-    """
+    """A callback of `bemkit.run` that prints one line per step of the solver, to standard error by default."""
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = Console(stderr=True, highlight=False) if console is None else console
@@ -78,9 +65,7 @@ class ConvergenceTable:
     def __call__(self, record: StepRecord) -> None:
         """Print a line."""
         if not self._has_header:
-            header = (
-                f"{'step':>4}  {'solves':>6}  {'separated':>9}  {'stick':>6}  {'slip':>6}  {'changed':>7}  {'worst':>8}"
-            )
+            header = "step  solves  separated   stick    slip  changed     worst"
             self._console.print(Text(header, style="bold"))
             self._has_header = True
         line = (
@@ -93,14 +78,7 @@ class ConvergenceTable:
 def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
     """Print planned against measured time and memory, the counts, and what was left out.
 
-    Parameters
-    ----------
-    solution : Solution
-        Of a run whose memory was traced, which makes small scenes about twice as slow.
-    output_seconds : float [s]
-        What writing its outputs took.
-    to_stderr : bool
-        Whether standard output is taken by data.
+    Memory was traced in the run, which makes small scenes about twice as slow. Standard output may be taken by data.
     """
     console = Console(stderr=to_stderr, highlight=False)
     console.print(Group(_stages(solution, output_seconds), _counts(solution.plan.work, solution.work)))
@@ -164,93 +142,50 @@ def format_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
-def _summary_rows(solution: Solution) -> list[tuple[str, Text]]:
-    timings = ", ".join(f"{name} {value:.2f}" for name, value in solution.timings.items() if name != "total")
+def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
+    mesh, contact, timings = solution.mesh, solution.contact, solution.timings
     colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
     status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
-    discretisation = _word(DISCRETISATIONS, solution.scene.discretisation)
-    if (degree := solution.scene.discretisation.displacement_space(solution.mesh).degree) > 2:
+    yield "status", status
+    discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
+    if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
-    rows = [
-        ("status", status),
-        ("elements", Text(f"{solution.mesh.n_elements} ({discretisation})")),
-        *_symmetry(solution),
-        *_contact(solution),
-        ("elastic energy", Text(f"{solution.energy:.8g}  per unit thickness")),
-        *_estimate(solution),
-        *_solve(solution),
-        ("certificate", Text(_certificate_line(solution.certificate))),
-        *_between_nodes(solution),
-        ("time", Text(f"{solution.timings.get('total', sum(solution.timings.values())):.2f} s ({timings})")),
-    ]
-    return rows
-
-
-def _certificate_line(certificate: Certificate) -> str:
-    return f"{_worst_entry(certificate)}; round-off of the forces up to {certificate.round_off:.1e}"
-
-
-def _between_nodes(solution: Solution) -> list[tuple[str, Text]]:
-    between = solution.between_nodes
-    if between is None:
-        return []
-    line = f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
-    return [("between nodes", Text(line))]
+    yield "elements", f"{mesh.n_elements} ({discretisation})"
+    if mesh.symmetry is not None:
+        values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
+        yield "symmetry", f"about {mesh.symmetry}: {values}"
+    if contact.n_contact:
+        counts = Counter(contact.status_words())
+        nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+        yield "contact nodes", f"{contact.n_contact}: {nodes}"
+        yield "normal force", f"{solution.force_normal:.8g}  pressing, per unit thickness"
+        yield "friction force", f"{solution.force_tangential:.8g}  on the body, along the boundary"
+    else:
+        yield "contact", "none"
+    yield "elastic energy", f"{solution.energy:.8g}  per unit thickness"
+    if solution.estimated_error is not None:
+        tractions = solution.estimated_traction_error
+        of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
+        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
+    if contact.n_contact:
+        yield "transitions", "\n".join(_transition_lines(solution))
+        solver = SOLVERS.word_of(solution.scene.solver)
+        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
+    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
+    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
+    if (between := solution.between_nodes) is not None:
+        yield "between nodes", f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
+    stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
+    yield "time", f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
 
 
 def _worst_entry(measured: Certificate | BetweenNodes) -> str:
     violations = measured.violations
-    worst = max(violations, key=lambda name: _nan_first(violations[name]))
+    worst = max(violations, key=lambda name: np.nan_to_num(violations[name], nan=np.inf))
     name = f" ({worst.replace('_', ' ')})" if measured.worst != 0.0 else ""  # where all are equal
     return f"worst entry {measured.worst:.1e}{name}"
-
-
-def _symmetry(solution: Solution) -> list[tuple[str, Text]]:
-    mesh = solution.mesh
-    if mesh.symmetry is None:
-        return []
-    values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
-    return [("symmetry", Text(f"about {mesh.symmetry}: {values}"))]
-
-
-def _contact(solution: Solution) -> list[tuple[str, Text]]:
-    if not solution.contact.n_contact:
-        return [("contact", Text("none"))]
-    counts = Counter(solution.contact.status_words())
-    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
-    return [
-        ("contact nodes", Text(f"{solution.contact.n_contact}: {nodes}")),
-        ("normal force", Text(f"{solution.force_normal:.8g}  pressing, per unit thickness")),
-        ("friction force", Text(f"{solution.force_tangential:.8g}  on the body, along the boundary")),
-    ]
-
-
-def _solve(solution: Solution) -> list[tuple[str, Text]]:
-    if not solution.contact.n_contact:
-        return []
-    solves = f"{solution.linear_solves} in {solution.outer_steps} steps ({_word(SOLVERS, solution.scene.solver)})"
-    return [("transitions", Text("\n".join(_transition_lines(solution)))), ("linear solves", Text(solves))]
-
-
-def _estimate(solution: Solution) -> list[tuple[str, Text]]:
-    energy, tractions = solution.estimated_error, solution.estimated_traction_error
-    if energy is None:
-        return []
-    of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
-    return [("estimated error", Text(f"{energy:.1e}  relative, in the energy norm{of_tractions}"))]
-
-
-def _nan_first(value: float) -> float:
-    return value if value == value else float("inf")
-
-
-def _word(registry: Registry, value: object) -> str:
-    try:
-        return registry.kind_of(value)
-    except InputError:  # a class of one's own
-        return type(value).__name__
 
 
 def _transition_lines(solution: Solution) -> list[str]:

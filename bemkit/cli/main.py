@@ -9,22 +9,24 @@ from __future__ import annotations
 import sys
 import time
 import tracemalloc
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from bemkit.cli.stability import stability
-from bemkit.cli.study import study
 from bemkit.errors import BemkitError, NoResultError, concerning, one_line, printable
-from bemkit.results.outputs import PipeClosedError, guarded_streams, print_data
+from bemkit.results.outputs import JSON_START, STDOUT, Outputs, PipeClosedError, TextFile, guarded_streams, print_data
 from bemkit.version import __version__
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from bemkit.results.solution import Solution
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
+_STUDIES = ("stability", "study")
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -67,6 +69,23 @@ def _run_to_end(arguments: list[str] | None) -> int:
     return code if isinstance(code, int) else 0
 
 
+class _Commands(click.Group):
+    """Loads the commands of studies only when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of all commands."""
+        return sorted([*super().list_commands(ctx), *_STUDIES])
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return the command of a name."""
+        if cmd_name not in _STUDIES:
+            return super().get_command(ctx, cmd_name)
+        from bemkit.cli import study
+
+        command: click.Command = getattr(study, cmd_name)
+        return command
+
+
 def _degree(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
     """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
     if value is None:
@@ -78,7 +97,7 @@ def _degree(context: click.Context, parameter: click.Parameter, value: str | Non
     return int(value)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="bemkit")
 def commands() -> None:
     """Frictional contact of elastic bodies by boundary elements."""
@@ -117,11 +136,10 @@ def run(
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     from bemkit.atomic_files import reserved
-    from bemkit.cli.outputs import Outputs
     from bemkit.scene.toml import load_scene, with_overrides
 
-    wanted = Outputs(_path(output), json_file, csv_file, plots=_path(folder))
-    click.get_current_context().with_resource(reserved(wanted.check()))
+    outputs = _outputs(json_file, csv_file, folder)
+    click.get_current_context().with_resource(reserved(outputs.check(_result_target(output))))
     chosen = with_overrides(
         load_scene(scene),
         elements=elements,
@@ -140,16 +158,20 @@ def run(
         finally:
             tracemalloc.stop()
     begin = time.perf_counter()
-    wanted.write(solution)
+    if output is not None:
+        from bemkit.results.result_file import write_result
+
+        write_result(output, solution)
+    outputs.write(solution)
     output_seconds = time.perf_counter() - begin
-    if not quiet and not wanted.uses_stdout:
+    if not quiet and not outputs.uses_stdout:
         from bemkit.cli.console import print_summary
 
         print_summary(solution)
     if explain:
         from bemkit.cli.console import print_explanation
 
-        print_explanation(solution, output_seconds, to_stderr=wanted.uses_stdout)
+        print_explanation(solution, output_seconds, to_stderr=outputs.uses_stdout)
     if solution.is_converged:
         return 0
     return INACCURATE if solution.is_certified else NOT_CONVERGED
@@ -163,20 +185,18 @@ def run(
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
 def show(result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool) -> None:
     """Show RESULT, a file written by bemkit run -o."""
-    from bemkit.cli.outputs import Outputs
-    from bemkit.results.outputs import STDOUT
     from bemkit.results.result_file import read_result
     from bemkit.scene.toml import scene_to_toml
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    wanted = Outputs(json=json_file, csv=STDOUT if table else None, table=table or "contact", plots=_path(folder))
-    wanted.check()
+    outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact")
+    outputs.check()
     solution = read_result(result)
-    wanted.write(solution)
+    outputs.write(solution)
     if shows_scene:
         print_data(scene_to_toml(solution.scene))
-    elif wanted == Outputs():
+    elif not (table or json_file or folder):
         from bemkit.cli.console import print_summary
 
         print_summary(solution)
@@ -230,8 +250,38 @@ def plan(
         print_plan(chosen.title, made)
 
 
-commands.add_command(study)
-commands.add_command(stability)
+def _outputs(
+    json_file: str | None, csv_file: str | None, folder: str | None, table: str = "contact"
+) -> Outputs[Solution]:
+    """Return where the command line sends a solution, besides a result file."""
+    if json_file is csv_file is folder is None:
+        return Outputs()
+    from bemkit.results.tables import CSV_STARTS, to_csv, to_json
+
+    def as_json(solution: Solution) -> str:
+        return to_json(solution) + "\n"
+
+    def as_csv(solution: Solution) -> str:
+        return to_csv(solution, table)
+
+    def figures(solution: Solution) -> Mapping[str, Figure]:
+        from bemkit.results.figures import all_figures
+
+        return all_figures(solution)
+
+    texts = (
+        TextFile(json_file, "JSON file", JSON_START, as_json),
+        TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
+    )
+    return Outputs(texts, folder, figures, "deformation")
+
+
+def _result_target(output: str | None) -> list[Path]:
+    if output is None:
+        return []
+    from bemkit.results.result_file import check_result_target
+
+    return [check_result_target(output)]
 
 
 def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
@@ -253,13 +303,10 @@ def _start_tracing() -> None:
     """Trace memory from now on, with what every run loads on first use behind it."""
     import scipy.linalg  # noqa: F401
 
+    import bemkit.results.error_indicators
     import bemkit.runs.run  # noqa: F401
 
     tracemalloc.start()
-
-
-def _path(name: str | None) -> Path | None:
-    return None if name is None else Path(name)
 
 
 def _complain(message: str) -> None:

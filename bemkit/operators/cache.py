@@ -28,7 +28,7 @@ from bemkit.atomic_files import check_target
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table
+from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_table
 from bemkit.operators.boundary import Mass, PairOperator
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
@@ -83,7 +83,7 @@ def save(path: str | Path, operator: CachedOperator) -> None:
     arrays = _computed(operator)
     with created(target, MARKER, sum(array.nbytes for array in arrays.values())) as file:
         marks = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "bemkit": __version__}
-        write_attributes(file, {**marks, **fingerprints(operator)})
+        file.attrs.update({**marks, **fingerprints(operator)})
         write_table(file.create_group("arrays"), arrays)
 
 

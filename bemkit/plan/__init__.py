@@ -1,8 +1,8 @@
 """Only what the scene needs: what a scene will take, what is left out, and why."""
 
 from bemkit.operators.steklov_poincare.needs import PlanItem as PlanItem
-from bemkit.plan.items import Sizes as Sizes
 from bemkit.plan.plan import Plan as Plan
+from bemkit.plan.plan import Sizes as Sizes
 from bemkit.plan.plan import TooLargeError as TooLargeError
 from bemkit.plan.plan import check_elements as check_elements
 from bemkit.plan.plan import check_memory as check_memory

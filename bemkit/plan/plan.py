@@ -1,11 +1,14 @@
-"""The plan of a scene: counts exactly, memory and time as estimates; and the refusal of what does not fit."""
+"""The plan of a scene: what it needs and leaves out and why, counts, memory and time; refusal of what does not fit."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
@@ -13,9 +16,9 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData
-from bemkit.plan.items import Sizes, find_sizes, plan_items
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 
@@ -30,6 +33,148 @@ _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 2_000
 """Elements of the mesh from whose plan larger ones are told."""
+_DEGREES = ("constant", "linear", "quadratic")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Numbers of elements and unknowns.
+
+    Parameters
+    ----------
+    n_elements, n_curved, n_loops : int
+        Elements, those of them that are curved, and closed curves of the boundary.
+    n_sources : int
+        Elements of the whole body, images by symmetry included.
+    displacement_degree, traction_degree : int
+        Of the polynomials on each element.
+    n_displacements, n_tractions : int
+        Components at all nodes of the two spaces.
+    n_fixed, n_free, n_open : int
+        Displacement components that supports prescribe, that carry a known force, and that contact decides.
+    n_contact, n_contact_unknowns : int
+        Contact nodes, and the order of their system.
+    n_motions, n_free_motions : int
+        Rigid motions that cause no traction (3, or none on an exterior), and those of them that no support holds.
+    """
+
+    n_elements: int
+    n_curved: int
+    n_loops: int
+    n_sources: int
+    displacement_degree: int
+    traction_degree: int
+    n_displacements: int
+    n_tractions: int
+    n_fixed: int
+    n_free: int
+    n_open: int
+    n_contact: int
+    n_contact_unknowns: int
+    n_motions: int
+    n_free_motions: int
+
+
+def find_sizes(prepared: Prepared) -> Sizes:
+    """Count the elements and unknowns of a prepared scene."""
+    mesh, conditions, nodes = prepared.mesh, prepared.conditions, prepared.contact.nodes
+    n_contact, tractions = nodes.nodes.size, prepared.scene.discretisation.traction_space(mesh)
+    return Sizes(
+        n_elements=mesh.n_elements,
+        n_curved=int(np.count_nonzero(~mesh.is_straight)),
+        n_loops=len(mesh.loops),
+        n_sources=mesh.whole.n_elements,
+        displacement_degree=prepared.space.degree,
+        traction_degree=tractions.degree,
+        n_displacements=prepared.space.n_dofs,
+        n_tractions=tractions.n_dofs,
+        n_fixed=int(np.count_nonzero(conditions.is_fixed)),
+        n_free=int(np.count_nonzero(conditions.is_free)),
+        n_open=int(np.count_nonzero(conditions.is_retained)),
+        n_contact=n_contact,
+        n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
+        n_motions=len(admissible_modes(mesh)),
+        n_free_motions=len(prepared.free_motions),
+    )
+
+
+def plan_items(
+    scene: Scene, sizes: Sizes, of_body: tuple[PlanItem, ...], n_steps: int, proposal: Symmetry | None = None
+) -> tuple[PlanItem, ...]:
+    """Say what a scene needs and what it leaves out, in the order in which it is used.
+
+    Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
+    scene has but does not use.
+    """
+    history = "the whole load comes in one step"
+    if n_steps > 1:
+        history = f"{n_steps} load steps; slip counts from the end of the step before"
+    return (
+        *_mesh_items(scene, sizes, proposal),
+        *of_body,
+        *_contact_items(scene, sizes, n_steps),
+        PlanItem("load history", n_steps > 1, history),
+        PlanItem("fields on the boundary", True, "part of every result"),
+        PlanItem("displacement inside the body", False, "not asked for; see interior_fields"),
+        PlanItem("stress inside the body", False, "not asked for; see interior_fields"),
+        PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for"),
+        PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for"),
+    )
+
+
+def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
+    """Yield what elements, symmetry and spaces need."""
+    n, n_curved, accuracy = sizes.n_elements, sizes.n_curved, scene.mesh.accuracy
+    yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
+    further = "the number of elements is given"
+    if accuracy is not None:
+        further = f"until the estimated error is below {accuracy:g}; this plan is for the first mesh"
+    yield PlanItem("further meshes", accuracy is not None, further)
+    curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
+    yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
+    if not sizes.n_motions and scene.symmetry is None:
+        yield PlanItem("exterior domain", True, "the body fills the outside of the boundary")
+    reason = "not asked for"
+    if scene.symmetry is not None:
+        reason = f"about {scene.symmetry}: {n} of {sizes.n_sources} elements carry unknowns"
+    elif proposal is not None:
+        share = "half" if proposal.n_images == 2 else "a quarter"
+        reason = f"proposed: the scene is symmetric about {proposal}, and {share} of its unknowns would do"
+    yield PlanItem("symmetry", scene.symmetry is not None, reason)
+    displacements, tractions = (
+        _DEGREES[degree] if degree < len(_DEGREES) else f"degree {degree}"
+        for degree in (sizes.displacement_degree, sizes.traction_degree)
+    )
+    reason = (
+        f"{scene.discretisation.method}: {sizes.n_displacements} displacements and {sizes.n_tractions} tractions, "
+        f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
+    )
+    yield PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
+
+
+def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
+    """Yield what contact needs."""
+    c, n, n_free = sizes.n_contact_unknowns, sizes.n_contact, sizes.n_free_motions
+    if not scene.contact_parts:
+        yield PlanItem("contact system", False, "no part may touch an obstacle: the body is solved at once")
+        return
+    yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
+    yield PlanItem("second elastic body", False, "the obstacles are rigid")
+    names = ", ".join(dict.fromkeys(type(law).__name__ for law in scene.laws.values() if not law.is_frictionless))
+    kind = "static" if n_steps == 1 else "incremental"
+    yield PlanItem(
+        "friction", bool(names), f"law {names}, {kind}" if names else "the law allows no tangential traction"
+    )
+    tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "frictionless"
+    yield PlanItem("tangential unknowns", c > n, tangential)
+    modes = "the supports hold all rigid motions"
+    if n_free:
+        modes = f"{n_free} of {sizes.n_motions} rigid motions {'is' if n_free == 1 else 'are'} held by contact alone"
+    yield PlanItem("rigid motions as unknowns", n_free > 0, modes)
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"
 
 
 class TooLargeError(InputError):
@@ -141,10 +286,7 @@ def check_memory(plan: Plan) -> None:
 def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
-    Parameters
-    ----------
-    scene : Scene
-        Memory grows with the square of the number of elements: the plan for a small mesh tells what a large one takes.
+    Memory grows with the square of that number: the plan for a small mesh tells what a large one takes.
 
     Raises
     ------

@@ -10,8 +10,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.material import Material
+from bemkit.reference.compare import Answer, Places, Reference, Zone, errors_of
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
-from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class DiscBetweenPlates:
         work = -self.radius * pressure.integral(self._gap)
         answer = Answer(
             u_n=u_n,
-            u_t=self.radius * pressure.displacement(self._across, angle),
+            u_t=self.radius * pressure.displacement(lambda x: self._influence(x)[1], angle),
             sigma_n=-pressure.at(angle),
             sigma_t=np.zeros_like(s),
             energy=0.25 * work,
@@ -124,37 +124,18 @@ class DiscBetweenPlates:
         )
 
     def _towards(self, angle: FloatArray) -> FloatArray:
-        """u_n / radius of unit line pressures at an angle and opposite to it."""
+        return self._influence(angle)[0]
+
+    def _influence(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return u_n / radius and u_t / radius of unit line pressures at an angle and opposite to it."""
+        kappa, shear = self.material.kappa, self.material.shear_modulus
+        # the sums of cos(n angle) / n and of sin(n angle) / n over odd n
+        c, s = 0.5 * np.log(1.0 / np.tan(0.5 * np.abs(angle))), 0.25 * np.pi * np.sign(angle)
+        cosine, sine = np.cos(angle), np.sin(angle)
         if self.along_normals:
-            return self._radial(angle)
-        c, _ = self._sums(angle)
-        return np.asarray(-(self.material.kappa + 1.0) / (2.0 * np.pi * self.material.shear_modulus)) * (
-            c - 0.5 * np.cos(angle)
-        )
-
-    def _across(self, angle: FloatArray) -> FloatArray:
-        """u_t / radius of the same pressures."""
-        if self.along_normals:
-            return self._circumferential(angle)
-        _, s = self._sums(angle)
-        kappa, shear = self.material.kappa, self.material.shear_modulus
-        return np.asarray(-((kappa - 1.0) * s - 0.5 * (kappa + 1.0) * np.sin(angle)) / (2.0 * np.pi * shear))
-
-    def _sums(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the sums of cos(n angle)/n and of sin(n angle)/n over odd n."""
-        return 0.5 * np.log(1.0 / np.tan(0.5 * np.abs(angle))), 0.25 * np.pi * np.sign(angle)
-
-    def _radial(self, angle: FloatArray) -> FloatArray:
-        """u_r / radius of pressures along the normals."""
-        c, s = self._sums(angle)
-        along, across = np.cos(angle) * c, np.sin(angle) * s
-        kappa, shear = self.material.kappa, self.material.shear_modulus
-        total = 0.5 * (kappa - 1.0) + kappa * (along + across - 1.0) + along - across
-        return np.asarray(-total / (2.0 * np.pi * shear))
-
-    def _circumferential(self, angle: FloatArray) -> FloatArray:
-        """u_t / radius of the same."""
-        c, s = self._sums(angle)
-        along, across = np.cos(angle) * s, np.sin(angle) * c
-        kappa, shear = self.material.kappa, self.material.shear_modulus
-        return np.asarray(-(kappa * (along - across) - (along + across)) / (2.0 * np.pi * shear))
+            towards = 0.5 * (kappa - 1.0) + kappa * (cosine * c + sine * s - 1.0) + cosine * c - sine * s
+            across = kappa * (cosine * s - sine * c) - (cosine * s + sine * c)
+        else:
+            towards = (kappa + 1.0) * (c - 0.5 * cosine)
+            across = (kappa - 1.0) * s - 0.5 * (kappa + 1.0) * sine
+        return -towards / (2.0 * np.pi * shear), -across / (2.0 * np.pi * shear)

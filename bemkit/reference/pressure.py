@@ -48,7 +48,8 @@ class EvenPressure:
 
     def integral(self, weight: Callable[[FloatArray], FloatArray]) -> float:
         """Integrate the pressure times a smooth function over the zone [N/m for the function 1]."""
-        angle, step = _midpoints()
+        step = np.pi / 200  # the midpoint rule in the angle
+        angle = (np.arange(200) - 99.5) * step
         x = self.half_width * np.sin(angle)
         return float(np.sum(self.at(x) * weight(x) * np.cos(angle))) * self.half_width * step
 
@@ -69,45 +70,22 @@ def solve_pressure(
     given: Callable[[FloatArray], FloatArray],
     n_terms: int = N_TERMS,
 ) -> tuple[EvenPressure, float]:
-    """Find the pressure on a zone and the size of one more field.
+    """Find the pressure p on a zone and the size c of one more field, an even function of the place.
 
-    Solves ``integral of kernel(x - y) p(y) dy + c unknown(x) = given(x)`` for p and c at the zeros of a Chebyshev
-    polynomial.
-
-    Parameters
-    ----------
-    kernel : callable
-    half_width : float [m]
-    unknown, given : callable
-        Even functions of the place.
-    n_terms : int
-        Coefficients of the pressure.
-
-    Returns
-    -------
-    tuple of EvenPressure and float
+    Solves ``integral of kernel(x - y) p(y) dy + c unknown(x) = given(x)`` at the zeros of a Chebyshev polynomial; p has
+    `n_terms` coefficients on a zone of a half-width [m].
     """
     n = n_terms
     x = half_width * np.cos((np.arange(n + 1) + 0.5) * np.pi / (2 * n + 2))
-    system = np.column_stack([_influence(kernel, half_width, x, n), unknown(x)])
+    places, weights = _rule(kernel, half_width, x)
+    even_chebyshev = np.cos(2.0 * np.arange(n) * np.arccos(places)[..., None])
+    system = np.column_stack([np.einsum("pq,pqn->pn", weights, even_chebyshev), unknown(x)])
     solution = np.asarray(np.linalg.solve(system, given(x)), dtype=np.float64)
     return EvenPressure(half_width, solution[:n]), float(solution[n])
 
 
 def half_width_for(load: float, load_of: Callable[[float], float], near: float) -> float:
-    """Find the half-width at which a load is carried, from a first guess.
-
-    Parameters
-    ----------
-    load : float
-    load_of : callable
-        Grows with the half-width.
-    near : float [m]
-
-    Returns
-    -------
-    float [m]
-    """
+    """Find the half-width [m] at which a load is carried, which grows with it, from a first guess."""
     from scipy.optimize import brentq
 
     low = high = near
@@ -136,21 +114,6 @@ def _graded_rule(n_panels: int, n_points: int) -> tuple[FloatArray, FloatArray]:
     edges: FloatArray = np.concatenate([[0.0], 0.5 ** np.arange(n_panels - 1, -1, -1)])
     half: FloatArray = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (1.0 + xi)).ravel(), (half * weights).ravel()
-
-
-def _even_chebyshev(x: FloatArray, n: int) -> FloatArray:
-    return np.asarray(np.cos(2.0 * np.arange(n) * np.arccos(x)[..., None]))
-
-
-def _midpoints() -> tuple[FloatArray, float]:
-    step = np.pi / 200
-    return np.asarray((np.arange(200) - 99.5) * step), step
-
-
-def _influence(kernel: Kernel, half_width: float, x: FloatArray, n: int) -> FloatArray:
-    """Return the (n_points, n) displacements at x [m] that each term of the pressure causes."""
-    places, weights = _rule(kernel, half_width, x)
-    return np.asarray(np.einsum("pq,pqn->pn", weights, _even_chebyshev(places, n)))
 
 
 def _rule(kernel: Kernel, half_width: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -10,8 +10,8 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.operators.material import Material
+from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.pressure import N_TERMS, EvenPressure, half_width_for, places_along, solve_pressure
-from bemkit.reference.values import Answer, Places, Reference, Zone
 
 _N_MODES = 4
 """Modes whose compliance the far side changes; the fifth is changed by less than 1e-30."""

@@ -1,13 +1,13 @@
 """Figures of a solution: the deformed body, and displacements, tractions and status along the contact boundary.
 
-Without contact, the tractions along the whole boundary instead; see `bemkit.results.boundary_figure`.
+Without contact, the tractions along the whole boundary instead.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import floor, log10
 from pathlib import Path
 from types import MappingProxyType
@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.results.boundary_figure import draw_boundary_traction
 from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, new_figure, panel_above_strip
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
+from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,16 +33,17 @@ _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "sli
 
 _EXAGGERATION = 0.08
 """The largest displacement is drawn about this long, in diameters of the body."""
+_FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
+_SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
+_LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
+FREE, PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
+_READABLE = 0.06
+"""Share of the boundary from which on a piece is long enough for its name."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """Names of units on the axes.
-
-    Parameters
-    ----------
-    length, stress : str
-    """
+    """Names of units on the axes."""
 
     length: str = "m"
     stress: str = "Pa"
@@ -53,50 +53,40 @@ SI = Units()
 
 
 def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -> tuple[Path, ...]:
-    """Draw all figures into a folder, which is made if need be.
-
-    Parameters
-    ----------
-    solution : Solution
-    folder : str or Path
-    units : Units
-        Metre and pascal by default.
-
-    Returns
-    -------
-    tuple of Path
-        ``deformation.png``, and for each contact part ``contact-displacement.png``, ``contact-traction.png`` and
-        ``contact-status.png``, numbered if there are several; without contact ``boundary-traction.png``.
+    """Draw all figures into a folder, which is made if need be, and return their paths; see `all_figures`.
 
     Raises
     ------
     OutputFileError
         If the folder or a file in it cannot be written.
     """
+    return write_figures(all_figures(solution, units=units), Path(folder))
+
+
+def all_figures(solution: Solution, *, units: Units = SI) -> dict[str, Figure]:
+    """Draw everything there is to show.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By file names without ``.png``: ``deformation``, and for each contact part ``contact-displacement``,
+        ``contact-traction`` and ``contact-status``, numbered if there are several; without contact
+        ``boundary-traction``.
+    """
     figures = {"deformation": draw_deformation(solution, units=units)}
-    parts = list(dict.fromkeys(solution.contact.part))
+    parts = solution.contact.parts
     if not parts:
-        figures["boundary-traction"] = draw_boundary_traction(solution, length=units.length, stress=units.stress)
+        figures["boundary-traction"] = draw_boundary_traction(solution, units=units)
     for number, part in enumerate(parts, start=1):
         suffix = f"-{number}" if len(parts) > 1 else ""
         figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
         figures[f"contact-traction{suffix}"] = draw_contact_traction(solution, part, units=units)
         figures[f"contact-status{suffix}"] = draw_contact_status(solution, part, units=units)
-    return write_figures(figures, Path(folder))
+    return figures
 
 
 def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
-    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
-
-    Parameters
-    ----------
-    solution : Solution
-    units : Units
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells."""
     mesh = solution.mesh.whole
     displacement = node_displacement(solution)
     factor = exaggeration(mesh.diameter, displacement)
@@ -122,19 +112,7 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
 
 
 def draw_contact_displacement(solution: Solution, part: str, *, units: Units = SI) -> Figure:
-    """Draw normal and tangential displacement and the gap along one contact part, above its status.
-
-    Parameters
-    ----------
-    solution : Solution
-    part : str
-        Name of the contact part.
-    units : Units
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw normal and tangential displacement and the gap along one contact part, above its status."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
     figure, axes = _contact_axes(solution, part, units, "Displacements on the contact boundary")
@@ -153,9 +131,11 @@ def draw_contact_traction(solution: Solution, part: str, *, units: Units = SI) -
     figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
     axes.plot(s, contact.sigma_n[chosen], label=r"normal $\sigma_n$", **_FIRST)
     axes.plot(s, contact.sigma_t[chosen], label=r"tangential $\sigma_t$", **_SECOND)
-    law = _friction_law(solution)
+    law = solution.scene.law_at(contact.part, np.stack([contact.x, contact.y], axis=1))
     if not law.is_frictionless:
-        bound = _friction_bound(solution, law)[chosen]
+        bound = law.bound(np.minimum(contact.sigma_n, 0.0))
+        is_closed = contact.status != NodeStatus.SEPARATED
+        bound = np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)[chosen]
         axes.plot(s, bound, label="friction bound", **_LIMIT)
         axes.plot(s, -bound, **_LIMIT)
     label_values(axes, f"traction [{units.stress}]")
@@ -183,17 +163,12 @@ def draw_contact_status(solution: Solution, part: str, *, units: Units = SI) -> 
 
 
 def exaggeration(diameter: float, displacement: FloatArray) -> float:
-    """Choose the factor 1, 2 or 5 times a power of ten by which displacements are drawn.
+    """Choose the factor 1, 2 or 5 times a power of ten by which displacements are drawn; 1 if there are none.
 
     Parameters
     ----------
     diameter : float [m]
     displacement : (n, 2) array [m]
-
-    Returns
-    -------
-    float
-        1 if there is no displacement.
     """
     largest = float(np.hypot(*displacement.T).max())
     if not 0.0 < largest < np.inf:
@@ -204,16 +179,9 @@ def exaggeration(diameter: float, displacement: FloatArray) -> float:
 
 
 def node_displacement(solution: Solution) -> FloatArray:
-    """Return the displacement at the mesh nodes.
+    """Return the displacement at the nodes of ``solution.mesh.whole``, (n_nodes, 2) array [m].
 
-    Parameters
-    ----------
-    solution : Solution
-
-    Returns
-    -------
-    (n_nodes, 2) array [m]
-        At the nodes of ``solution.mesh.whole``, interpolated between the two elements that meet where they differ.
+    It is interpolated between the two elements that meet where they differ.
     """
     mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
     space = make_space(mesh)
@@ -224,27 +192,11 @@ def node_displacement(solution: Solution) -> FloatArray:
     return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])
 
 
-_FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
-_SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
-_LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
-
-
 def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
     """Blank out distances to the obstacle that would dwarf the displacements."""
     contact = solution.contact
     largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
     return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
-
-
-def _friction_law(solution: Solution) -> FrictionLaw:
-    contact = solution.contact
-    return solution.scene.law_at(contact.part, np.stack([contact.x, contact.y], axis=1))
-
-
-def _friction_bound(solution: Solution, law: FrictionLaw) -> FloatArray:
-    bound = law.bound(np.minimum(solution.contact.sigma_n, 0.0))
-    is_closed = np.array([word != "separated" for word in solution.contact.status_words()])
-    return np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)
 
 
 def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
@@ -305,13 +257,8 @@ def _draw_obstacles(axes: Axes, solution: Solution) -> None:
 
     frame = np.array([axes.get_xlim(), axes.get_ylim()])
     reach = 4.0 * float(np.hypot(*(frame[:, 1] - frame[:, 0])))
-    style: dict[str, Any] = {
-        "facecolor": "#EDEDED",
-        "edgecolor": "#555555",
-        "hatch": "////",
-        "linewidth": 1.0,
-        "zorder": 0,
-    }
+    edge: dict[str, Any] = {"edgecolor": "#555555", "linewidth": 1.0}
+    style = {**edge, "facecolor": "#EDEDED", "hatch": "////", "zorder": 0}
     is_labelled = False
     for part in solution.scene.contact_parts:
         label = None if is_labelled else "obstacle"
@@ -326,9 +273,44 @@ def _draw_obstacles(axes: Axes, solution: Solution) -> None:
             case Circle(centre=centre, radius=radius):
                 axes.add_patch(Disc(centre, radius, label=label, **style))
             case Cavity(centre=centre, radius=radius):
-                axes.add_patch(Disc(centre, radius, label=label, fill=False, edgecolor="#555555", linewidth=1.0))
+                axes.add_patch(Disc(centre, radius, label=label, fill=False, **edge))
             case _:
                 continue
         is_labelled = True
     axes.set_xlim(*frame[0])
     axes.set_ylim(*frame[1])
+
+
+def draw_boundary_traction(solution: Solution, *, units: Units = SI) -> Figure:
+    """Draw the normal and the tangential traction of each element along the boundary, above the parts it belongs to.
+
+    Closed curves of the boundary follow each other; a line marks where each of them begins.
+    """
+    mesh, traction = solution.mesh, solution.boundary.traction
+    order = np.concatenate(mesh.loops)
+    s = np.append(0.0, np.cumsum(mesh.lengths[order]))
+    normals = mesh.normals[order]
+    tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    title = f"Tractions on the boundary\n{solution.scene.title}"
+    figure, axes, strip = panel_above_strip(title, f"arc length $s$ [{units.length}]")
+    for directions, colour, label in ((normals, BLUE, r"normal $t_n$"), (tangents, VERMILION, r"tangential $t_t$")):
+        axes.stairs(np.einsum("ec,ec->e", traction[order], directions), s, color=colour, label=label, linewidth=1.4)
+    starts = np.cumsum([0, *(len(loop) for loop in mesh.loops)])[1:-1]
+    for place in s[starts]:
+        axes.axvline(place, color="black", linewidth=0.8)
+    label_values(axes, f"traction [{units.stress}]")
+    _draw_parts(strip, solution, order.tolist(), s.tolist())
+    return figure
+
+
+def _draw_parts(strip: Axes, solution: Solution, order: list[int], s: list[float]) -> None:
+    """Paint the part that each piece of the boundary belongs to, with its name where there is room."""
+    name_of = {element: name for name, elements in solution.mesh.parts.items() for element in elements.tolist()}
+    numbers = {name: number for number, name in enumerate(solution.mesh.parts)}
+    for name, group in groupby(range(len(order)), key=lambda k: name_of.get(order[k])):
+        places = list(group)
+        begin, end = s[places[0]], s[places[-1] + 1]
+        strip.axvspan(begin, end, color=FREE if name is None else PARTS[numbers[name] % 2], linewidth=0)
+        if name is not None and end - begin > _READABLE * s[-1]:
+            strip.text((begin + end) / 2.0, 0.5, name, ha="center", va="center", fontsize=8, parse_math=False)
+    strip.set_xlim(0.0, s[-1])

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TextIO, TypeVar
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 STDOUT = "-"
-PNG_START = "\x89PNG"
 JSON_START = "{"
 
 Content = TypeVar("Content")
@@ -98,36 +97,73 @@ def begins_with(path: Path, start: str) -> bool:
         return stream.read(len(expected)) == expected
 
 
-def check_figures(folder: Path, name: str) -> None:
-    """Find out, before any work is done, whether figures can be drawn and written.
+@dataclass(frozen=True)
+class Outputs(Generic[Content]):
+    """Where a content goes; each may be left out.
 
     Parameters
     ----------
-    folder : Path
-        Need not exist yet.
-    name : str
-        One of the figures: if it can be written, any other can.
-
-    Raises
-    ------
-    OutputFileError
+    texts : tuple of TextFile
+    folder : str or None
+        For figures; need not exist yet.
+    figures : callable (content) -> mapping of str to Figure
+        By file names without ``.png``.
+    figure : str
+        Name of one of them: if it can be written, any other can.
+    dots_per_inch : int
     """
-    if find_spec("matplotlib") is None:
-        raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
-    if folder.exists() and not folder.is_dir():
-        raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
-    _check_figure(folder / f"{name}.png" if folder.exists() else folder)
+
+    texts: tuple[TextFile[Content], ...] = ()
+    folder: str | None = None
+    figures: Callable[[Content], Mapping[str, Figure]] = field(default=lambda content: {})
+    figure: str = ""
+    dots_per_inch: int = 150
+
+    @property
+    def uses_stdout(self) -> bool:
+        """Whether standard output is taken by data, so that nothing else may be printed there."""
+        return any(text.place == STDOUT for text in self.texts)
+
+    def check(self, others: Sequence[Path] = ()) -> list[Path]:
+        """Find out, before any work is done, whether everything can be written, `others` besides; return all files.
+
+        Raises
+        ------
+        OutputFileError
+            If a file or folder cannot be written, something of another kind stands in the way, two outputs go to one
+            place, or a package for figures is missing.
+        """
+        targets = [*others, *(target for text in self.texts for target in text.check())]
+        places = [text.place for text in self.texts if text.place is not None]
+        if len(set(targets)) < len(targets) or places.count(STDOUT) > 1:
+            shown = ", ".join([*map(str, others), *places])
+            raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
+        if self.folder is not None:
+            folder = Path(self.folder)
+            if find_spec("matplotlib") is None:
+                raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
+            if folder.exists() and not folder.is_dir():
+                raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
+            _check_figure(folder / f"{self.figure}.png" if folder.exists() else folder)
+        return targets
+
+    def write(self, content: Content) -> None:
+        """Write everything that is wanted.
+
+        Raises
+        ------
+        OutputFileError
+        """
+        for text in self.texts:
+            text.write(content)
+        if self.folder is not None:
+            write_figures(self.figures(content), Path(self.folder), self.dots_per_inch)
 
 
 def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: int = 150) -> tuple[Path, ...]:
-    """Write figures as PNG, each all or nothing, into a folder that is made if need be; return their paths.
+    """Write figures, by file names without ``.png``, each all or nothing, into a folder that is made if need be.
 
-    Parameters
-    ----------
-    figures : mapping of str to matplotlib.figure.Figure
-        By file names without ``.png``.
-    folder : Path
-    dots_per_inch : int
+    Returns the paths.
 
     Raises
     ------
@@ -144,12 +180,7 @@ def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: in
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder if need be.
-
-    Raises
-    ------
-    OutputFileError
-    """
+    """Make a folder if need be; OutputFileError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -158,7 +189,7 @@ def make_folder(folder: Path) -> None:
 
 
 def _check_figure(path: Path) -> Path:
-    return check_target(path, "figure", lambda existing: begins_with(existing, PNG_START))
+    return check_target(path, "figure", lambda existing: begins_with(existing, "\x89PNG"))
 
 
 _CLOSED = io.TextIOWrapper(io.BytesIO())
@@ -307,12 +338,7 @@ def stdout_console(console: Console | None = None, *, width: int | None = None) 
 def plain_table(left: Sequence[str] = (), right: Sequence[str] = (), *, gap: int = 1) -> Table:
     """Return a table of rich without frame: columns of texts, which may be folded, then columns of numbers.
 
-    Parameters
-    ----------
-    left, right : sequence of str
-        Heads of the columns that are justified to the left and to the right.
-    gap : int
-        Spaces between columns.
+    Columns are named and have some spaces between them.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table

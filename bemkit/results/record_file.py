@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
-from bemkit.atomic_files import check_target
-from bemkit.hdf5 import ResultFileError, created, opened, write_attributes, write_table, write_text
-from bemkit.results.result_file import provenance
+from bemkit.hdf5 import FileFormat, ResultFileError, rows_of, write_table, write_text
 
 _MAX_LABEL = 1_000_000
 
@@ -33,27 +31,29 @@ class RecordFile(Generic[R]):
 
     Parameters
     ----------
-    format : str
-        Mark by which such files are recognised.
-    version : int
-        Of the layout.
-    command : str
-        That writes such files, for messages.
+    format : FileFormat
     record : type
         Of the records.
     labels : tuple of str
         Names of the texts.
     """
 
-    format: str
-    version: int
-    command: str
+    format: FileFormat
     record: type[R]
     labels: tuple[str, ...]
 
-    def check_target(self, path: str | Path) -> Path:
-        """Find out, before any work is done, whether records can be written; see `bemkit.atomic_files.check_target`."""
-        return check_target(Path(path), f"{self.command} file", self._is_own)
+    def check(self, path: str | Path | None) -> list[Path]:
+        """Find out, before any work is done, whether records can be written; return the file, if there is one to write.
+
+        Raises
+        ------
+        OutputFileError, ResultFileError
+        """
+        if path is None:
+            return []
+        if Path(path).is_file():
+            self.read(path)  # says more about a broken file than that it stands in the way
+        return [self.format.check_target(path)]
 
     def write(self, path: str | Path, labels: Mapping[str, str], records: Sequence[R]) -> None:
         """Write labels and records, replacing an older file at once or not at all.
@@ -63,13 +63,14 @@ class RecordFile(Generic[R]):
         OutputFileError
             If the file cannot be written, or a file of another kind stands in the way.
         """
-        target = self.check_target(path)
-        with created(target) as file:
-            write_attributes(file, {"format": self.format, "schema_version": self.version})
+        with self.format.created(path) as file:
             for name in self.labels:
                 write_text(file, name, labels[name])
-            write_attributes(file.create_group("provenance"), provenance())
-            write_table(file.create_group("rows"), {name: self._column(name, records) for name in self._types})
+            columns: dict[str, Any] = {}
+            for name, kind in self._types.items():
+                values = [getattr(record, name) for record in records]
+                columns[name] = values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)
+            write_table(file.create_group("rows"), columns)
 
     def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
         """Read labels and records.
@@ -79,26 +80,15 @@ class RecordFile(Generic[R]):
         ResultFileError
             If the file is not a complete file of this kind and version.
         """
-        with opened(Path(path), made_by=f"{self.command} -o") as reader:
-            marks = reader.attributes("/")
-            if marks.get("format") != self.format:
-                raise reader.error(f"an HDF5 file, but not of '{self.command} -o': choose another name")
-            if marks.get("schema_version") != self.version:
-                raise reader.error(
-                    f"has layout version {marks.get('schema_version')}, this bemkit reads version {self.version}: "
-                    "use the bemkit that wrote it, or delete it to begin anew"
-                )
+        with self.format.opened(path) as reader:
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
             texts, floats, integers = ([name for name in types if types[name] is kind] for kind in (str, float, int))
-            columns = reader.table("rows", texts=texts, floats=floats, integers=integers)
-            records = tuple(
-                self.record(**{name: types[name](value) for name, value in zip(columns, values, strict=True)})
-                for values in zip(*columns.values(), strict=True)
-            )
+            rows = rows_of(reader.table("rows", texts=texts, floats=floats, integers=integers))
+            records = tuple(self.record(**row) for row in rows)
         return labels, records
 
-    def finished(self, path: str | Path, labels: Mapping[str, str]) -> dict[Hashable, R]:
+    def finished(self, path: str | Path | None, labels: Mapping[str, str]) -> dict[Hashable, R]:
         """Return the records of an earlier study under the same labels by their keys, nothing if there is no file.
 
         Raises
@@ -106,7 +96,7 @@ class RecordFile(Generic[R]):
         ResultFileError
             If the file cannot be read, or its labels differ.
         """
-        if not Path(path).exists():
+        if path is None or not Path(path).exists():
             return {}
         earlier, records = self.read(path)
         for name in self.labels:
@@ -117,18 +107,17 @@ class RecordFile(Generic[R]):
                 raise ResultFileError(f"{path}: holds the sweep {what}: choose another name or delete it first")
         return {record.key: record for record in records}
 
+    def keep(
+        self, path: str | Path | None, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]
+    ) -> Iterator[R]:
+        """Hand records on after those that are new were added to the finished ones and written to the file, if any."""
+        for record in records:
+            if record.key not in finished:
+                finished[record.key] = record
+                if path is not None:
+                    self.write(path, labels, list(finished.values()))
+            yield record
+
     @property
     def _types(self) -> dict[str, Any]:
         return get_type_hints(self.record)
-
-    def _column(self, name: str, records: Sequence[R]) -> Any:
-        values = [getattr(record, name) for record in records]
-        kind = self._types[name]
-        return values if kind is str else np.array(values, dtype=np.int64 if kind is int else float)
-
-    def _is_own(self, path: Path) -> bool:
-        try:
-            self.read(path)
-        except ResultFileError:
-            return False
-        return True

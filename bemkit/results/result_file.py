@@ -19,38 +19,33 @@ stranger runs no code. The layout, version 2:
 from __future__ import annotations
 
 import json
-import platform
-from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemkit.atomic_files import OutputFileError, check_target
+from bemkit.atomic_files import OutputFileError
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_attributes, write_table, write_text, write_texts
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.outputs import STDOUT
 from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Transition
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure, unstructure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import Status, StepRecord
-from bemkit.version import __version__
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
-FORMAT = "bemkit-result"
-SCHEMA_VERSION = 2
+FORMAT = FileFormat("bemkit-result", 2, "bemkit result", "bemkit run -o")
 _MAX_PLAN = 1_000_000
 
 _COUNTS = ("linear_solves", "outer_steps")
@@ -62,29 +57,18 @@ _BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs")
 def check_result_target(path: str | Path) -> Path:
     """Find out, before any work is done, whether a result can be written to a file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Path
-
     Raises
     ------
     OutputFileError
         If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
     """
-    return check_target(Path(path), "bemkit result", _is_result)
+    if str(path) == STDOUT:
+        raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
+    return FORMAT.check_target(path)
 
 
 def write_result(path: str | Path, solution: Solution) -> None:
     """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
-
-    Parameters
-    ----------
-    path : str or Path
-    solution : Solution
 
     Raises
     ------
@@ -93,48 +77,41 @@ def write_result(path: str | Path, solution: Solution) -> None:
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """
-    target = check_result_target(path)
     text = scene_to_toml(solution.scene)
-    with created(target) as file:
-        write_attributes(file, {"format": FORMAT, "schema_version": SCHEMA_VERSION})
+    with FORMAT.created(path) as file:
         write_text(file, "scene", text)
-        write_attributes(file.create_group("provenance"), provenance())
-        write_attributes(file.create_group("summary"), _summary(solution))
-        write_attributes(file.create_group("certificate"), solution.certificate.as_dict())
+        numbers = {name: getattr(solution, name) for name in (*_COUNTS, *_FORCES)}
+        summary = {"status": solution.status.name, "message": solution.message, **numbers}
+        file.create_group("summary").attrs.update(summary)
+        file.create_group("certificate").attrs.update(solution.certificate.as_dict())
         if solution.between_nodes is not None:
-            write_attributes(file.create_group("between_nodes"), solution.between_nodes.as_dict())
-        write_attributes(file.create_group("timings", track_order=True), solution.timings)
+            file.create_group("between_nodes").attrs.update(solution.between_nodes.as_dict())
+        file.create_group("timings", track_order=True).attrs.update(solution.timings)
         _write_mesh(file.create_group("mesh"), solution.mesh)
         for name in _BOUNDARY:
             file.create_dataset(f"boundary/{name}", data=getattr(solution.boundary, name))
         contact = {"part": list(solution.contact.part), **solution.contact.columns()}
         write_table(file.create_group("contact"), contact)
-        write_table(file.create_group("transitions"), _transition_columns(solution.transitions))
+        rows = [transition.as_dict() for transition in solution.transitions]
+        columns: dict[str, Any] = {name: [row[name] for row in rows] for name in ("part", "from", "to")}
+        columns |= {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
+        write_table(file.create_group("transitions"), columns)
         write_table(file.create_group("history"), history_columns(solution.history))
         for name in ("plan", "work"):
             write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
-        write_attributes(file.create_group("memory"), solution.memory)
-        write_texts(file, "warnings", solution.warnings)
+        file.create_group("memory").attrs.update(solution.memory)
+        write_table(file, {"warnings": list(solution.warnings)})
 
 
 def read_result(path: str | Path) -> Solution:
     """Read a solution from a result file.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    Solution
 
     Raises
     ------
     ResultFileError
         If the file is not a complete bemkit result of a known version.
     """
-    with opened(Path(path)) as reader:
-        _check_version(reader)
+    with FORMAT.opened(path) as reader:
         try:
             scene = scene_from_toml(reader.text("scene", MAX_BYTES), name="scene inside")
         except SceneError as error:
@@ -146,47 +123,10 @@ def read_result(path: str | Path) -> Solution:
     return solution
 
 
-def provenance() -> dict[str, str]:
-    """Return the versions and the platform that a result depends on, and the time; no names of people or folders."""
-    return {
-        "bemkit": __version__,
-        "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "scipy", "h5py")},
-        "platform": f"{platform.system()} {platform.machine()}",
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
-
-
-def _is_result(path: Path) -> bool:
-    try:
-        with opened(path) as reader:
-            _check_version(reader)
-    except ResultFileError:
-        return False
-    return True
-
-
-def _check_version(reader: Reader) -> None:
-    marks = reader.attributes("/")
-    if marks.get("format") != FORMAT:
-        raise reader.error("an HDF5 file, but not a bemkit result: give a file written by 'bemkit run -o'")
-    version = marks.get("schema_version")
-    if version != SCHEMA_VERSION:
-        raise reader.error(
-            f"has layout version {version}, this bemkit {__version__} reads version {SCHEMA_VERSION}: "
-            "use the bemkit that wrote it, or run its scene again"
-        )
-
-
-def _summary(solution: Solution) -> dict[str, Any]:
-    numbers = {name: getattr(solution, name) for name in (*_COUNTS, *_FORCES)}
-    return {"status": solution.status.name, "message": solution.message, **numbers}
-
-
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
     lines = {} if mesh.symmetry is None else {"symmetry_x": mesh.symmetry.x, "symmetry_y": mesh.symmetry.y}
     lines = {name: place for name, place in lines.items() if place is not None}
-    write_attributes(group, {"is_exterior": int(mesh.is_exterior), **lines})
+    group.attrs.update({"is_exterior": int(mesh.is_exterior), **lines})
     group["nodes"] = mesh.nodes
     group["elements"] = mesh.elements.astype(np.int64)
     if mesh.element_curve is not None and mesh.element_span is not None:
@@ -218,7 +158,9 @@ def _read_mesh(reader: Reader, scene: Scene) -> BoundaryMesh:
 
 
 def _read_solution(reader: Reader, scene: Scene) -> Solution:
-    summary = reader.attributes("summary")
+    summary, certificate = reader.attributes("summary"), reader.attributes("certificate")
+    numbers: dict[str, Any] = {name: int(summary[name]) for name in _COUNTS}
+    numbers |= {name: float(summary[name]) for name in _FORCES}
     mesh = _read_mesh(reader, scene)
     columns = reader.table("contact", texts=("part",), floats=_NUMBERS, integers=("status",))
     boundary = BoundaryFields(**{name: reader.floats(f"boundary/{name}") for name in _BOUNDARY})
@@ -228,15 +170,11 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
         scene=scene,
         mesh=mesh,
         status=Status[str(summary["status"])],
-        certificate=Certificate(**_numbers(reader, "certificate", CERTIFICATE_ENTRIES)),
+        certificate=Certificate(**{name: float(certificate[name]) for name in CERTIFICATE_ENTRIES}),
         contact=ContactTable(**{**columns, "part": tuple(columns["part"])}),
         boundary=boundary,
         history=_read_history(reader),
-        linear_solves=int(summary["linear_solves"]),
-        outer_steps=int(summary["outer_steps"]),
-        force_normal=float(summary["force_normal"]),
-        force_tangential=float(summary["force_tangential"]),
-        energy=float(summary["energy"]),
+        **numbers,
         transitions=_read_transitions(reader),
         timings={name: float(value) for name, value in reader.attributes("timings").items()},
         plan=structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
@@ -247,38 +185,13 @@ def _read_solution(reader: Reader, scene: Scene) -> Solution:
     )
 
 
-def _numbers(reader: Reader, group: str, names: Sequence[str]) -> dict[str, float]:
-    attributes = reader.attributes(group)
-    return {name: float(attributes[name]) for name in names}
-
-
-def _transition_columns(transitions: Sequence[Transition]) -> dict[str, Any]:
-    rows = [transition.as_dict() for transition in transitions]
-    texts = {name: [str(row[name]) for row in rows] for name in ("part", "from", "to")}
-    return texts | {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
-
-
 def _read_transitions(reader: Reader) -> tuple[Transition, ...]:
-    columns = reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s"))
-    return tuple(
-        Transition(row["part"], float(row["x"]), float(row["y"]), float(row["s"]), row["from"], row["to"])
-        for row in _rows(columns)
-    )
+    rows = rows_of(reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s")))
+    return tuple(Transition(row["part"], row["x"], row["y"], row["s"], row["from"], row["to"]) for row in rows)
 
 
 def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
     floats = ("relative_change", *CERTIFICATE_ENTRIES)
-    columns = reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS)
-    return tuple(
-        StepRecord(
-            **{name: int(row[name]) for name in RECORD_COUNTS},
-            certificate=Certificate(**{name: float(row[name]) for name in CERTIFICATE_ENTRIES}),
-            relative_change=float(row["relative_change"]),
-            message=row["message"],
-        )
-        for row in _rows(columns)
-    )
-
-
-def _rows(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
-    return [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    rows = rows_of(reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS))
+    certificates = [Certificate(**{name: row.pop(name) for name in CERTIFICATE_ENTRIES}) for row in rows]
+    return tuple(StepRecord(**row, certificate=each) for row, each in zip(rows, certificates, strict=True))

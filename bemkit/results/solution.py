@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +20,13 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
-from bemkit.results.coefficient_decay import CoefficientErrors, coefficient_errors
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.error_indicators import contact_errors, place_errors, squared_errors
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
+
+if TYPE_CHECKING:
+    from bemkit.results.coefficient_decay import CoefficientErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +142,8 @@ class Solution:
         space, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
         if not discretisation.estimates_error or space.degree <= 2:
             return None
+        from bemkit.results.coefficient_decay import coefficient_errors
+
         at_nodes = self.boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
         modulus = self.scene.material.plane_modulus
         return coefficient_errors(space, tractions, self.boundary.displacement, at_nodes, modulus)
@@ -153,6 +156,8 @@ class Solution:
         discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
         if not discretisation.estimates_error:
             return None
+        from bemkit.results.error_indicators import squared_errors
+
         make_space = discretisation.displacement_space
         return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
 
@@ -178,6 +183,8 @@ class Solution:
         """
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
+        from bemkit.results.error_indicators import contact_errors, place_errors
+
         if self.coefficient_errors is None:
             degree = self.scene.discretisation.displacement_space(self.mesh).degree
             squared = float(contact_errors(self.contact, degree).sum())
@@ -232,13 +239,11 @@ class Solution:
             "warnings": list(self.warnings),
             "n_elements": self.mesh.n_elements,
             "n_contact": self.contact.n_contact,
-            "linear_solves": self.linear_solves,
-            "outer_steps": self.outer_steps,
-            "force_normal": self.force_normal,
-            "force_tangential": self.force_tangential,
-            "energy": self.energy,
-            "estimated_error": self.estimated_error,
-            "estimated_traction_error": self.estimated_traction_error,
+            **{name: getattr(self, name) for name in ("linear_solves", "outer_steps", "force_normal")},
+            **{
+                name: getattr(self, name)
+                for name in ("force_tangential", "energy", "estimated_error", "estimated_traction_error")
+            },
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
@@ -250,15 +255,9 @@ class Solution:
 
 
 def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence[str]) -> Solution:
-    """Return a solution with the steps, linear solves, times and memory of all that led to it.
+    """Return a solution with the steps, linear solves, times and memory of all that led to it, in their order.
 
-    Parameters
-    ----------
-    result : Solution
-    solutions : sequence of Solution
-        All of them, in the order in which they were solved.
-    names : sequence of str
-        What each of them is, for the remarks of its steps: "load step 1 of 3".
+    The names say what each of them is, for the remarks of its steps: "load step 1 of 3".
     """
     records: list[StepRecord] = []
     for name, solution in zip(names, solutions, strict=True):

@@ -47,20 +47,11 @@ def to_csv(solution: Solution, table: str) -> str:
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     columns = _columns(solution, table)
-    return csv_text(columns, zip(*(_plain(column) for column in columns.values()), strict=True))
+    return csv_text(columns, zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
 
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
-    """Return the convergence history as columns, the certificate's entries among them.
-
-    Parameters
-    ----------
-    history : sequence of StepRecord
-
-    Returns
-    -------
-    dict of str to array or list of str
-    """
+    """Return the convergence history as columns, the certificate's entries among them."""
     columns: dict[str, Any] = {
         name: np.array([getattr(record, name) for record in history], dtype=np.int64) for name in RECORD_COUNTS
     }
@@ -77,17 +68,7 @@ def to_json(solution: Solution) -> str:
 
 
 def element_displacement(solution: Solution) -> FloatArray:
-    """Return the displacement at the element centres.
-
-    Parameters
-    ----------
-    solution : Solution
-
-    Returns
-    -------
-    (n_elements, 2) array [m]
-        Given there directly, or interpolated.
-    """
+    """Return the displacement at the element centres, (n_elements, 2) array [m], interpolated if need be."""
     space = solution.scene.discretisation.displacement_space(solution.mesh)
     at_centre = space.basis(np.zeros(1))[:, 0]
     return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))
@@ -124,11 +105,6 @@ def _boundary_columns(solution: Solution) -> dict[str, Any]:
         "t_x": traction[:, 0],
         "t_y": traction[:, 1],
     }
-
-
-def _plain(column: Any) -> list[Any]:
-    values: list[Any] = column.tolist() if isinstance(column, np.ndarray) else list(column)
-    return values
 
 
 def finite_only(value: Any) -> Any:

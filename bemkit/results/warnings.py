@@ -12,7 +12,6 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.contact_table import ContactTable, are_neighbours
-from bemkit.results.error_indicators import blind_elements
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
@@ -52,11 +51,16 @@ def _error(solution: Solution) -> Iterator[str]:
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
     elif error > LARGEST_ERROR:
         yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
-    if (share := _share_alone(solution.mesh)) > LARGEST_SHARE_ALONE:
+    # elements without a neighbour on their piece: their strains meet no others
+    whole = solution.mesh.whole
+    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
+    if (share := whole.lengths[is_alone].sum() / whole.lengths.sum()) > LARGEST_SHARE_ALONE:
         yield (
             f"On {100.0 * share:.0f} % of the boundary single elements stand between corners and ends of parts, where "
             "no error can be estimated: use more elements."
         )
+    from bemkit.results.error_indicators import blind_elements
+
     is_blind = blind_elements(solution.mesh, discretisation.traction_space(solution.mesh).degree)
     for part in solution.scene.parts:
         elements = solution.mesh.part(part.name)
@@ -66,13 +70,6 @@ def _error(solution: Solution) -> Iterator[str]:
                 f"Part {part.name!r} has {count}, too few to estimate the error of its reactions: "
                 "use more elements there."
             )
-
-
-def _share_alone(mesh: BoundaryMesh) -> float:
-    """Return the share of the boundary on elements without a neighbour on their piece, whose strains meet no others."""
-    whole = mesh.whole
-    is_alone = break_nodes(whole)[whole.elements].all(axis=1)
-    return float(whole.lengths[is_alone].sum() / whole.lengths.sum())
 
 
 def _turned(solution: Solution) -> Iterator[str]:

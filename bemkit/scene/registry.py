@@ -77,6 +77,13 @@ class Registry:
         hint = f"register it under the entry-point group '{self.group}'" if self.group else "use a built-in one"
         raise InputError(f"the {self.role} {type(value).__name__} has no name in scene files: {hint}")
 
+    def word_of(self, value: object) -> str:
+        """Return the kind of a value, or the name of its class if that has no name in scene files."""
+        try:
+            return self.kind_of(value)
+        except InputError:
+            return type(value).__name__
+
     def _installed(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=self.group)} if self.group else {}
 

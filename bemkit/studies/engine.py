@@ -8,20 +8,15 @@ import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from contextlib import ExitStack
+from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
-from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Generic, NamedTuple
+from typing import Generic, NamedTuple
 
 from bemkit.errors import BemkitError, InputError
-from bemkit.results.outputs import TextFile, check_figures, write_figures
-from bemkit.results.record_file import R, RecordFile
+from bemkit.results.record_file import R
 from bemkit.results.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 REFUSED = "refused"
 """Status of a scene that is refused by a named error before any step."""
@@ -61,97 +56,14 @@ def attempt(solve: Callable[[], Solution]) -> Attempt:
 
 @dataclass(frozen=True)
 class Task(Generic[R]):
-    """One record to compute.
+    """One record to compute: its key, a label for the progress bar, and what computes it.
 
-    Parameters
-    ----------
-    key : hashable
-        That of the record.
-    label : str
-        For the progress bar.
-    compute : callable () -> record
-        To be sent to another process it must be picklable.
+    To be sent to another process that must be picklable.
     """
 
     key: Hashable
     label: str
     compute: Callable[[], R]
-
-
-@dataclass(frozen=True)
-class StudyOutputs(Generic[R]):
-    """Where the records of a study go; each may be left out.
-
-    Parameters
-    ----------
-    file : RecordFile
-    path : str or None
-        File that is complete after every record.
-    texts : tuple of TextFile
-        Tables of all records.
-    folder : str or None
-        For figures.
-    figures : callable (records) -> mapping of str to Figure
-        By file names without ``.png``.
-    figure : str
-        Name of one of them.
-    dots_per_inch : int
-    """
-
-    file: RecordFile[R]
-    path: str | None = None
-    texts: tuple[TextFile[Sequence[R]], ...] = ()
-    folder: str | None = None
-    figures: Callable[[Sequence[R]], Mapping[str, Figure]] = field(default=lambda records: {})
-    figure: str = ""
-    dots_per_inch: int = 150
-
-    def check(self) -> list[Path]:
-        """Find out, before any work is done, whether everything can be written.
-
-        Returns
-        -------
-        list of Path
-            The file of records, to be reserved.
-
-        Raises
-        ------
-        OutputFileError, ResultFileError
-        """
-        if self.path is not None and Path(self.path).is_file():
-            self.file.read(self.path)  # says more about a broken file than that it stands in the way
-        target = [] if self.path is None else [self.file.check_target(self.path)]
-        for text in self.texts:
-            text.check()
-        if self.folder is not None:
-            check_figures(Path(self.folder), self.figure)
-        return target
-
-    def finished(self, labels: Mapping[str, str]) -> dict[Hashable, R]:
-        """Return the records that an earlier study under the same labels has left in the file, by their keys.
-
-        Raises
-        ------
-        ResultFileError
-            If the file belongs to another study.
-        """
-        return {} if self.path is None else self.file.finished(self.path, labels)
-
-    def keep(self, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]) -> Iterator[R]:
-        """Hand records on after those that are new were added to the finished ones and written to the file."""
-        for record in records:
-            if record.key not in finished:
-                finished[record.key] = record
-                if self.path is not None:
-                    self.file.write(self.path, labels, list(finished.values()))
-            yield record
-
-    def write(self, records: Sequence[R]) -> None:
-        """Write tables and figures of all records."""
-        for text in self.texts:
-            text.write(records)
-        if self.folder is not None:
-            write_figures(self.figures(records), Path(self.folder), self.dots_per_inch)
 
 
 def compute(
@@ -167,8 +79,7 @@ def compute(
     ----------
     tasks : sequence of Task
     executor : Executor, optional
-        For example a `ProcessPoolExecutor`, or the executor of a `distributed` client; without one the tasks are
-        computed here, one after the other.
+        Such as a `ProcessPoolExecutor` or that of a `distributed` client; by default tasks are computed here, in turn.
     finished : mapping of keys to records, optional
         Of an earlier study; they are handed on instead of computed again.
     begins : callable, optional
@@ -205,22 +116,18 @@ def compute_with_progress(
 ) -> Iterator[R]:
     """Compute records as `compute` does, here or in several processes, while a bar on standard error shows how far.
 
-    Parameters
-    ----------
-    tasks : sequence of Task
-    name : str
-        Of the study, at the bar.
-    is_live : bool
-        Whether the bar is shown.
-    processes : int
-    finished : mapping of keys to records, optional
+    The bar bears a name, and is shown only if it is live.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with ExitStack() as stack:
-        executor = stack.enter_context(worker_processes(processes)) if processes > 1 else None
+        executor = None
+        if processes > 1:
+            # spawned processes do not inherit threads that hold locks
+            executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
+            stack.callback(executor.shutdown, cancel_futures=True)  # what has not begun is left out
         bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=not is_live)
         row = stack.enter_context(bar).add_task(name, total=len(tasks))
         for record in compute(
@@ -228,20 +135,6 @@ def compute_with_progress(
         ):
             bar.advance(row)
             yield record
-
-
-@contextmanager
-def worker_processes(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Give an executor of several processes; what has not begun when the ``with`` statement ends is left out.
-
-    The processes end at once when the one that started them ends, however that is killed, and on Ctrl-C.
-    """
-    # spawned processes do not inherit threads that hold locks
-    executor = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_prepare_process)
-    try:
-        yield executor
-    finally:
-        executor.shutdown(cancel_futures=True)
 
 
 def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterator[R]:
@@ -267,6 +160,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterato
 
 
 def _prepare_process() -> None:
+    """Let a worker end at once on Ctrl-C, and when the process that started it ends, however that is killed."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     Thread(target=_end_after_parent, daemon=True).start()
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,8 @@ from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.outputs import csv_text, plain_table, stdout_console
-from bemkit.scene.scene import ConstantCollocation, MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation
+from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
@@ -92,31 +93,11 @@ class PaperTable:
         """Printed outer steps, outer steps and linear solves."""
         return self.printed, self.outer_steps, self.linear_solves
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the table as JSON can hold it."""
-        return {
-            "table": self.number,
-            "rho": list(RHO),
-            "printed": self.printed.tolist(),
-            "outer_steps": self.outer_steps.tolist(),
-            "linear_solves": self.linear_solves.tolist(),
-            "newton_solves": self.newton_solves,
-        }
-
 
 def paper_tables(
     run: Callable[[Sequence[Task[PaperCell]]], Iterable[PaperCell]] = compute,
 ) -> tuple[PaperTable, PaperTable]:
-    """Compute both tables; about a second.
-
-    Parameters
-    ----------
-    run : callable, optional
-        Computes the 50 cells here, such as `bemkit.studies.engine.compute_with_progress`.
-
-    Returns
-    -------
-    tuple of two PaperTable
+    """Compute both tables, about a second; their 50 cells by `compute` or `compute_with_progress` of the engine.
 
     Raises
     ------
@@ -126,7 +107,15 @@ def paper_tables(
     # for systems this small a second thread of BLAS only gets in the way
     with blas_threads_for(_N_ELEMENTS // 2):
         models = {number: paper_model(number) for number in (1, 2)}
-        cells = list(run([_task(*key, models[key[0]]) for key in product((1, 2), range(len(RHO)), range(len(RHO)))]))
+        tasks = [
+            Task(
+                (number, i, j),
+                f"Table {number}, rho_1 = {RHO[i]:.0e}, rho_2 = {RHO[j]:.0e}",
+                partial(_cell, number, i, j, models[number]),
+            )
+            for number, i, j in product((1, 2), range(len(RHO)), range(len(RHO)))
+        ]
+        cells = list(run(tasks))
         return _table(1, models[1], cells), _table(2, models[2], cells)
 
 
@@ -146,7 +135,16 @@ def paper_model(number: int) -> Model:
 
 def to_json(tables: Sequence[PaperTable]) -> str:
     """Return the tables as one JSON object."""
-    return json.dumps({"tables": [table.as_dict() for table in tables]}, indent=2) + "\n"
+    contents = [
+        {
+            "table": table.number,
+            "rho": RHO,
+            **{name: getattr(table, name).tolist() for name in ("printed", "outer_steps", "linear_solves")},
+            "newton_solves": table.newton_solves,
+        }
+        for table in tables
+    ]
+    return json.dumps({"tables": contents}, indent=2) + "\n"
 
 
 def to_csv(tables: Sequence[PaperTable]) -> str:
@@ -175,11 +173,6 @@ def print_paper_tables(tables: Sequence[PaperTable]) -> None:
         console.print(f"semismooth Newton on the same problem: {table.newton_solves} linear solves for every rho\n")
 
 
-def _task(number: int, i: int, j: int, model: Model) -> Task[PaperCell]:
-    label = f"Table {number}, rho_1 = {RHO[i]:.0e}, rho_2 = {RHO[j]:.0e}"
-    return Task((number, i, j), label, partial(_cell, number, i, j, model))
-
-
 def _cell(number: int, i: int, j: int, model: Model) -> PaperCell:
     # from rho * E / (1 unit of length) to units of E'/L
     unit = model.scene.material.youngs_modulus / model.units.modulus * model.units.length
@@ -201,7 +194,11 @@ def _table(number: int, model: Model, cells: Sequence[PaperCell]) -> PaperTable:
 
 def _outer_steps(problem: ContactProblem, driver: AugmentedLagrangian) -> tuple[int, int]:
     """Return outer steps and linear solves until the paper's criterion is met."""
-    iterate = driver.init(problem, _zero_multipliers(problem))
+    # The start has no tractions, and all its nodes overlap a little, so that they begin in contact: otherwise the first
+    # active set would be empty and the floating body of Example 1 would not be held.
+    _, length = certificate_scales(problem, problem.sticking_state)
+    overlap = np.stack([np.maximum(problem.gap, 0.0) + length, problem.slip_origin], axis=1)
+    iterate = driver.init(problem, ContactState(overlap, np.zeros_like(overlap)))
     for step in range(1, driver.max_steps + 1):
         previous = iterate.state.displacement
         iterate = driver.step(problem, iterate)
@@ -212,13 +209,3 @@ def _outer_steps(problem: ContactProblem, driver: AugmentedLagrangian) -> tuple[
         if step > 1 and change <= _PAPER_TOLERANCE * float(np.abs(displacement).max()):
             return step, iterate.linear_solves
     raise PaperTableError(f"not stopped after {driver.max_steps} outer steps")
-
-
-def _zero_multipliers(problem: ContactProblem) -> ContactState:
-    """Return a start without tractions whose nodes all overlap a little, so that they begin in contact.
-
-    Without the overlap the first active set would be empty and the floating body of Example 1 would not be held.
-    """
-    _, length = certificate_scales(problem, problem.sticking_state)
-    overlap = np.stack([np.maximum(problem.gap, 0.0) + length, problem.slip_origin], axis=1)
-    return ContactState(overlap, np.zeros_like(overlap))

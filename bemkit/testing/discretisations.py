@@ -19,7 +19,8 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, Roller, Traction
 from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.scene import MeshOptions, Scene
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.testing.failure import demand
 from bemkit.testing.spaces import check_space
 
@@ -32,10 +33,6 @@ _COARSE = 0.05
 
 def check_discretisation(discretisation: Discretisation) -> None:
     """Check everything that `Discretisation` promises, by running small scenes; call it on your own discretisation.
-
-    Parameters
-    ----------
-    discretisation : Discretisation
 
     Raises
     ------

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
 from bemkit.errors import BemkitError
 
 
@@ -13,3 +18,16 @@ def demand(is_kept: bool, message: str) -> None:
     """Raise `CheckFailed` with the message unless a promise is kept."""
     if not is_kept:
         raise CheckFailed(message)
+
+
+def evaluated(label: str, method: Callable[[FloatArray], FloatArray], places: FloatArray, shape: object) -> FloatArray:
+    """Return what a function says at some places, after demands that every function of places has to meet."""
+    given = places.copy()
+    values = method(places)
+    demand(np.array_equal(places, given), f"{label} changes its argument")
+    demand(
+        np.shape(values) == shape, f"{label} returns the shape {np.shape(values)} for {places.size} points, not {shape}"
+    )
+    demand(bool(np.isfinite(values).all()), f"{label} is not finite at {places}")
+    demand(np.array_equal(values, method(places)), f"{label} gives two answers to one question")
+    return values

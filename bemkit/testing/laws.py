@@ -4,7 +4,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.testing.failure import CheckFailed, demand
+from bemkit.testing.failure import CheckFailed, demand, evaluated
 
 
 def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5, seed: int = 0) -> None:
@@ -30,9 +30,10 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
     for _ in range(20):
         sigma_n = -stress_scale * 10.0 ** random.uniform(-3.0, 3.0, n_contact)
         _check_values(law, name, sigma_n)
-        _check_monotony(law, name, sigma_n)
         _check_derivative(law, name, sigma_n)
-        _check_locality(law, name, sigma_n)
+        other = np.concatenate([sigma_n[:1], 3.0 * sigma_n[1:]])
+        is_local = law.bound(other)[0] == law.bound(sigma_n)[0]
+        demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
         _check_scaling(law, name, sigma_n)
     _check_values(law, name, np.zeros(n_contact))
     acts = np.asarray(law.acts_across_gap)
@@ -40,23 +41,13 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
 
 
 def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
-    given = sigma_n.copy()
-    for method in (law.bound, law.bound_derivative):
-        values = method(sigma_n)
-        label = f"{name}.{method.__name__}"
-        demand(np.shape(values) == sigma_n.shape, f"{label} returns the shape {np.shape(values)} for {sigma_n.shape}")
-        demand(bool(np.isfinite(values).all()), f"{label} is not finite at sigma_n = {sigma_n}")
-        demand(np.array_equal(sigma_n, given), f"{label} changes its argument")
-        demand(np.array_equal(values, method(sigma_n)), f"{label} gives two answers to one question")
-    demand(bool((law.bound(sigma_n) >= 0.0).all()), f"{name}.bound is negative at sigma_n = {sigma_n}")
-    demand(bool((law.bound_derivative(sigma_n) <= 0.0).all()), f"{name}.bound_derivative is positive at {sigma_n}")
-    is_zero = not law.bound(sigma_n).any()
-    demand(is_zero or not law.is_frictionless, f"{name} says it is frictionless and has a bound at {sigma_n}")
-
-
-def _check_monotony(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
-    less, more = law.bound(sigma_n), law.bound(2.0 * sigma_n)
-    demand(bool((more >= less).all()), f"{name}.bound falls when the pressure grows from {-sigma_n} to twice that")
+    bound = evaluated(f"{name}.bound", law.bound, sigma_n, sigma_n.shape)
+    derivative = evaluated(f"{name}.bound_derivative", law.bound_derivative, sigma_n, sigma_n.shape)
+    demand(bool((bound >= 0.0).all()), f"{name}.bound is negative at sigma_n = {sigma_n}")
+    demand(bool((derivative <= 0.0).all()), f"{name}.bound_derivative is positive at {sigma_n}")
+    demand(not (law.is_frictionless and bound.any()), f"{name} says it is frictionless and has a bound at {sigma_n}")
+    grows = law.bound(2.0 * sigma_n) >= bound
+    demand(bool(grows.all()), f"{name}.bound falls when the pressure grows from {-sigma_n} to twice that")
 
 
 def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
@@ -76,13 +67,6 @@ def _check_derivative(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
             f"{name}.bound_derivative is {derivative[node]:g} at node {node}, sigma_n = {sigma_n[node]:g}; "
             f"differences of bound give {before[node]:g} and {after[node]:g}"
         )
-
-
-def _check_locality(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:
-    other = sigma_n.copy()
-    other[1:] *= 3.0
-    is_local = law.bound(other)[0] == law.bound(sigma_n)[0]
-    demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
 
 
 def _check_scaling(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.laws import Coulomb, Frictionless, Tresca
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, DenseBody
 
 
@@ -29,103 +30,79 @@ class KnownProblem:
     solutions: tuple[FloatArray, ...]
 
 
-def _one_node(stiffness: FloatArray, load: FloatArray, friction: float, gap: float = 0.0) -> ContactProblem:
-    body = DenseBody(np.asarray(stiffness, dtype=float), np.asarray(load, dtype=float), np.ones(1))
-    return ContactProblem(body, np.array([gap]), Coulomb(friction))
+def _known(
+    stiffness: npt.ArrayLike,
+    load: Sequence[float],
+    law: FrictionLaw,
+    *solutions: npt.ArrayLike,
+    gap: float = 0.0,
+    slip_origin: float = 0.0,
+    weight: float = 1.0,
+    motions: npt.ArrayLike = (),
+) -> Callable[[], KnownProblem]:
+    """Return what makes a problem; gap, origin of slip and weight are those of every node."""
+
+    def make() -> KnownProblem:
+        n_contact = len(load) // 2
+        modes = np.array(motions, dtype=float).reshape(-1, n_contact, 2)
+        body = DenseBody(np.array(stiffness, dtype=float), np.array(load), np.full(n_contact, weight), modes)
+        problem = ContactProblem(body, np.full(n_contact, gap), law, np.full(n_contact, slip_origin))
+        return KnownProblem(problem, tuple(np.array(solution, dtype=float) for solution in solutions))
+
+    return make
 
 
-def _states(*pairs: tuple[tuple[float, float], tuple[float, float]]) -> tuple[FloatArray, ...]:
-    """Return one-node states from pairs of displacement (n, t) and traction (n, t)."""
-    return tuple(np.array([pair]) for pair in pairs)
-
-
-def three_solutions() -> KnownProblem:
-    """Return one node with coupled stiffness and s = 3: it may stick, slip or open."""
-    problem = _one_node(np.array([[1.0, 0.5], [0.5, 1.0]]), np.array([1.0, 2.5]), 3.0)
-    states = _states(((0.0, 0.0), (-1.0, -2.5)), ((0.0, 1.0), (-0.5, -1.5)), ((-1.0 / 3.0, 8.0 / 3.0), (0.0, 0.0)))
-    return KnownProblem(problem, states)
-
-
-def nothing_to_do() -> KnownProblem:
-    """Return three nodes without load or gap, which stay where they are."""
-    body = DenseBody(np.eye(6) + 0.1, np.zeros(6), np.ones(3))
-    return KnownProblem(ContactProblem(body, np.zeros(3), Coulomb(0.5)), (np.zeros((3, 2, 2)),))
-
-
-def overlap() -> KnownProblem:
-    """Return one node that is pressed back from an obstacle inside the body, without any load."""
-    return KnownProblem(_one_node(np.eye(2), np.zeros(2), 0.5, gap=-0.3), _states(((-0.3, 0.0), (-0.3, 0.0))))
-
-
-def out_of_reach() -> KnownProblem:
-    """Return one node that is pulled away and pushed sideways, and carries nothing."""
-    return KnownProblem(_one_node(np.eye(2), np.array([-1.0, 0.4]), 0.5), _states(((-1.0, 0.4), (0.0, 0.0))))
-
-
-def tie() -> KnownProblem:
-    """Return one node that is pulled by exactly as much as friction can hold."""
-    return KnownProblem(_one_node(np.eye(2), np.array([2.0, 1.0]), 0.5), _states(((0.0, 0.0), (-2.0, -1.0))))
-
-
-def slide_backward() -> KnownProblem:
-    """Return one node that slips against the tangent."""
-    return KnownProblem(_one_node(np.eye(2), np.array([2.0, -3.0]), 0.5), _states(((0.0, -2.0), (-2.0, 1.0))))
-
-
-def incremental() -> KnownProblem:
-    """Return the same node with its slip counted from -2.5: it stays there, pushed back, below the bound."""
-    problem = _one_node(np.eye(2), np.array([2.0, -3.0]), 0.5)
-    moved = ContactProblem(problem.body, problem.gap, problem.law, np.array([-2.5]))
-    return KnownProblem(moved, _states(((0.0, -2.5), (-2.0, 0.5))))
-
-
-def smooth_floor() -> KnownProblem:
-    """Return two nodes without friction, one pressed and one lifted."""
-    body = DenseBody(np.diag([2.0, 1.0, 2.0, 1.0]), np.array([3.0, 0.2, -1.0, 0.1]), np.array([0.5, 0.5]))
-    state = np.array([[[0.0, 0.2], [-6.0, 0.0]], [[-0.5, 0.1], [0.0, 0.0]]])
-    return KnownProblem(ContactProblem(body, np.zeros(2), Frictionless()), (state,))
-
-
-def given_friction() -> KnownProblem:
-    """Return Tresca's law, which acts on an open node too."""
-    body = DenseBody(np.eye(4), np.array([-1.0, 0.2, -1.0, 2.0]), np.ones(2))
-    state = np.array([[[-1.0, 0.0], [0.0, -0.2]], [[-1.0, 1.5], [0.0, -0.5]]])
-    return KnownProblem(ContactProblem(body, np.zeros(2), Tresca(0.5)), (state,))
-
-
-def _floating_problem(direction: float) -> ContactProblem:
-    spring = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    stiffness = np.zeros((4, 4))
-    stiffness[0::2, 0::2], stiffness[1::2, 1::2] = spring, np.eye(2)
-    load = direction * np.array([1.0, 0.1, 2.0, 0.1])
-    body = DenseBody(stiffness, load, np.ones(2), np.array([[[1.0, 0.0], [1.0, 0.0]]]))
-    return ContactProblem(body, np.zeros(2), Coulomb(0.3))
-
-
-def floating() -> KnownProblem:
-    """Return two nodes of a body that only contact holds against vertical motion."""
-    state = np.array([[[0.0, 0.0], [-1.0, -0.1]], [[0.0, 0.0], [-2.0, -0.1]]])
-    return KnownProblem(_floating_problem(1.0), (state,))
-
-
-def lifted() -> KnownProblem:
-    """Return the same body pulled off: there is no solution, and a driver must not find one."""
-    return KnownProblem(_floating_problem(-1.0), ())
-
+_SPRING = ((1.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+"""Two nodes that a spring holds against each other, and the ground against tangential motion."""
 
 KNOWN_PROBLEMS: Mapping[str, Callable[[], KnownProblem]] = MappingProxyType(
     {
-        "three solutions": three_solutions,
-        "nothing to do": nothing_to_do,
-        "overlap": overlap,
-        "out of reach": out_of_reach,
-        "tie": tie,
-        "slide backward": slide_backward,
-        "incremental": incremental,
-        "smooth floor": smooth_floor,
-        "given friction": given_friction,
-        "floating": floating,
-        "lifted": lifted,
+        # one node with coupled stiffness, which may stick, slip or open
+        "three solutions": _known(
+            ((1.0, 0.5), (0.5, 1.0)),
+            (1.0, 2.5),
+            Coulomb(3.0),
+            [[(0.0, 0.0), (-1.0, -2.5)]],
+            [[(0.0, 1.0), (-0.5, -1.5)]],
+            [[(-1.0 / 3.0, 8.0 / 3.0), (0.0, 0.0)]],
+        ),
+        # three nodes without load or gap, which stay where they are
+        "nothing to do": _known(np.eye(6) + 0.1, (0.0,) * 6, Coulomb(0.5), np.zeros((3, 2, 2))),
+        # one node that is pressed back from an obstacle inside the body, without any load
+        "overlap": _known(np.eye(2), (0.0, 0.0), Coulomb(0.5), [[(-0.3, 0.0), (-0.3, 0.0)]], gap=-0.3),
+        # one node that is pulled away and pushed sideways, and carries nothing
+        "out of reach": _known(np.eye(2), (-1.0, 0.4), Coulomb(0.5), [[(-1.0, 0.4), (0.0, 0.0)]]),
+        # one node that is pulled by exactly as much as friction can hold
+        "tie": _known(np.eye(2), (2.0, 1.0), Coulomb(0.5), [[(0.0, 0.0), (-2.0, -1.0)]]),
+        # one node that slips against the tangent
+        "slide backward": _known(np.eye(2), (2.0, -3.0), Coulomb(0.5), [[(0.0, -2.0), (-2.0, 1.0)]]),
+        # the same node with its slip counted from -2.5: it stays there, pushed back, below the bound
+        "incremental": _known(np.eye(2), (2.0, -3.0), Coulomb(0.5), [[(0.0, -2.5), (-2.0, 0.5)]], slip_origin=-2.5),
+        # two nodes without friction, one pressed and one lifted
+        "smooth floor": _known(
+            np.diag((2.0, 1.0, 2.0, 1.0)),
+            (3.0, 0.2, -1.0, 0.1),
+            Frictionless(),
+            [[(0.0, 0.2), (-6.0, 0.0)], [(-0.5, 0.1), (0.0, 0.0)]],
+            weight=0.5,
+        ),
+        # Tresca's law, which acts on an open node too
+        "given friction": _known(
+            np.eye(4),
+            (-1.0, 0.2, -1.0, 2.0),
+            Tresca(0.5),
+            [[(-1.0, 0.0), (0.0, -0.2)], [(-1.0, 1.5), (0.0, -0.5)]],
+        ),
+        # two nodes of a body that only contact holds against vertical motion
+        "floating": _known(
+            _SPRING,
+            (1.0, 0.1, 2.0, 0.1),
+            Coulomb(0.3),
+            [[(0.0, 0.0), (-1.0, -0.1)], [(0.0, 0.0), (-2.0, -0.1)]],
+            motions=((1.0, 0.0), (1.0, 0.0)),
+        ),
+        # the same body pulled off: there is no solution, and a driver must not find one
+        "lifted": _known(_SPRING, (-1.0, -0.1, -2.0, -0.1), Coulomb(0.3), motions=((1.0, 0.0), (1.0, 0.0))),
     }
 )
 """By name; each call makes a new problem."""

@@ -44,9 +44,13 @@ def check_solver(solver: ContactSolver, *, problems: Iterable[str] | None = None
             demand(not found.is_converged, f"{label} claims a solution where there is none")
             continue
         found = _solved(known, solver, label, tolerance)
-        _check_repetition(known, solver, label, tolerance, found)
-        _check_units(known, solver, label, tolerance, found)
-        _check_restart(known, solver, label, tolerance, found)
+        again = solve(known.problem, solver, throw=False, tolerance=tolerance)
+        is_same = np.array_equal(_as_array(again.state), _as_array(found.state)) and again.steps == found.steps
+        demand(is_same, f"{label} gives two answers to one question")
+        _check_units(known, solver, label, found, tolerance)
+        again = solve(known.problem, solver, start=found.state, throw=False, tolerance=tolerance)
+        ending = f"{again.steps} steps, {again.status.name}"
+        demand(again.is_converged and again.steps == 0, f"{label} leaves its own solution as a start ({ending})")
         _check_purity(known, solver, label)
 
 
@@ -62,18 +66,8 @@ def _solved(known: KnownProblem, solver: ContactSolver, label: str, tolerance: f
     return found
 
 
-def _check_repetition(
-    known: KnownProblem, solver: ContactSolver, label: str, tolerance: float, found: ContactSolution
-) -> None:
-    again = solve(known.problem, solver, throw=False, tolerance=tolerance)
-    demand(
-        np.array_equal(_as_array(again.state), _as_array(found.state)) and again.steps == found.steps,
-        f"{label} gives two answers to one question",
-    )
-
-
 def _check_units(
-    known: KnownProblem, solver: ContactSolver, label: str, tolerance: float, found: ContactSolution
+    known: KnownProblem, solver: ContactSolver, label: str, found: ContactSolution, tolerance: float
 ) -> None:
     """Measure lengths and forces in other units (powers of two, so that nothing is rounded)."""
     if any(getattr(solver, option, None) is not None for option in ("rho", "rho_n", "rho_t")):
@@ -96,16 +90,6 @@ def _in_units(problem: ContactProblem, length: float, stress: float) -> ContactP
     scaled = DenseBody(body.stiffness * stress / length, body.load * stress, body.weights, body.motions)
     law = problem.law.scaled(1.0 / stress)
     return ContactProblem(scaled, problem.gap * length, law, problem.slip_origin * length)
-
-
-def _check_restart(
-    known: KnownProblem, solver: ContactSolver, label: str, tolerance: float, found: ContactSolution
-) -> None:
-    again = solve(known.problem, solver, start=found.state, throw=False, tolerance=tolerance)
-    demand(
-        again.is_converged and again.steps == 0,
-        f"{label} leaves its own solution as a start ({again.steps} steps, {again.status.name})",
-    )
 
 
 def _check_purity(known: KnownProblem, solver: ContactSolver, label: str) -> None:

@@ -138,7 +138,7 @@ def test_the_command(
     assert call("--quiet") == 0
     assert capsys.readouterr() == ("", "")
     assert call("--csv", "-", "--json", "-") == 2
-    assert "both print to standard output" in capsys.readouterr().err
+    assert "two outputs go to the same place" in capsys.readouterr().err
     Path("mine.txt").write_text("not a table")
     assert call("--csv", "mine.txt") == 2
     assert Path("mine.txt").read_text() == "not a table"

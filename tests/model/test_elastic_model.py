@@ -28,7 +28,7 @@ from bemkit.runs.run import run_probe
 from bemkit.scene.scene import Discretisation, NoContactError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import StepRecord
-from bemkit.studies.stability.axes import all_axes
+from bemkit.studies.stability.axes import AXES
 from bemkit.studies.stability.sweep import StabilityError, sweep
 
 CURVATURE, NU, MODULUS = 2e-3, 0.3, 1000.0 / (1.0 - 0.3**2)
@@ -168,9 +168,9 @@ def test_scene_files_say_nothing_of_friction_and_drivers() -> None:
 def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Path) -> None:
     paths = save_figures(bent, tmp_path / "figures")
     assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png"]
-    from bemkit.results.boundary_figure import draw_boundary_traction
+    from bemkit.results.figures import Units, draw_boundary_traction
 
-    axes, strip = draw_boundary_traction(bent, length="mm", stress="MPa").axes
+    axes, strip = draw_boundary_traction(bent, units=Units("mm", "MPa")).axes
     drawn = {patch.get_label(): patch.get_data().values for patch in axes.patches}
     largest = np.abs(bent.boundary.traction).max()
     assert drawn["normal $t_n$"].max() == pytest.approx(largest, rel=1e-12)
@@ -187,7 +187,7 @@ def test_holes_follow_the_outer_boundary_in_the_figure() -> None:
         shape=bk.Ring(1.0, 2.0),
     )
     solution = bk.run(scene)
-    from bemkit.results.boundary_figure import draw_boundary_traction
+    from bemkit.results.figures import draw_boundary_traction
 
     axes, _ = draw_boundary_traction(solution).axes
     places = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] > 0]
@@ -299,7 +299,7 @@ def test_questions_about_contact_are_refused(bent: Solution) -> None:
     with pytest.raises(NoContactError, match="start is given, but no part is in contact"):
         bk.run(bending(), start=bent)
     with pytest.raises(StabilityError, match="the scene has no contact, which this suite is about"):
-        next(sweep(bending(), all_axes()))
+        next(sweep(bending(), AXES))
 
 
 def test_other_loads_need_no_other_matrices() -> None:

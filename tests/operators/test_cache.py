@@ -226,7 +226,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("bemkit.operators.cache.write_attributes", full)
+    monkeypatch.setattr("bemkit.operators.cache.write_table", full)
     with pytest.raises(OutputFileError, match="No space left"):
         cache.save(path, galerkin(mesh(20)))
     assert path.read_bytes() == before

@@ -119,7 +119,7 @@ def test_an_interrupt_while_writing_leaves_the_old_result(
     def interrupted(*arguments: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.results.result_file, "write_texts", interrupted)
+    monkeypatch.setattr(bemkit.results.result_file, "write_text", interrupted)
     with pytest.raises(error):
         write_result(file, dataclasses.replace(solution, message="never"))
     assert os.listdir(file.parent) == ["result.h5"]

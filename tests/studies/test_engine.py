@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from bemkit.hdf5 import ResultFileError
-from bemkit.results.outputs import TextFile
+from bemkit.hdf5 import FileFormat, ResultFileError
+from bemkit.results.outputs import Outputs, TextFile
 from bemkit.results.record_file import RecordFile
-from bemkit.studies.engine import StudyOutputs, Task, compute, compute_with_progress
+from bemkit.studies.engine import Task, compute, compute_with_progress
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class Square:
         return self.number
 
 
-FILE = RecordFile("bemkit-squares", 1, "bemkit squares", Square, ("title",))
+FORMAT = FileFormat("bemkit-squares", 1, "bemkit squares file", "bemkit squares -o")
+FILE = RecordFile(FORMAT, Square, ("title",))
 LABELS = {"title": "squares"}
 
 
@@ -63,25 +64,24 @@ def test_records_come_in_order_and_finished_ones_are_handed_on() -> None:
 
 def test_every_record_is_in_the_file_before_the_next_is_computed(tmp_path: Path) -> None:
     path = tmp_path / "squares.h5"
-    outputs = StudyOutputs(FILE, str(path))
-    assert outputs.check() == [path]
+    assert FILE.check(str(path)) == [path]
     with pytest.raises(ValueError, match="no such number"):
-        list(outputs.keep(compute(tasks(1, 2, -1, 3)), outputs.finished(LABELS), LABELS))
-    finished = outputs.finished(LABELS)
+        list(FILE.keep(path, compute(tasks(1, 2, -1, 3)), FILE.finished(path, LABELS), LABELS))
+    finished = FILE.finished(path, LABELS)
     assert list(finished.values()) == [Square(1, 1.0), Square(2, 4.0)]
     content = path.read_bytes()
-    assert list(outputs.keep(compute(tasks(2), finished=finished), finished, LABELS)) == [Square(2, 4.0)]
+    assert list(FILE.keep(path, compute(tasks(2), finished=finished), finished, LABELS)) == [Square(2, 4.0)]
     assert path.read_bytes() == content  # nothing new, nothing written
-    list(outputs.keep(compute(tasks(3), finished=finished), finished, LABELS))
+    list(FILE.keep(path, compute(tasks(3), finished=finished), finished, LABELS))
     assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3]
     with pytest.raises(ResultFileError, match="holds the sweep with title squares, not cubes: choose another name"):
-        outputs.finished({"title": "cubes"})
+        FILE.finished(path, {"title": "cubes"})
 
 
 def test_texts_are_written_only_where_they_are_wanted(tmp_path: Path) -> None:
     wanted, other = TextFile(str(tmp_path / "a.txt"), "text", "1", as_text), TextFile(None, "text", "1", as_text)
-    outputs = StudyOutputs(FILE, texts=(wanted, other))
-    assert outputs.check() == []
+    outputs = Outputs((wanted, other))
+    assert outputs.check() == [tmp_path / "a.txt"]
     outputs.write([square(1), square(2)])
     assert (tmp_path / "a.txt").read_text() == "1.0\n4.0\n"
 

@@ -8,20 +8,19 @@ from typing import Any, TypeVar, cast
 
 from bemkit.formulas import closest
 from bemkit.plan import make_plan
-from bemkit.reference.compare import over_resolved
+from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
-from bemkit.reference.values import MEASURES, Reference
+from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import QuadraticGalerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import scene_to_toml, with_overrides
 from bemkit.solvers.base import ContactSolver
-from bemkit.studies.accuracy.runs import AdaptiveMeshes, MeshSequence, Run, all_runs, graded, uniform
+from bemkit.studies.accuracy.runs import MeshSequence, Run, adaptive, all_runs, graded, uniform
 from bemkit.studies.engine import StudyError
 
 Number = TypeVar("Number", int, float)
 
-DEFAULT_MEASURES = "energy,sigma_n,displacement,transitions"
 SUGGESTED = 600
 """Elements of an over-resolved solution whose error is small against that of the default meshes."""
 _MESHES_TOGETHER = 1.3
@@ -32,18 +31,8 @@ _MESHES_TOGETHER = 1.3
 class StudyOptions:
     """What is asked of an error study; lists are words and numbers with commas between them.
 
-    Parameters
-    ----------
-    elements, accuracies, discretisation, meshes, solver : str
-        What is combined.
-    exponent : float
-        Of graded meshes.
-    most_elements : int
-        Limit of adaptive meshes.
-    over_resolve : int or None
-        Elements of the over-resolved solution, if that is to be the reference.
-    repeat : int or None
-        Timed repetitions, None if no times are measured.
+    The exponent is that of graded meshes, the most elements are those of adaptive ones. The reference is a fine
+    solution if its number of elements is given; no run times are measured without a number of repetitions.
     """
 
     elements: str
@@ -69,14 +58,15 @@ class StudyOptions:
         sequences: dict[str, MeshSequence] = {
             "uniform": uniform(elements),
             "graded": graded(elements, self.exponent),
-            "adaptive": AdaptiveMeshes(accuracies, self.most_elements),
+            "adaptive": adaptive(accuracies, self.most_elements),
         }
-        words = _words(self.discretisation, "discretisation")
+        words, drivers = _words(self.discretisation, "discretisation"), _words(self.solver, "solver")
         return all_runs(
             scene,
             [with_overrides(scene, discretisation=word).discretisation for word in words],
-            [sequences[word] for word in _known(_words(self.meshes, "meshes"), sequences, "meshes")],
-            [_solver(scene, word) for word in _words(self.solver, "solver")],
+            [sequences[word] for word in _known(self.meshes, "meshes", sequences)],
+            # the scene's own driver, with its options, if it has that word
+            [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, drivers)],
         )
 
     def labels(self, scene: Scene) -> dict[str, str]:
@@ -101,32 +91,26 @@ class StudyOptions:
         if self.over_resolve is not None:
             return over_resolved(scene, self.over_resolve)
         found = find_reference(scene)
-        if found is None:
-            raise StudyError(
-                "no closed form or reference solution belongs to this scene: add --over-resolve "
-                f"{SUGGESTED} to measure against a fine solution ({over_resolution_cost(scene)})"
-            )
-        return found
-
-
-def over_resolution_cost(scene: Scene, n_elements: int = SUGGESTED) -> str:
-    """Say what `bemkit.reference.over_resolved` takes, from the plan of its last mesh."""
-    options = MeshOptions(elements=n_elements, density=scene.mesh.density)
-    fine = replace(scene, discretisation=QuadraticGalerkin(), mesh=options)
-    plan = make_plan(fine, fine.build_mesh())
-    seconds = _MESHES_TOGETHER * plan.seconds
-    return f"{n_elements} elements, about {seconds:.1g} s and {plan.memory / 1e9:.1g} GB"
+        if found is not None:
+            return found
+        options = MeshOptions(elements=SUGGESTED, density=scene.mesh.density)
+        fine = replace(scene, discretisation=QuadraticGalerkin(), mesh=options)
+        plan = make_plan(fine, fine.build_mesh())
+        cost = f"about {_MESHES_TOGETHER * plan.seconds:.1g} s and {plan.memory / 1e9:.1g} GB"
+        raise StudyError(
+            "no closed form or reference solution belongs to this scene: add --over-resolve "
+            f"{SUGGESTED} to measure against a fine solution ({SUGGESTED} elements, {cost})"
+        )
 
 
 def read_measures(text: str) -> tuple[str, ...]:
     """Return the names of errors, which must be known."""
-    return _known(_words(text, "errors"), MEASURES, "errors")
+    return _known(text, "errors", MEASURES)
 
 
-def _solver(scene: Scene, word: str) -> ContactSolver:
-    """Return the driver of a word: the scene's own, with its options, if it has that word."""
-    chosen: ContactSolver = structure(word, cast(Any, ContactSolver))
-    return scene.solver if type(chosen) is type(scene.solver) else chosen
+def _solver(word: str) -> ContactSolver:
+    solver: ContactSolver = structure(word, cast(Any, ContactSolver))
+    return solver
 
 
 def _words(text: str, option: str) -> tuple[str, ...]:
@@ -136,8 +120,8 @@ def _words(text: str, option: str) -> tuple[str, ...]:
     return words
 
 
-def _known(words: tuple[str, ...], known: Iterable[str], option: str) -> tuple[str, ...]:
-    names = list(known)
+def _known(text: str, option: str, known: Iterable[str]) -> tuple[str, ...]:
+    words, names = _words(text, option), list(known)
     for word in words:
         if word not in names:
             raise StudyError(f"{option}: unknown {word!r}: the known ones are {', '.join(names)}{closest(word, names)}")

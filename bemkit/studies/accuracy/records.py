@@ -8,7 +8,8 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from bemkit.reference.values import MEASURES
+from bemkit.hdf5 import FileFormat
+from bemkit.reference.compare import MEASURES
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
 
@@ -95,19 +96,7 @@ def by_series(records: Iterable[ErrorRecord]) -> list[list[ErrorRecord]]:
 
 
 def orders(records: Sequence[ErrorRecord], measure: str) -> list[float]:
-    """Return the order of an error between each mesh and the one before it; nan where there is none.
-
-    Parameters
-    ----------
-    records : sequence of ErrorRecord
-        Of one series.
-    measure : str
-
-    Returns
-    -------
-    list of float
-        p in error ~ N**-p.
-    """
+    """Return the orders p, error ~ N**-p, between each mesh of a series and the one before; nan where there is none."""
     return [float("nan"), *(_slope((before, after), measure) for before, after in pairwise(records))][: len(records)]
 
 
@@ -128,15 +117,7 @@ def _slope(records: Sequence[ErrorRecord], measure: str) -> float:
 def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorRecord]:
     """Return the records that no other record beats or equals in both run time and error, from fast to accurate.
 
-    Parameters
-    ----------
-    records : sequence of ErrorRecord
-    measure : str
-
-    Returns
-    -------
-    list of ErrorRecord
-        Empty if no run time was measured.
+    There are none if no run time was measured.
     """
     known = [record for record in records if np.isfinite(record.seconds) and np.isfinite(getattr(record, measure))]
     front: list[ErrorRecord] = []
@@ -146,9 +127,8 @@ def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorReco
     return front
 
 
-FILE = RecordFile(
-    "bemkit-study", 1, "bemkit study errors", ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions")
-)
+FORMAT = FileFormat("bemkit-study", 1, "bemkit study errors file", "bemkit study errors -o")
+FILE = RecordFile(FORMAT, ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions"))
 CSV_START = "discretisation,map,meshes,solver,size,"
 
 

@@ -1,150 +1,106 @@
-"""The runs of a study: element types times drivers times sequences of meshes."""
+"""The runs of an error study, element types times drivers times sequences of meshes, and what is measured of each.
+
+Measured are run times, memory and errors, or the errors alone where runs at the same time would disturb each other.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tracemalloc
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from functools import partial
+from typing import Any
+
+import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
+from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
+from bemkit.runs.run import run as solve
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.scene import Discretisation, Scene
+from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
-from bemkit.studies.engine import StudyError
+from bemkit.studies.accuracy.records import STAGES, ErrorRecord
+from bemkit.studies.engine import Attempt, StudyError, Task, attempt
 
 ELEMENTS = (40, 80, 160, 320)
 ACCURACIES = (1e-2, 1e-3, 1e-4)
 MOST_ELEMENTS = 500
-
-
-class MeshSequence(Protocol):
-    """Meshes of growing size."""
-
-    @property
-    def name(self) -> str:
-        """A word for tables and figures."""
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """What tells the meshes apart, from coarse to fine: numbers of elements, or accuracies."""
-
-    def options(self, scene: Scene, size: float) -> MeshOptions:
-        """Return the mesh options of one size."""
+_NAN = float("nan")
 
 
 @dataclass(frozen=True)
-class GivenMeshes:
-    """Meshes of given numbers of elements with one grading; densities of sides are those of the scene.
+class MeshSequence:
+    """Meshes of growing size.
 
     Parameters
     ----------
     name : str
-    grading : Grading
-    elements : tuple of int
+        A word for tables and figures.
+    sizes : tuple of float
+        What tells the meshes apart, from coarse to fine: numbers of elements, or accuracies.
+    options : callable (scene, size) -> MeshOptions
+    needs_estimate : bool
+        Whether they follow an error estimate, which some element types do not have.
     """
 
     name: str
-    grading: Grading
-    elements: tuple[int, ...] = ELEMENTS
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """Numbers of elements."""
-        return self.elements
-
-    def options(self, scene: Scene, size: float) -> MeshOptions:
-        """Return the scene's options with this grading and number of elements."""
-        return MeshOptions(elements=int(size), grading=self.grading, density=scene.mesh.density)
+    sizes: tuple[float, ...]
+    options: Callable[[Scene, float], MeshOptions]
+    needs_estimate: bool = False
 
 
-def uniform(elements: tuple[int, ...] = ELEMENTS) -> GivenMeshes:
-    """Return uniform meshes."""
-    return GivenMeshes("uniform", Uniform(), elements)
+def uniform(elements: tuple[int, ...] = ELEMENTS) -> MeshSequence:
+    """Return uniform meshes of given numbers of elements; densities of sides are those of the scene."""
+    return _given("uniform", Uniform(), elements)
 
 
-def graded(elements: tuple[int, ...] = ELEMENTS, exponent: float = 3.0) -> GivenMeshes:
+def graded(elements: tuple[int, ...] = ELEMENTS, exponent: float = 3.0) -> MeshSequence:
     """Return meshes graded towards corners and ends of parts like a power of the distance."""
-    return GivenMeshes("graded", Algebraic(exponent), elements)
+    return _given("graded", Algebraic(exponent), elements)
 
 
-@dataclass(frozen=True)
-class AdaptiveMeshes:
-    """Meshes that follow the solution until an accuracy is reached.
+def _given(name: str, grading: Grading, elements: tuple[int, ...]) -> MeshSequence:
+    def options(scene: Scene, size: float) -> MeshOptions:
+        return MeshOptions(elements=int(size), grading=grading, density=scene.mesh.density)
 
-    Parameters
-    ----------
-    accuracies : tuple of float
-    most_elements : int
-        No mesh has more; a run that ends there keeps the best result so far. A limit of time would not do: what it
-        leaves differs from run to run.
+    return MeshSequence(name, elements, options)
+
+
+def adaptive(accuracies: tuple[float, ...] = ACCURACIES, most_elements: int = MOST_ELEMENTS) -> MeshSequence:
+    """Return meshes that follow the solution until an accuracy is reached.
+
+    None has more than the given elements; a run that ends there keeps the best result so far. A limit of time would not
+    do: what it leaves differs from run to run.
     """
 
-    accuracies: tuple[float, ...] = ACCURACIES
-    most_elements: int = MOST_ELEMENTS
+    def options(scene: Scene, size: float) -> MeshOptions:
+        return MeshOptions(accuracy=size, most_elements=most_elements)
 
-    @property
-    def name(self) -> str:
-        """``adaptive``."""
-        return "adaptive"
-
-    @property
-    def sizes(self) -> tuple[float, ...]:
-        """Accuracies, from coarse to fine."""
-        return self.accuracies
-
-    def options(self, scene: Scene, size: float) -> MeshOptions:
-        """Return options that ask for the accuracy."""
-        return MeshOptions(accuracy=size, most_elements=self.most_elements)
+    return MeshSequence("adaptive", accuracies, options, needs_estimate=True)
 
 
 @dataclass(frozen=True)
 class Run:
-    """One record to compute.
+    """One record to compute: what tells it apart, and a problem, of which mesh, elements and driver are changed.
 
-    Parameters
-    ----------
-    meshes : str
-        Name of the sequence.
-    size : float
-        Number of elements, or asked-for accuracy.
-    problem : Scene
-        Its own mesh, elements and driver do not matter.
-    element : Discretisation
-    options : MeshOptions
-    driver : ContactSolver
+    The size is a number of elements, or the accuracy that is asked for.
     """
 
+    discretisation: str
+    map: str
     meshes: str
+    solver: str
     size: float
     problem: Scene = field(repr=False)
-    element: Discretisation
-    options: MeshOptions
-    driver: ContactSolver
+    changes: Mapping[str, Any] = field(repr=False)
 
     @property
     def scene(self) -> Scene:
         """Made ready to run; InputError if it does not allow the element type or the mesh."""
-        return replace(self.problem, discretisation=self.element, mesh=self.options, solver=self.driver)
-
-    @property
-    def discretisation(self) -> str:
-        """The word for its elements."""
-        return DISCRETISATIONS.kind_of(self.element)
-
-    @property
-    def map(self) -> str:
-        """Name of the Steklov-Poincare map that belongs to the elements."""
-        return self.element.method
-
-    @property
-    def solver(self) -> str:
-        """Its word, or the name of its class if it has none."""
-        try:
-            return SOLVERS.kind_of(self.driver)
-        except InputError:
-            return type(self.driver).__name__
+        return replace(self.problem, **self.changes)
 
     @property
     def key(self) -> tuple[str, str, str, float]:
@@ -160,30 +116,30 @@ def all_runs(
 ) -> tuple[Run, ...]:
     """Combine element types, meshes and drivers; constant elements have no error estimate and so no adaptive meshes.
 
-    Parameters
-    ----------
-    scene : Scene
-        The problem; its own mesh, discretisation and solver do not matter.
-    discretisations, meshes, solvers : sequences
-
-    Returns
-    -------
-    tuple of Run
+    The scene's own mesh, discretisation and solver do not matter. What it does not allow becomes a refused row.
 
     Raises
     ------
     StudyError
         If nothing is left to run, two runs could not be told apart, the scene has no contact, or a size is no size of a
-        mesh. What the scene itself does not allow becomes a refused row.
+        mesh.
     """
     if not scene.contact_parts:
         raise StudyError("no part of the scene is in contact: errors are measured along the contact boundary")
     try:
         runs = tuple(
-            Run(sequence.name, size, scene, element, sequence.options(scene, size), solver)
+            Run(
+                DISCRETISATIONS.kind_of(element),
+                element.method,
+                sequence.name,
+                SOLVERS.word_of(solver),
+                float(size),
+                scene,
+                {"discretisation": element, "mesh": sequence.options(scene, size), "solver": solver},
+            )
             for element in discretisations
             for sequence in meshes
-            if element.estimates_error or not isinstance(sequence, AdaptiveMeshes)
+            if element.estimates_error or not sequence.needs_estimate
             for solver in solvers
             for size in sequence.sizes
         )
@@ -199,3 +155,75 @@ def all_runs(
     if repeated is not None:
         raise StudyError(f"{', '.join(map(str, repeated[:3]))} of size {repeated[3]:g} is given twice: leave one out")
     return runs
+
+
+def error_tasks(runs: Sequence[Run], reference: Reference, repeat: int | None = None) -> tuple[Task[ErrorRecord], ...]:
+    """Return the tasks of a study, for `bemkit.studies.engine.compute`.
+
+    Each run is timed `repeat` times, after one that warms up and before one that measures the memory. By default
+    neither is measured, and both are nan: runs at the same time would disturb each other.
+
+    Raises
+    ------
+    StudyError
+        If `repeat` is not positive.
+    """
+    if repeat is not None and repeat < 1:
+        raise StudyError(f"repeat is {repeat}: give at least one timed repetition")
+    return tuple(
+        Task(
+            run.key,
+            f"{run.discretisation}, {run.meshes} {run.size:g}, {run.solver}",
+            partial(measure, run, reference, repeat),
+        )
+        for run in runs
+    )
+
+
+def measure(run: Run, reference: Reference, repeat: int | None) -> ErrorRecord:
+    """Run once to warm up and for the errors, then repeatedly for the times, then once for the memory."""
+    first = _attempt(run)
+    names = {"total": "seconds", **{stage: f"seconds_{stage}" for stage in STAGES}}
+    if repeat is None or first.solution is None or not first.solution.is_certified:
+        return _record(run, first, reference, dict.fromkeys([*names.values(), "peak_memory"], _NAN))
+    solutions = [again for _ in range(repeat) if (again := _attempt(run).solution) is not None]
+    seconds = {name: float(np.median([each.timings[key] for each in solutions])) for key, name in names.items()}
+    return _record(run, first, reference, {**seconds, "peak_memory": _peak_memory(run)})
+
+
+def _attempt(run: Run) -> Attempt:
+    # the scene is made inside: what it does not allow is an answer too
+    return attempt(lambda: solve(run.scene))
+
+
+def _peak_memory(run: Run) -> float:
+    """Return the largest memory [bytes] that one run holds at a time; tracing it slows the run down."""
+    tracemalloc.start()
+    try:
+        _attempt(run)
+        return float(tracemalloc.get_traced_memory()[1])
+    finally:
+        tracemalloc.stop()
+
+
+def _record(run: Run, found: Attempt, reference: Reference, measured: Mapping[str, float]) -> ErrorRecord:
+    solution = found.solution
+    errors: dict[str, Any] = dict.fromkeys(MEASURES, _NAN)
+    if solution is not None and solution.is_certified:
+        errors = errors_of(answer_of(solution, reference.places), reference)
+    return ErrorRecord(
+        discretisation=run.discretisation,
+        map=run.map,
+        meshes=run.meshes,
+        solver=run.solver,
+        size=run.size,
+        status=found.status,
+        elements=0 if solution is None else solution.mesh.n_elements,
+        contact_nodes=0 if solution is None else solution.contact.n_contact,
+        linear_solves=0 if solution is None else solution.linear_solves,
+        outer_steps=0 if solution is None else solution.outer_steps,
+        estimated_error=_NAN if solution is None or solution.estimated_error is None else solution.estimated_error,
+        message="" if found.is_converged else found.message,
+        **measured,
+        **errors,
+    )

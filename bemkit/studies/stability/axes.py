@@ -1,121 +1,159 @@
-"""The axes of the stability sweeps."""
+"""The axes of the stability sweeps, the cases they make, and the similarity that leads a case back to the baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from math import radians
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import HalfPlane
+from bemkit.errors import InputError
 from bemkit.geometry.grading import Uniform
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Rectangle
+from bemkit.geometry.spaces import ConstantSpace, break_nodes
+from bemkit.operators.boundary import single_layer
+from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Contact, MeshOptions, Part, Pressure, Scene, Traction
+from bemkit.scene.conditions import Contact, Part, Pressure, Traction
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.cases import PRECISION, Axis, Case, Similarity
-from bemkit.studies.stability.degenerate import degenerate_diameters
+
+PRECISION = 1e-9
+"""Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """The same problem in other units and elsewhere: every result follows from that of the original.
+
+    Parameters
+    ----------
+    length, modulus, stress : float
+        Factors of all lengths of the body, of Young's modulus, and of all loads.
+    shift : (float, float) [m]
+        Where the origin goes.
+    """
+
+    length: float = 1.0
+    modulus: float = 1.0
+    stress: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def displacement(self) -> float:
+        """Factor of displacements, and so of gaps and prescribed displacements."""
+        return self.stress / self.modulus * self.length
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the similar scene."""
+        affine = AffineMap((self.length, self.length), self.shift)
+        return transformed_scene(
+            scene, affine, stress=self.stress, displacement=self.displacement, modulus=self.modulus
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row to compute.
+
+    Parameters
+    ----------
+    value : float
+        Place on the axis.
+    scene : Scene
+    similarity : Similarity
+        Factors that lead from the reference of the axis to this scene, by which results are scaled back.
+    levels : int
+        How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
+    precision : float
+        Agreement owed by the similar twin of this case.
+    drift_limit : float
+        Agreement owed to the reference; infinite if the answer may change along the axis.
+    keeps_steps : bool
+        Whether active sets and the number of linear solves must be those of the reference as well.
+    is_solvable : bool or None
+        Whether a solution exists, where that is known beforehand.
+    """
+
+    value: float
+    scene: Scene
+    similarity: Similarity = Similarity()
+    levels: int = 0
+    precision: float = PRECISION
+    drift_limit: float = float("inf")
+    keeps_steps: bool = False
+    is_solvable: bool | None = None
+
+    def mesh(self, scene: Scene) -> BoundaryMesh:
+        """Divide the boundary of `scene`, which is this case's or similar to it."""
+        mesh = scene.build_mesh()
+        for _ in range(self.levels):
+            mesh = mesh.refined(np.unique(mesh.node_elements[break_nodes(mesh)]))
+        return mesh
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A direction in which a scene is driven to its extremes.
+
+    Parameters
+    ----------
+    name : str
+    label : str
+        Of the values, for tables and plots.
+    promise : str
+        One sentence on what must hold along the axis.
+    values : tuple of float
+    make : callable (baseline solution, value) -> Case
+    reference : float, optional
+        Value whose row the others are compared with; the given scene if left out.
+    """
+
+    name: str
+    label: str
+    promise: str
+    values: tuple[float, ...]
+    make: Callable[[Solution, float], Case]
+    reference: float | None = None
+
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether the values span decades."""
+        size = [abs(value) for value in self.values if value]
+        return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
+
+
+def find_axes(names: Sequence[str]) -> tuple[Axis, ...]:
+    """Return the axes of the given names, all of them if there are none.
+
+    Raises
+    ------
+    UnknownAxisError
+        The message lists the names.
+    """
+    known = {axis.name: axis for axis in AXES}
+    for name in names:
+        if name not in known:
+            raise UnknownAxisError(f"axis is {name!r}: the axes are {', '.join(known)}")
+    return tuple(known[name] for name in names) if names else AXES
+
+
+class UnknownAxisError(InputError):
+    """An axis of a name that does not exist; the message lists the names."""
+
 
 _BLOCK_FRICTION = 0.5
 _REFERENCE_GRADING = 1e6
-
-
-def all_axes() -> tuple[Axis, ...]:
-    """Return every axis, in the order of the report."""
-    return (*_unit_axes(), *_physical_axes(), *_numerical_axes())
-
-
-def _unit_axes() -> tuple[Axis, ...]:
-    units = "same sets, same linear solves, results equal to 1e-9 after scaling"
-    decades = tuple(10.0**k for k in (-12, -9, -6, -3, 3, 6, 9, 12, 15))
-    return (
-        Axis("youngs-modulus", "factor of Young's modulus", units, decades, partial(_similar, factor="modulus")),
-        Axis("load", "factor of all loads and gaps", units, decades, partial(_similar, factor="stress")),
-        Axis(
-            "size",
-            "factor of all lengths",
-            units,
-            tuple(10.0**k for k in range(-9, 10, 3) if k),
-            partial(_similar, factor="length"),
-        ),
-        Axis(
-            "position",
-            "distance from the origin / diameter",
-            "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
-            (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
-            _moved,
-        ),
-        Axis(
-            "degenerate-size",
-            "diameter / diameter at which V with log|r| is singular",
-            units,
-            (0.5, 0.99, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.01, 2.0),
-            _degenerate,
-        ),
-    )
-
-
-def _physical_axes() -> tuple[Axis, ...]:
-    free = "right answer or named error"
-    friction = (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1000.0)
-    incompressible = (-0.5, 0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.499999, 0.4999999, 0.5)
-    offsets = (-1e3, -1.0, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999999, 1.0, 1.000001, 2.0, 1e3)
-    ratios = (0.0, 0.5, 0.9, 0.99, 1.0 - 1e-4, 1.0, 1.0 + 1e-4, 1.01, 1.1, 2.0, 100.0)
-    return (
-        Axis(
-            "poisson-ratio",
-            "Poisson's ratio",
-            f"{free}; drift proportional to 1/2 - nu near 1/2",
-            incompressible,
-            _poisson,
-            0.5,
-        ),
-        Axis("friction", "friction coefficient", free, friction, _friction),
-        Axis("gap", "gap added / largest displacement", free, offsets, _gap),
-        Axis(
-            "load-direction",
-            "turn of all loads [degrees]",
-            free,
-            (0.0, 1.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 180.0, -15.0, -45.0, -90.0),
-            _turned,
-        ),
-        Axis(
-            "sliding", "push / friction available, loose block", "solved below 1, refused above", ratios, _pushed, 0.0
-        ),
-        Axis("aspect-ratio", "stretch along x", free, tuple(10.0**k for k in (-3, -2, -1, 0, 1, 2, 3)), _stretched),
-    )
-
-
-def _numerical_axes() -> tuple[Axis, ...]:
-    rho = tuple(10.0**k for k in range(-8, 13, 2))
-    independent = "same answer for every rho, or named status"
-    return (
-        Axis("rho-newton", "rho / (E'/L), semismooth Newton", independent, rho, partial(_solver, make=_newton)),
-        Axis(
-            "rho-augmented", "rho / (E'/L), augmented Lagrangian", independent, rho, partial(_solver, make=_augmented)
-        ),
-        Axis(
-            "elements",
-            "number of elements / that of the scene",
-            "right answer; drift is the discretisation error",
-            (0.125, 0.25, 0.5, 1.0, 2.0),
-            _elements,
-        ),
-        Axis(
-            "grading",
-            "largest / smallest element",
-            "solution unchanged to 1e-6 from 1e6 on",
-            (1e2, 1e4, _REFERENCE_GRADING, 1e8, 1e10, 1e12),
-            _graded,
-            _REFERENCE_GRADING,
-        ),
-    )
 
 
 def _similar(baseline: Solution, value: float, *, factor: str) -> Case:
@@ -155,13 +193,11 @@ def _poisson(baseline: Solution, value: float) -> Case:
 
 
 def _friction(baseline: Solution, value: float) -> Case:
-    def plain(part: Part) -> Part:
-        return (
-            replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
-        )
-
-    scene = replace(baseline.scene, parts=tuple(map(plain, baseline.scene.parts)), law=Coulomb(value))
-    return Case(value, scene)
+    parts = [
+        replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
+        for part in baseline.scene.parts
+    ]
+    return Case(value, replace(baseline.scene, parts=tuple(parts), law=Coulomb(value)))
 
 
 def _gap(baseline: Solution, value: float) -> Case:
@@ -204,17 +240,17 @@ def _stretched(baseline: Solution, value: float) -> Case:
     )
 
 
-def _newton(rho: float) -> ContactSolver:
-    return SemismoothNewton(rho=rho)
+def _newton(baseline: Solution, rho: float) -> Case:
+    return _with_solver(baseline, rho, SemismoothNewton(rho=rho))
 
 
-def _augmented(rho: float) -> ContactSolver:
-    return AugmentedLagrangian(rho_n=rho, rho_t=rho)
+def _augmented(baseline: Solution, rho: float) -> Case:
+    return _with_solver(baseline, rho, AugmentedLagrangian(rho_n=rho, rho_t=rho))
 
 
-def _solver(baseline: Solution, value: float, *, make: Callable[[float], ContactSolver]) -> Case:
+def _with_solver(baseline: Solution, rho: float, solver: ContactSolver) -> Case:
     # answers with a certificate of 1e-9 differ by that times the compliance of what is certified
-    return Case(value, replace(baseline.scene, solver=make(value)), drift_limit=1e-6)
+    return Case(rho, replace(baseline.scene, solver=solver), drift_limit=1e-6)
 
 
 def _elements(baseline: Solution, value: float) -> Case:
@@ -234,3 +270,91 @@ def _graded(baseline: Solution, value: float) -> Case:
         precision=1e-6,
         drift_limit=1e-6 if value >= _REFERENCE_GRADING else np.inf,
     )
+
+
+def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
+    """Return the two diameters [m], ascending, at which the kernel with log|r| of plain numbers has no inverse.
+
+    The mesh may be that of a body of any size.
+
+    Notes
+    -----
+    With lengths measured by the diameter d the operator V is positive definite. A body of the same shape and the
+    diameter d has ``V - c log(d) m m^T``, c = (3 - 4 nu) / (8 pi mu (1 - nu)), where the two columns of m integrate
+    tractions to forces; by the matrix determinant lemma that is singular if ``1 / (c log d)`` is an eigenvalue of
+    ``m^T V^-1 m``. bemkit itself never meets these sizes, because it measures lengths by the diameter.
+    """
+    diameter = mesh.diameter
+    unit = mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1])), factor=1.0 / diameter)
+    space = ConstantSpace(unit)
+    # the operator measures lengths by the diameter of its mesh, which is one here
+    v = single_layer(space, space, material).matrix()
+    to_force = np.kron(unit.lengths[:, None], np.eye(2))
+    nu = material.effective_poisson_ratio
+    factor = (3.0 - 4.0 * nu) / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
+    eigenvalues = np.linalg.eigvalsh(to_force.T @ np.linalg.solve(v, to_force))
+    return np.sort(np.exp(1.0 / (factor * eigenvalues)))
+
+
+_UNITS = "same sets, same linear solves, results equal to 1e-9 after scaling"
+_FREE = "right answer or named error"
+_DRIFTS = f"{_FREE}; drift proportional to 1/2 - nu near 1/2"
+_INDEPENDENT = "same answer for every rho, or named status"
+_DECADES = tuple(10.0**k for k in (-12, -9, -6, -3, 3, 6, 9, 12, 15))
+_SIZES = tuple(10.0**k for k in range(-9, 10, 3) if k)
+_NEAR_DEGENERATE = (0.5, 0.99, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.01, 2.0)
+_RATIOS = (-0.5, 0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.499999, 0.4999999, 0.5)
+_COEFFICIENTS = (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1000.0)
+_OFFSETS = (-1e3, -1.0, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999999, 1.0, 1.000001, 2.0, 1e3)
+_ANGLES = (0.0, 1.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 180.0, -15.0, -45.0, -90.0)
+_PUSHES = (0.0, 0.5, 0.9, 0.99, 1.0 - 1e-4, 1.0, 1.0 + 1e-4, 1.01, 1.1, 2.0, 100.0)
+_STRETCHES = tuple(10.0**k for k in (-3, -2, -1, 0, 1, 2, 3))
+_PENALTIES = tuple(10.0**k for k in range(-8, 13, 2))
+_SHARES = (0.125, 0.25, 0.5, 1.0, 2.0)
+_GRADINGS = (1e2, 1e4, _REFERENCE_GRADING, 1e8, 1e10, 1e12)
+
+AXES: tuple[Axis, ...] = (
+    Axis("youngs-modulus", "factor of Young's modulus", _UNITS, _DECADES, partial(_similar, factor="modulus")),
+    Axis("load", "factor of all loads and gaps", _UNITS, _DECADES, partial(_similar, factor="stress")),
+    Axis("size", "factor of all lengths", _UNITS, _SIZES, partial(_similar, factor="length")),
+    Axis(
+        "position",
+        "distance from the origin / diameter",
+        "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
+        (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
+        _moved,
+    ),
+    Axis(
+        "degenerate-size",
+        "diameter / diameter at which V with log|r| is singular",
+        _UNITS,
+        _NEAR_DEGENERATE,
+        _degenerate,
+    ),
+    Axis(
+        "poisson-ratio", "Poisson's ratio", f"{_FREE}; drift proportional to 1/2 - nu near 1/2", _RATIOS, _poisson, 0.5
+    ),
+    Axis("friction", "friction coefficient", _FREE, _COEFFICIENTS, _friction),
+    Axis("gap", "gap added / largest displacement", _FREE, _OFFSETS, _gap),
+    Axis("load-direction", "turn of all loads [degrees]", _FREE, _ANGLES, _turned),
+    Axis("sliding", "push / friction available, loose block", "solved below 1, refused above", _PUSHES, _pushed, 0.0),
+    Axis("aspect-ratio", "stretch along x", _FREE, _STRETCHES, _stretched),
+    Axis("rho-newton", "rho / (E'/L), semismooth Newton", _INDEPENDENT, _PENALTIES, _newton),
+    Axis("rho-augmented", "rho / (E'/L), augmented Lagrangian", _INDEPENDENT, _PENALTIES, _augmented),
+    Axis(
+        "elements",
+        "number of elements / that of the scene",
+        "right answer; drift is the discretisation error",
+        _SHARES,
+        _elements,
+    ),
+    Axis(
+        "grading",
+        "largest / smallest element",
+        "solution unchanged to 1e-6 from 1e6 on",
+        _GRADINGS,
+        _graded,
+        _REFERENCE_GRADING,
+    ),
+)
+"""Every axis, in the order of the report."""

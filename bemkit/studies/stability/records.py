@@ -8,9 +8,10 @@ from enum import Enum
 
 import numpy as np
 
+from bemkit.hdf5 import FileFormat
 from bemkit.results.outputs import csv_text
 from bemkit.results.record_file import RecordFile
-from bemkit.studies.stability.cases import Axis
+from bemkit.studies.stability.axes import Axis
 
 
 class Verdict(Enum):
@@ -76,7 +77,8 @@ class StabilityRecord:
         return self.axis, self.value
 
 
-FILE = RecordFile("bemkit-stability", 1, "bemkit stability", StabilityRecord, ("scene",))
+FORMAT = FileFormat("bemkit-stability", 1, "bemkit stability file", "bemkit stability -o")
+FILE = RecordFile(FORMAT, StabilityRecord, ("scene",))
 CSV_START = "axis,value,verdict,status,"
 MARKDOWN_START = "### "
 
@@ -107,9 +109,5 @@ def cells(record: StabilityRecord) -> list[str]:
         record.verdict,
         record.status.replace("_", " "),
         solves,
-        *(_short(x) for x in numbers),
+        *("" if np.isnan(number) else f"{number:.0e}" for number in numbers),
     ]
-
-
-def _short(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.0e}"

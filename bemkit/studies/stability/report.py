@@ -1,33 +1,41 @@
-"""What ``bemkit stability`` prints."""
+"""What ``bemkit stability`` prints and draws."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
-from bemkit.studies.stability.cases import Axis
+from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 from bemkit.studies.stability.trials import Outcome, Trial
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 
-_OUTCOME_STYLES = {
-    Outcome.WRONG: "bold red",
-    Outcome.TRACEBACK: "bold red",
-    Outcome.WARNED: "yellow",
-    Outcome.NAMED: "cyan",
+_OUTCOMES = {
+    Outcome.SUCCESS: ("successes", ""),
+    Outcome.WARNED: ("warned", "yellow"),
+    Outcome.NAMED: ("named failures", "cyan"),
+    Outcome.WRONG: ("wrong successes", "bold red"),
+    Outcome.TRACEBACK: ("tracebacks", "bold red"),
 }
-_PLURALS = {
-    Outcome.SUCCESS: "successes",
-    Outcome.WARNED: "warned",
-    Outcome.NAMED: "named failures",
-    Outcome.WRONG: "wrong successes",
-    Outcome.TRACEBACK: "tracebacks",
-}
+"""What each outcome is called in the plural, and its style."""
+_SERIES = (
+    ("certificate", "certificate of the driver", BLUE, "o"),
+    ("check", "independent check", GREEN, "s"),
+    ("twin", "difference to the similar twin", ORANGE, "^"),
+    ("drift", "drift from the reference", GREY, "x"),
+)
+_FLOOR = 1e-18
 
 
 def print_axis(axis: Axis, records: Sequence[StabilityRecord], console: Console | None = None) -> None:
@@ -62,16 +70,52 @@ def print_trials(trials: Sequence[Trial], console: Console | None = None) -> Non
     console = stdout_console(console)
     table = plain_table(("outcome", "scenes", "why"), gap=2)
     table.columns[1].justify = "right"
-    for outcome in Outcome:
+    for outcome, (plural, style) in _OUTCOMES.items():
         own = [trial for trial in trials if trial.outcome is outcome]
         reasons = Counter(trial.reason for trial in own if trial.reason)
         why = ", ".join(f"{reason.replace('_', ' ')} {count}" for reason, count in reasons.most_common())
-        shows_why = outcome is not Outcome.WARNED
-        table.add_row(
-            Text(_PLURALS[outcome], _OUTCOME_STYLES.get(outcome, "")), str(len(own)), why if shows_why else ""
-        )
+        table.add_row(Text(plural, style), str(len(own)), why if outcome is not Outcome.WARNED else "")
     console.print(Text(f"{len(trials)} random scenes", style="bold"))
     console.print(table)
-    for trial in [trial for trial in trials if trial.is_failure]:
+    for trial in filter(lambda trial: trial.is_failure, trials):
         console.print(Text(f"{trial.outcome.value}: {trial.reason}: {trial.message.strip().splitlines()[-1]}"))
         console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))
+
+
+def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
+    """Draw one figure for each axis, by file names."""
+    return {figure_name(axis): draw_axis(axis, [one for one in records if one.axis == axis.name]) for axis in axes}
+
+
+def figure_name(axis: Axis) -> str:
+    """Return the name of the file, without ``.png``."""
+    return f"stability-{axis.name}"
+
+
+def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
+    """Draw one axis."""
+    figure = new_figure(6.4, 4.0)
+    plot = figure.add_subplot()
+    is_logarithmic = axis.is_logarithmic and any(record.value > 0.0 for record in records)
+    if is_logarithmic:
+        records = [record for record in records if record.value > 0.0]
+    values = np.array([record.value for record in records])
+    for name, label, colour, marker in _SERIES:
+        numbers = np.maximum([getattr(record, name) for record in records], _FLOOR)
+        shown = np.isfinite(numbers)
+        plot.plot(
+            values[shown], numbers[shown], marker, color=colour, label=label, markersize=5, linestyle="-", linewidth=0.8
+        )
+    for verdict, colour in ((Verdict.NAMED, SKY), (Verdict.WRONG, VERMILION)):
+        marked = [record.value for record in records if record.verdict == verdict.value]
+        for k, value in enumerate(marked):
+            plot.axvline(value, color=colour, linewidth=4, alpha=0.35, label=verdict.value if k == 0 else None)
+    if is_logarithmic:
+        plot.set_xscale("log")
+    plot.set_yscale("log")
+    plot.set_xlabel(axis.label)
+    plot.set_ylabel("dimensionless")
+    plot.set_title(axis.name, loc="left")
+    show_grid(plot)
+    plot.legend(fontsize="small", frameon=False)
+    return figure

@@ -8,7 +8,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
@@ -17,7 +16,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.stability.cases import Axis, Case, Similarity
+from bemkit.studies.stability.axes import Axis, Case, Similarity
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 
@@ -34,19 +33,9 @@ def sweep(
     axes: Sequence[Axis],
     run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
 ) -> Iterator[StabilityRecord]:
-    """Compute the records of some axes, one axis after the other.
+    """Compute the records of some axes from a baseline scene, one axis after the other.
 
-    Parameters
-    ----------
-    scene : Scene
-        The baseline.
-    axes : sequence of Axis
-    run_tasks : callable, optional
-        Computes the tasks of one axis, such as `bemkit.studies.engine.compute` with records of an earlier sweep.
-
-    Yields
-    ------
-    StabilityRecord
+    `run_tasks` computes the tasks of one axis, such as `compute` of the engine with records of an earlier sweep.
 
     Raises
     ------
@@ -73,19 +62,9 @@ def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
 
 
 def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> StabilityRecord:
-    """Solve a case and its twin, and judge them.
+    """Solve a case of an axis and its twin, and judge them.
 
-    Parameters
-    ----------
-    axis : str
-        Name of the axis, for the record.
-    case : Case
-    reference : Solution or None
-        What the drift is measured against; None if the reference itself has no solution.
-
-    Returns
-    -------
-    StabilityRecord
+    The drift is measured against the reference, which is None if it has no solution itself.
     """
     twin_scene = TWIN.apply(case.scene)
     first, second = _attempt(case.scene, case), _attempt(twin_scene, case)
@@ -130,14 +109,14 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
     similarity : Similarity
         Leads from the reference to the solution.
     in_mean : bool
-        Take the mean along each contact part instead of the largest entry; always on other meshes,
-        because single nodes at corners see singular tractions.
+        Take the mean along each contact part instead of the largest entry; always on other meshes, because single nodes
+        at corners see singular tractions. On different meshes the coarser one is interpolated to the finer one.
 
     Returns
     -------
     float
         Of clearances and tangential displacements relative to the largest displacement, of tractions relative to the
-        largest traction of the reference. On different meshes the coarser one is interpolated to the finer one.
+        largest traction of the reference.
     """
     one, other = reference.contact, solution.contact
     unit = max(float(np.abs(one.u_n).max()), float(np.abs(one.u_t).max())) or 1.0
@@ -159,16 +138,11 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
                 before = np.interp(scaled_places, places, before)
             elif not is_same_mesh:
                 scaled = np.interp(places, scaled_places, scaled)
-            gone = _apart(before, scaled)
+            is_known = np.isfinite(before) | np.isfinite(scaled)  # infinite clearances agree with each other only
+            gone = np.abs(np.where(is_known, scaled, 0.0) - np.where(is_known, before, 0.0))
             size = gone.max() if is_same_mesh and not in_mean else weight @ gone / weight.sum()
             worst = max(worst, float(size) / (stress if is_stress else unit))
     return worst
-
-
-def _apart(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the distances of two columns; infinite clearances agree with each other only."""
-    known = np.isfinite(before) | np.isfinite(after)
-    return np.asarray(np.abs(np.where(known, after, 0.0) - np.where(known, before, 0.0)))
 
 
 def condition_number(scene: Scene, case: Case) -> float:

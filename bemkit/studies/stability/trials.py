@@ -88,18 +88,7 @@ def solved_steps(case: RandomCase) -> tuple[Solution, ...]:
 
 
 def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
-    """Judge the steps of a load history, each by the independent check.
-
-    Parameters
-    ----------
-    steps : iterable of Solution
-
-    Returns
-    -------
-    outcome : Outcome
-    reason, message : str
-        See `Trial`.
-    """
+    """Judge the steps of a load history by the independent check; return outcome, reason and message, see `Trial`."""
     steps = tuple(steps)
     for before, step in pairwise((None, *steps)):
         if step is None or not step.is_converged:

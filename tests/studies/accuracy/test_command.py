@@ -17,12 +17,10 @@ from bemkit.errors import BemkitError, one_line
 from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.reference import MEASURES, find_reference
 from bemkit.results import outputs as outputs_module
-from bemkit.studies.accuracy import measure as measure_module
-from bemkit.studies.accuracy.measure import error_tasks
-from bemkit.studies.accuracy.plots import draw_errors
+from bemkit.studies.accuracy import runs as runs_module
 from bemkit.studies.accuracy.records import FILE, to_csv
-from bemkit.studies.accuracy.runs import all_runs, uniform
-from bemkit.studies.accuracy.table import WIDE, print_study
+from bemkit.studies.accuracy.report import WIDE, draw_errors, print_study
+from bemkit.studies.accuracy.runs import all_runs, error_tasks, uniform
 from bemkit.studies.engine import compute_with_progress
 from tests.studies.accuracy.records import row
 
@@ -78,7 +76,7 @@ def test_rows_in_the_file_are_not_computed_again_and_others_are_added(
     assert more.return_value == 0
     assert FILE.read(path)[1][:2] == before
     assert len(FILE.read(path)[1]) == 4
-    monkeypatch.setattr(measure_module, "measure", int)  # calling it would fail
+    monkeypatch.setattr(runs_module, "measure", int)  # calling it would fail
     assert call(*FAST, "-q", "-o", path).return_value == 0
     assert len(FILE.read(path)[1]) == 4
 
@@ -118,7 +116,9 @@ def test_files_of_others_and_damaged_ones_stay(tmp_path: Path) -> None:
     assert "rows.h5" in str(result.exception)
     assert len(str(result.exception).splitlines()) == 1
     call("run", "paper-1", "--elements", "12", "-q", "-o", tmp_path / "result.h5")
-    assert "not of 'bemkit study errors -o'" in str(call(*FAST, "-o", tmp_path / "result.h5").exception)
+    assert "not a bemkit study errors file: give a file written by" in str(
+        call(*FAST, "-o", tmp_path / "result.h5").exception
+    )
 
 
 def test_a_scene_without_a_reference_says_what_a_fine_solution_costs() -> None:

@@ -12,11 +12,10 @@ from bemkit.cli.main import commands
 from bemkit.scene.toml import load_scene
 from bemkit.studies.engine import compute, compute_with_progress
 from bemkit.studies.stability import sweep as sweep_module
-from bemkit.studies.stability.axes import all_axes
-from bemkit.studies.stability.cases import find_axes
-from bemkit.studies.stability.plots import draw_axis
+from bemkit.studies.stability.axes import find_axes
 from bemkit.studies.stability.random_scenes import random_case
 from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
+from bemkit.studies.stability.report import draw_axis
 from bemkit.studies.stability.trials import Outcome, Trial, trial_tasks
 
 FAST = ("stability", "paper-1", "--elements", "32", "--axis", "sliding")
@@ -69,7 +68,7 @@ def test_a_wrong_row_shows_in_the_exit_code(monkeypatch: pytest.MonkeyPatch) -> 
     [
         (("stability", "paper-3"), "no such file or shipped scene"),
         (("stability", "paper-1", "--axis", "rho"), "the axes are youngs-modulus"),
-        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "both print to standard output"),
+        (("stability", "paper-1", "--csv", "-", "--markdown", "-"), "two outputs go to the same place"),
         (("stability", "paper-1", "-o", "/nowhere/rows.h5"), "create it first"),
         (("stability", "--random", "3", "--axis", "gap"), "--axis goes with a sweep of one scene"),
         (("stability", "paper-1", "--random", "3"), "SCENE goes with a sweep of one scene"),
@@ -95,7 +94,7 @@ def test_tables_leave_out_what_does_not_exist() -> None:
     nan = float("nan")
     row = StabilityRecord("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
     assert cells(row) == ["2", "named", "refused", "", "", "", "", "", "", ""]
-    axes = find_axes(all_axes(), ["sliding"])
+    axes = find_axes(["sliding"])
     assert "| 2 | named | refused |" in to_markdown(axes, [row])
     assert draw_axis(axes[0], [row]).axes[0].get_title(loc="left") == "sliding"
 

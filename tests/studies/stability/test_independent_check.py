@@ -10,7 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
-from bemkit.studies.stability.independent_check.obstacles import distance_to
+from bemkit.studies.stability.independent_check.nodes import distance_to
 from tests.scenes import CONSTANT, FLOOR, LINEAR, block, small_paper_scene
 
 

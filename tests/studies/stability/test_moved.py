@@ -10,8 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
-from bemkit.studies.stability.cases import Similarity, elements_at_ends
-from bemkit.studies.stability.degenerate import degenerate_diameters
+from bemkit.studies.stability.axes import Case, Similarity, degenerate_diameters
 from bemkit.studies.stability.sweep import difference
 from tests.scenes import FLOOR, block, small_paper_scene
 
@@ -79,13 +78,11 @@ def test_gap_offsets_and_turned_loads() -> None:
     assert difference(turned, bk.run(with_turned_loads(as_pressure, np.pi / 3.0)), Similarity()) <= 1e-12
 
 
-def test_ends_of_parts_and_corners_are_found() -> None:
+def test_levels_halve_the_elements_at_corners_and_ends_of_parts() -> None:
     scene = small_paper_scene(1)
-    mesh = scene.build_mesh()
-    ends = elements_at_ends(mesh)
+    counts = [Case(1.0, scene, levels=levels).mesh(scene).n_elements for levels in (0, 1, 2)]
     # four corners and two ends of loads, an element on either side of each
-    assert len(ends) == 12
-    assert len(elements_at_ends(mesh.refined(ends))) == 12
+    assert np.diff(counts).tolist() == [12, 12]
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability import sweep as sweep_module
-from bemkit.studies.stability.axes import all_axes
-from bemkit.studies.stability.cases import Axis, Case, UnknownAxisError, find_axes
+from bemkit.studies.stability.axes import AXES, Axis, Case, UnknownAxisError, find_axes
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
@@ -39,14 +38,14 @@ EXTREMES = {
 
 
 def shortened(name: str) -> Axis:
-    (axis,) = find_axes(all_axes(), [name])
+    (axis,) = find_axes([name])
     return dataclasses.replace(axis, values=EXTREMES[name])
 
 
 def test_every_axis_is_tested_here() -> None:
-    assert {axis.name for axis in all_axes()} == set(EXTREMES)
+    assert {axis.name for axis in AXES} == set(EXTREMES)
     with pytest.raises(UnknownAxisError, match="'rho': the axes are youngs-modulus, load"):
-        find_axes(all_axes(), ["rho"])
+        find_axes(["rho"])
 
 
 @pytest.mark.parametrize("name", EXTREMES)
@@ -137,7 +136,7 @@ def test_an_error_without_a_name_is_not_hidden(monkeypatch: pytest.MonkeyPatch) 
 def test_a_scene_without_a_solution_is_no_baseline() -> None:
     scene = small_paper_scene(1, solver=bk.SemismoothNewton(max_steps=1))
     with pytest.raises(StabilityError, match=r"no converged solution .*: give one that has"):
-        list(sweep(scene, all_axes()))
+        list(sweep(scene, AXES))
 
 
 def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,5 +163,5 @@ def test_differences_on_other_meshes_are_means_and_see_missing_parts() -> None:
 def test_no_row_of_the_whole_sweep_is_wrong(name: str, discretisation: bk.LinearGalerkin) -> None:
     scene = dataclasses.replace(bk.load_scene(name), discretisation=discretisation)
     assert check_solution(bk.run(scene)).is_good
-    wrong = [row for row in sweep(scene, all_axes()) if row.verdict == "wrong"]
+    wrong = [row for row in sweep(scene, AXES) if row.verdict == "wrong"]
     assert wrong == []

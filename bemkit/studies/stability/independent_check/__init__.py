@@ -6,7 +6,7 @@ textbooks. Whatever the drivers believe, these numbers say whether the fields ob
 whether forces and energy balance, and whether tractions and displacements belong to one elastic body.
 """
 
+from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
 from bemkit.studies.stability.independent_check.check import COARSE_LIMIT as COARSE_LIMIT
-from bemkit.studies.stability.independent_check.check import CONTACT_LIMIT as CONTACT_LIMIT
 from bemkit.studies.stability.independent_check.check import IndependentCheck as IndependentCheck
 from bemkit.studies.stability.independent_check.check import check_solution as check_solution

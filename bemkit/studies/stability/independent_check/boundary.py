@@ -1,23 +1,46 @@
-"""The boundary of a body at quadrature points, made from nothing but points on its elements."""
+"""What a solution is checked by: its boundary, made anew from points on its elements, and the sizes of its fields."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.results.solution import Solution
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 
+CONTACT_LIMIT = 1e-6
+"""Largest violation of contact, friction, supports and equilibrium in a right answer. Drivers stop at 1e-9 of a
+traction that may be hundreds of times that of the answer (that of the body held everywhere)."""
+EPSILON = float(np.finfo(float).eps)
 _N_POINTS = 8
 """Gauss points of an element: exact for products of loads and displacements of degree 15."""
 _N_FITTED = 14
 """Points whose polynomial is differentiated: on an arc of 90 degrees 8 of them leave 1e-6, 14 of them round-off."""
 
 
+class Held(NamedTuple):
+    """A direction in which a support holds the nodes of its elements.
+
+    Parameters
+    ----------
+    elements : (m,) int array
+    directions : (m, n_local, 2) array [-]
+    values : (m, n_local) array [m]
+        Prescribed components of the displacement along the directions.
+    """
+
+    elements: IntArray
+    directions: FloatArray
+    values: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class Boundary:
-    """Places on each element, and how nodal values are interpolated there.
+    """Places on each element, what the scene gives there, and how nodal values are interpolated.
 
     Parameters
     ----------
@@ -31,6 +54,9 @@ class Boundary:
         At the nodes of each element; normals are one-sided at corners.
     basis : (n_local, n_places) array
         Lagrange polynomials at the quadrature points.
+    traction : (n_elements, n_places, 2) array [Pa]
+        Loads as they are given, reactions of supports as means of elements; none of contact, which is known at nodes.
+    held : tuple of Held
     """
 
     points: FloatArray
@@ -40,6 +66,8 @@ class Boundary:
     node_points: FloatArray
     node_normals: FloatArray
     basis: FloatArray
+    traction: FloatArray
+    held: tuple[Held, ...]
 
     @property
     def lengths(self) -> FloatArray:
@@ -52,38 +80,37 @@ class Boundary:
 
 
 def boundary_of(solution: Solution) -> Boundary:
-    """Return the elements of a solution with quadrature points, normals and interpolation."""
+    """Return the elements of a solution with quadrature points, normals, loads, supports and interpolation."""
     mesh = solution.mesh
     places, weights = np.polynomial.legendre.leggauss(_N_POINTS)
     space = solution.scene.discretisation.displacement_space(mesh)  # which tells the rows of a result apart, no more
-    node_places, nodes = space.local_nodes, space.element_dofs
     elements = np.arange(mesh.n_elements)
     fitted = np.polynomial.legendre.leggauss(_N_FITTED)[0]
     curve = mesh.points(elements, fitted) - mesh.centre
-    slopes, node_slopes = (_slopes(curve, fitted, where) for where in (places, node_places))
+    slopes, node_slopes = (_slopes(curve, fitted, where) for where in (places, space.local_nodes))
     # on straight elements half the chord is exact, where differences of points lose digits
     half_chord = 0.5 * (mesh.end - mesh.start)[mesh.is_straight][:, None]
     slopes[mesh.is_straight] = node_slopes[mesh.is_straight] = half_chord
+    points, normals = mesh.points(elements, places), _turned_right(slopes)
+    node_points, node_normals = mesh.points(elements, space.local_nodes), _turned_right(node_slopes)
+    lagrange = np.linalg.solve(np.vander(space.local_nodes).T, np.vander(places, space.local_nodes.size).T)
     return Boundary(
-        points=mesh.points(elements, places),
-        normals=turned_right(slopes),
+        points=points,
+        normals=normals,
         shares=np.hypot(slopes[..., 0], slopes[..., 1]) * weights,
-        nodes=nodes,
-        node_points=mesh.points(elements, node_places),
-        node_normals=turned_right(node_slopes),
-        basis=_lagrange(node_places, places),
+        nodes=space.element_dofs,
+        node_points=node_points,
+        node_normals=node_normals,
+        basis=np.asarray(lagrange),
+        traction=_tractions(solution, points, normals),
+        held=tuple(_held(solution, node_points, node_normals)),
     )
 
 
-def turned_right(vectors: FloatArray) -> FloatArray:
+def _turned_right(vectors: FloatArray) -> FloatArray:
     """Return unit vectors (..., 2) at a right angle to the right: outward normals of anticlockwise tangents."""
     size = np.hypot(vectors[..., 0], vectors[..., 1])
     return np.stack([vectors[..., 1] / size, -vectors[..., 0] / size], axis=-1)
-
-
-def _lagrange(nodes: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the (n_nodes, n_places) Lagrange polynomials that belong to some nodes."""
-    return np.asarray(np.linalg.solve(np.vander(nodes).T, np.vander(places, nodes.size).T))
 
 
 def _slopes(values: FloatArray, places: FloatArray, targets: FloatArray) -> FloatArray:
@@ -93,3 +120,109 @@ def _slopes(values: FloatArray, places: FloatArray, targets: FloatArray) -> Floa
     coefficients = np.linalg.solve(legendre.legvander(places, degree), values.swapaxes(0, 1).reshape(places.size, -1))
     slopes = legendre.legvander(targets, degree - 1) @ legendre.legder(coefficients)
     return np.asarray(slopes.reshape(targets.size, len(values), 2).swapaxes(0, 1))
+
+
+def _tractions(solution: Solution, points: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return `Boundary.traction`."""
+    traction = np.zeros_like(points)
+    for part in solution.scene.parts:
+        elements = solution.mesh.part(part.name)
+        if isinstance(part.condition, Traction | Pressure):
+            load = part.condition.at(points[elements].reshape(-1, 2), normals[elements].reshape(-1, 2))
+            traction[elements] = solution.scene.load_factors[-1] * load.reshape(traction[elements].shape)
+        elif not isinstance(part.condition, Contact):
+            traction[elements] = solution.boundary.traction[elements][:, None]
+    return traction
+
+
+def _held(solution: Solution, node_points: FloatArray, node_normals: FloatArray) -> Iterator[Held]:
+    """Yield the directions in which the supports hold the body."""
+    for part in solution.scene.parts:
+        elements = solution.mesh.part(part.name)
+        points = node_points[elements]
+        match part.condition:
+            case Clamped():
+                given, components = np.zeros_like(points), [0, 1]
+            case PrescribedDisplacement(is_prescribed=is_prescribed) as condition:
+                given = solution.scene.load_factors[-1] * condition.at(points.reshape(-1, 2)).reshape(points.shape)
+                components = np.flatnonzero(is_prescribed).tolist()
+            case Roller():
+                yield Held(elements, node_normals[elements], np.zeros(points.shape[:2]))
+                continue
+            case _:
+                continue
+        for component in components:
+            yield Held(elements, np.broadcast_to(np.eye(2)[component], points.shape), given[:, :, component])
+
+
+class Scales(NamedTuple):
+    """Sizes that violations are divided by.
+
+    Parameters
+    ----------
+    stress : float [Pa]
+        Largest traction on the boundary, but no less than its round-off is worth, see `trusted_stress`.
+    length : float [m]
+        Displacement that this traction causes across the body, ``stress * diameter / E'``. What is left of rigid
+        motions a million times longer is round-off. If there are no tractions at all, as in a body that has given way
+        to an overlap, its displacement is the only length there is.
+    coordinates : float [m]
+        Round-off of lengths that are differences of coordinates.
+    turned : float [m]
+        Round-off of displacement components: the largest displacement times the error of normals of curved elements,
+        which are differentiated from coordinates.
+    """
+
+    stress: float
+    length: float
+    coordinates: float
+    turned: float
+
+
+def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
+    """Return the sizes that the violations in a solution are measured by.
+
+    What is left of the load step `before` is known no better than its own tractions were.
+    """
+    modulus, diameter = solution.scene.material.plane_modulus, solution.mesh.diameter
+    displacement = float(np.abs(solution.boundary.displacement).max())
+    table = solution.contact
+    fields = (solution.boundary.traction, table.sigma_n, table.sigma_t)
+    largest_traction = max(float(np.abs(each).max(initial=0.0)) for each in fields)
+    trusted = max(trusted_stress(each) for each in (solution, before) if each is not None)
+    stress = max(largest_traction, trusted)
+    length = max(stress / modulus * diameter, 1e-6 * displacement)
+    if largest_traction <= CONTACT_LIMIT * trusted:  # the body has only moved: a hundredth of that, to be strict
+        length = max(length, 1e-2 * displacement)
+    gaps = np.abs(table.gap[np.isfinite(table.gap)]).max(initial=0.0)
+    coordinates = 64.0 * EPSILON * (float(np.abs(solution.mesh.nodes).max()) + float(gaps))
+    curved = solution.mesh.lengths[~solution.mesh.is_straight]
+    # derivatives of 14 points amplify their errors by up to 14^2 at the ends of an element
+    error = 200.0 * EPSILON * float(np.abs(solution.mesh.nodes).max()) / float(curved.min()) if curved.size else 0.0
+    return Scales(stress or 1.0, length or 1.0, coordinates, (error + 1e-12) * displacement)
+
+
+def trusted_stress(solution: Solution) -> float:
+    """Return the stress [Pa] whose `CONTACT_LIMIT`-th part is the round-off of tractions: the least to measure by.
+
+    Numbers hold a displacement to some eps of its size. Across a node of length h that is the strain ``eps |u| / h``,
+    times E' a stress, which a bulk modulus beyond E' multiplies. A body that only moves, say because an overlap has
+    pushed it aside, has no tractions but these. Tiny elements and nearly incompressible bodies are no excuse for
+    tractions beyond 1e-10 of those by which the displacement would strain the whole body.
+    """
+    material, diameter = solution.scene.material, solution.mesh.diameter
+    freedom = 1.0 if material.is_incompressible else 1.0 - 2.0 * material.effective_poisson_ratio
+    lengths = solution.contact.weight if solution.contact.n_contact else solution.mesh.lengths
+    digits = 64.0 * EPSILON * diameter / (float(lengths.min()) * freedom)
+    strain = float(np.abs(solution.boundary.displacement).max()) / diameter
+    return min(digits / CONTACT_LIMIT, 1e-4) * strain * material.plane_modulus
+
+
+def largest(values: FloatArray) -> float:
+    """Return the largest value, at least zero; nan if there is one."""
+    return float(np.max(np.maximum(values, 0.0), initial=0.0))
+
+
+def beyond(differences: FloatArray, allowed: float, unit: float) -> float:
+    """Return the largest difference beyond what is allowed, in units; nan if there is one."""
+    return max(largest(differences) - allowed, 0.0) / unit if not np.isnan(differences).any() else float("nan")

@@ -15,9 +15,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
-from bemkit.studies.accuracy.measure import error_tasks
 from bemkit.studies.accuracy.records import STAGES, ErrorRecord, by_series, fitted_order
-from bemkit.studies.accuracy.runs import AdaptiveMeshes, Run, all_runs, graded, uniform
+from bemkit.studies.accuracy.runs import Run, adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import StudyError, Task, compute
 
 LINEAR, QUADRATIC, CONSTANT = bk.LinearGalerkin(), bk.QuadraticGalerkin(), bk.ConstantCollocation()
@@ -38,13 +37,13 @@ def paper_runs(*meshes: Any, elements: tuple[Any, ...] = (LINEAR,), **changes: A
 
 def test_runs_are_all_combinations_but_adaptive_constant_elements() -> None:
     scene = bk.load_scene("paper-1")
-    meshes = (uniform((20, 40)), graded((20,)), AdaptiveMeshes((1e-2,)))
+    meshes = (uniform((20, 40)), graded((20,)), adaptive((1e-2,)))
     runs = all_runs(scene, [CONSTANT, LINEAR], meshes, [NEWTON, AUGMENTED])
     assert len({run.key for run in runs}) == len(runs) == 2 * (2 + 1) + 2 * (2 + 1 + 1)
     assert {(run.discretisation, run.map) for run in runs} == {("constant", "collocation"), ("linear", "Galerkin")}
     assert {run.solver for run in runs} == {"semismooth-newton", "augmented-lagrangian"}
-    adaptive = next(run.scene.mesh for run in runs if run.meshes == "adaptive")
-    assert (adaptive.accuracy, adaptive.most_elements) == (1e-2, 500)
+    followed = next(run.scene.mesh for run in runs if run.meshes == "adaptive")
+    assert (followed.accuracy, followed.most_elements) == (1e-2, 500)
     densities = [run.scene.mesh.density for run in all_runs(bk.load_scene("paper-2"), [LINEAR], meshes[:2], [NEWTON])]
     assert densities == [{"bottom": 2.0}] * 3
 
@@ -52,7 +51,7 @@ def test_runs_are_all_combinations_but_adaptive_constant_elements() -> None:
 def test_nothing_to_run_and_runs_that_are_the_same() -> None:
     scene = bk.load_scene("paper-1")
     with pytest.raises(StudyError, match="nothing to run: give at least one element type"):
-        all_runs(scene, [CONSTANT], [AdaptiveMeshes()], [NEWTON])
+        all_runs(scene, [CONSTANT], [adaptive()], [NEWTON])
     with pytest.raises(StudyError, match="no part of the scene is in contact: errors are measured"):
         all_runs(bk.load_scene("bending"), [LINEAR], [uniform()], [NEWTON])
     with pytest.raises(StudyError, match="linear, uniform, semismooth-newton of size 20 is given twice: leave one out"):
@@ -98,7 +97,7 @@ def test_a_scene_that_does_not_allow_an_element_type_is_a_row_among_others() -> 
 
 
 def test_an_accuracy_out_of_reach_shows_what_was_reached() -> None:
-    meshes = AdaptiveMeshes((1e-2, 1e-6), most_elements=100)
+    meshes = adaptive((1e-2, 1e-6), most_elements=100)
     near, far = compute(error_tasks(paper_runs(meshes, elements=(QUADRATIC,)), reference(), 1))
     assert near.message == ""
     assert near.estimated_error <= 1e-2

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.studies.stability.independent_check.kernels import State, centre_of_dilatation, point_force, uniform_stress
+from bemkit.studies.stability.independent_check.balance import (
+    State,
+    centre_of_dilatation,
+    point_force,
+    uniform_stress,
+)
 
 MATERIALS = (bk.Material(2.0, 0.3), bk.Material(2.0, 0.3, bk.Plane.STRESS), bk.Material(2.0, -0.4))
 SOURCE = np.array([0.2, -0.1])
