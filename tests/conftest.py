@@ -15,9 +15,15 @@ settings.load_profile(os.environ.get("BEMKIT_HYPOTHESIS", "quick"))
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config: pytest.Config) -> None:
-    """Spread a run of all tests over the processors, file by file, so that a file's fixtures are made once."""
-    is_worker = "PYTEST_XDIST_WORKER" in os.environ
+    """Spread a run of all tests over the processors, file by file, so that a file's fixtures are made once.
+
+    Some tests or `pytest -n 0` run in one process.
+    """
     is_everything = config.args_source is pytest.Config.ArgsSource.TESTPATHS
-    if config.pluginmanager.hasplugin("xdist") and is_everything and not is_worker:
-        if config.option.numprocesses is None:
-            config.option.numprocesses, config.option.dist = "auto", "loadfile"
+    is_worker = "PYTEST_XDIST_WORKER" in os.environ
+    if not is_everything or is_worker or not config.pluginmanager.hasplugin("xdist"):
+        return
+    if config.option.numprocesses is None:
+        config.option.numprocesses, config.option.dist = "auto", "loadfile"
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+            os.environ.setdefault(name, "1")  # one process for each processor, not two
