@@ -13,7 +13,8 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
-from bemkit.scene.scene import Contact, Scene
+from bemkit.scene.conditions import Contact
+from bemkit.scene.scene import Scene
 
 SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees: directions of contact at one node that differ by less belong to one smooth side."""

@@ -15,8 +15,10 @@ from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.reference.values import Answer, Places, Reference, Zone, errors_of
 from bemkit.results.solution import Solution
+from bemkit.scene.conditions import Contact
+from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import Contact, QuadraticGalerkin, Scene
+from bemkit.scene.scene import Scene
 
 FINEST = 1e-12
 """An accuracy that no mesh reaches, so that the number of elements alone ends the search."""

@@ -13,8 +13,9 @@ from bemkit.reference.paper import paper_reference
 from bemkit.reference.pressure import places_along
 from bemkit.reference.values import Answer, Places, Reference
 from bemkit.reference.wavy import WavyObstacle
+from bemkit.scene.discretisation import LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import LinearGalerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.ssn import SemismoothNewton
 

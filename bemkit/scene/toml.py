@@ -14,9 +14,10 @@ from typing import Any, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
-from bemkit.scene.scene import Discretisation, Galerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 

@@ -25,7 +25,8 @@ from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.outputs import csv_text, plain_table, stdout_console
-from bemkit.scene.scene import ConstantCollocation, MeshOptions
+from bemkit.scene.discretisation import ConstantCollocation
+from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve

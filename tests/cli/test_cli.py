@@ -23,7 +23,8 @@ import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import main
 from bemkit.results.result_file import read_result
-from bemkit.scene.scene import MeshOptions, QuadraticGalerkin
+from bemkit.scene.discretisation import QuadraticGalerkin
+from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
 

@@ -16,7 +16,7 @@ from bemkit.contact.problem import ContactState, LawError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import nodal_forces, prepare, supports_on
 from bemkit.runs.run import UnsolvableSceneError
-from bemkit.scene.scene import Discretisation
+from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
 from bemkit.solvers.homotopy import AffineBound, follow_path
 from bemkit.testing.lemke import LemkePivoting

@@ -17,7 +17,9 @@ from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.linear.solvers import DefiniteOperator, Factor, Krylov, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
-from bemkit.scene.scene import Clamped, Condition, Contact, MeshOptions, Part, PrescribedDisplacement, Roller, Scene
+from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 
 

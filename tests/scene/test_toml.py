@@ -17,19 +17,10 @@ from bemkit.formulas import Expression
 from bemkit.geometry.grading import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
-from bemkit.scene.scene import (
-    Clamped,
-    ConstantCollocation,
-    Contact,
-    LinearGalerkin,
-    MeshOptions,
-    Part,
-    PrescribedDisplacement,
-    Pressure,
-    Roller,
-    Scene,
-    Traction,
-)
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.discretisation import ConstantCollocation, LinearGalerkin
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
 from bemkit.solvers.fixed_point import FixedPoint

@@ -11,8 +11,9 @@ from bemkit.plan import make_plan
 from bemkit.reference.compare import over_resolved
 from bemkit.reference.shipped import find_reference
 from bemkit.reference.values import MEASURES, Reference
+from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import QuadraticGalerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import scene_to_toml, with_overrides
 from bemkit.solvers.base import ContactSolver

@@ -8,9 +8,10 @@ from typing import Protocol
 
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.scene import Discretisation, Scene
+from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 from bemkit.studies.engine import StudyError
 

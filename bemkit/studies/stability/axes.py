@@ -14,7 +14,9 @@ from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.grading import Uniform
 from bemkit.geometry.shapes import Rectangle
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Contact, MeshOptions, Part, Pressure, Scene, Traction
+from bemkit.scene.conditions import Contact, Part, Pressure, Traction
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver

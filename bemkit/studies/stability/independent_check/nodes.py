@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Roller
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.studies.stability.independent_check.boundary import Boundary
 from bemkit.studies.stability.independent_check.obstacles import distance_to
 

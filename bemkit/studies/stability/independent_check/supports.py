@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.results.solution import Solution
-from bemkit.scene.scene import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.studies.stability.independent_check.boundary import Boundary
 from bemkit.studies.stability.independent_check.contact import beyond, largest
 from bemkit.studies.stability.independent_check.scales import Scales

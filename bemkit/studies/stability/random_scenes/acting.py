@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression
-from bemkit.scene.scene import Clamped, Condition, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Condition, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.studies.stability.random_scenes.bodies import Body, SideSample
 from bemkit.studies.stability.random_scenes.draw import between, chance, decades, direction, one_by_weight, one_of
 

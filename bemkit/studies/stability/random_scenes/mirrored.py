@@ -10,7 +10,7 @@ from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.formulas import Expression
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene.scene import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.studies.stability.random_scenes.bodies import Body
 from bemkit.studies.stability.random_scenes.draw import between, chance, decades, one_of
 from bemkit.studies.stability.random_scenes.touching import random_law

@@ -10,10 +10,11 @@ import numpy as np
 from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
+from bemkit.scene.conditions import Part
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, LinearGalerkin, QuadraticGalerkin
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Part, Scene
+from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver

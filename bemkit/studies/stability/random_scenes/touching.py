@@ -13,7 +13,7 @@ from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
-from bemkit.scene.scene import Contact, Part
+from bemkit.scene.conditions import Contact, Part
 from bemkit.studies.stability.random_scenes.bodies import Body, SideSample
 from bemkit.studies.stability.random_scenes.draw import (
     between,
