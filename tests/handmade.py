@@ -4,8 +4,16 @@ import zlib
 
 import numpy as np
 
+from bemkit.contact.condensation.nodes import contact_conditions
+from bemkit.contact.condensation.reduction import condensed_body
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
+
+
+def condense(elastic, supports, candidates, force):
+    """Reduce an elastic body with supports to those of the candidates that can touch."""
+    conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
+    return condensed_body(elastic, conditions, contact, force)
 
 
 def block_stiffness(n, poisson_ratio):

@@ -61,10 +61,6 @@ class LinearConditions:
         rows : (n_contact, 2) bool array
             Which conditions (normal, tangential) of which nodes to replace.
         other : LinearConditions
-
-        Returns
-        -------
-        LinearConditions
         """
         return LinearConditions(
             np.where(rows[:, :, None], other.on_displacement, self.on_displacement),
@@ -106,10 +102,6 @@ class LinearConditions:
         displacement : (n_contact, 2) array [m]
             Where the springs are without force.
         stiffness : float [Pa/m]
-
-        Returns
-        -------
-        LinearConditions
         """
         spring = np.where(np.any(self.on_displacement != 0.0, axis=2), 0.0, stiffness)
         return LinearConditions(
@@ -120,16 +112,7 @@ class LinearConditions:
 
 
 def separated(n_contact: int) -> LinearConditions:
-    """Return the conditions of open nodes: ``t = 0``.
-
-    Parameters
-    ----------
-    n_contact : int
-
-    Returns
-    -------
-    LinearConditions
-    """
+    """Return the conditions of open nodes: ``t = 0``."""
     return LinearConditions(np.zeros((n_contact, 2, 2)), _unit_blocks(n_contact), np.zeros((n_contact, 2)))
 
 
@@ -141,10 +124,6 @@ def stick(gap: FloatArray, reference_slip: FloatArray) -> LinearConditions:
     gap : (n_contact,) array [m]
     reference_slip : (n_contact,) array [m]
         Tangential displacement at which the node was last at rest (zero for the static law).
-
-    Returns
-    -------
-    LinearConditions
     """
     n_contact = len(gap)
     value = np.stack([gap, reference_slip], axis=1)
@@ -165,10 +144,6 @@ def slip(
         Derivative of the friction bound, ``-s`` for Coulomb's law.
     bound_intercept : (n_contact,) array [Pa]
         The linearised bound is ``bound_slope * t_n + bound_intercept``.
-
-    Returns
-    -------
-    LinearConditions
 
     Notes
     -----
@@ -197,10 +172,6 @@ def augmented(
     multiplier : (n_contact, 2) array [Pa]
         sigma^(k) of Algorithm 1, kept fixed during an inner loop.
     rho_n, rho_t : float [Pa/m]
-
-    Returns
-    -------
-    LinearConditions
     """
     n_contact = len(gap)
     rho = np.array([rho_n, rho_t])

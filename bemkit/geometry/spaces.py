@@ -133,12 +133,7 @@ class ConstantSpace:
 
 @dataclass(frozen=True, eq=False)
 class ElementwiseSpace:
-    """The functions of another space with dofs of their own on each element, so that all of them may jump.
-
-    Parameters
-    ----------
-    space : BoundarySpace
-    """
+    """The functions of another space with dofs of their own on each element, so that all of them may jump."""
 
     space: BoundarySpace
 

@@ -55,10 +55,6 @@ def load_scene(source: str | Path) -> Scene:
     source : str or Path
         Path of a TOML file, or the name of a shipped scene such as ``"paper-1"``.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError
@@ -96,10 +92,6 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
     name : str
         Where the text comes from, for messages.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError
@@ -119,10 +111,6 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
 
 def scene_to_toml(scene: Scene) -> str:
     """Write a scene as TOML text, leaving out what has its default value.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------
@@ -170,10 +158,6 @@ def with_overrides(
         Of Galerkin elements, instead of a discretisation.
     rho : float, optional
         Penalty of the solver in units of E'/L; sets all penalties it has.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

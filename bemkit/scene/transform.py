@@ -15,7 +15,7 @@ from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Traction
+from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
 from bemkit.scene.scene import Scene
 
 
@@ -221,21 +221,14 @@ def _transformed_part(part: Part, affine: AffineMap, stress: float, displacement
 
 
 def _transformed_condition(condition: Condition, affine: AffineMap, stress: float, displacement: float) -> Condition:
-    def moved(field: ScalarField, factor: float) -> TransformedField:
-        return TransformedField(field, affine, factor)
-
-    match condition:
-        case Traction(x, y):
-            return Traction(moved(x, stress), moved(y, stress))
-        case Pressure(pressure, shear):
-            return Pressure(moved(pressure, stress), moved(shear, stress))
-        case PrescribedDisplacement(x, y):
-            components = [None if value is None else moved(value, displacement) for value in (x, y)]
-            return PrescribedDisplacement(*components)
-        case Contact(obstacle, law):
-            own = None if law is None else TransformedLaw(law, 1.0 / stress, affine)
-            return Contact(TransformedObstacle(obstacle, affine, displacement), own)
-    return condition
+    if isinstance(condition, Contact):
+        own = None if condition.law is None else TransformedLaw(condition.law, 1.0 / stress, affine)
+        return Contact(TransformedObstacle(condition.obstacle, affine, displacement), own)
+    return with_fields(
+        condition,
+        lambda load: TransformedField(load, affine, stress),
+        lambda motion: TransformedField(motion, affine, displacement),
+    )
 
 
 def _transformed_curve(curve: Curve, affine: AffineMap) -> Curve:

@@ -10,7 +10,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.condensation.nodes import retained_tangents
-from bemkit.contact.condensation.reduction import condense
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactState, LawError
 from bemkit.model.contact_model import Model, build_model
@@ -20,6 +19,7 @@ from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
 from bemkit.solvers.homotopy import AffineBound, follow_path
 from bemkit.testing.lemke import LemkePivoting
+from tests.handmade import condense
 
 FLOOR = bk.HalfPlane()
 NEWTON = bk.SemismoothNewton()

@@ -90,10 +90,6 @@ def contact_along_normals(space: BoundarySpace, elements: IntArray, *, is_fricti
         Contact elements in order along the boundary.
     is_frictionless : bool
         Of all nodes.
-
-    Returns
-    -------
-    ContactNodes
     """
     nodes, normals = nodes_on(space, elements)
     weights = dof_weights(space, elements)[nodes]

@@ -191,10 +191,6 @@ def divide(outline: Outline, parts: Mapping[str, Selection]) -> Division:
     parts : mapping of str to Selection
         Boundary parts by name; they must not overlap, and need not cover the boundary.
 
-    Returns
-    -------
-    Division
-
     Raises
     ------
     GeometryError
