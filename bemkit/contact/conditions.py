@@ -158,6 +158,22 @@ def slip(
     return LinearConditions(on_displacement, on_traction, np.stack([gap, -direction * bound_intercept], axis=1))
 
 
+def of_statuses(
+    is_closed: BoolArray, slips: BoolArray, held: LinearConditions, sliding: LinearConditions
+) -> LinearConditions:
+    """Return the conditions of nodes in different statuses.
+
+    Parameters
+    ----------
+    is_closed, slips : (n_contact,) bool arrays
+        Where the normal condition is that of `held` (elsewhere ``t_n = 0``), and where the tangential one is that of
+        `sliding` (elsewhere that of `held`).
+    held, sliding : LinearConditions
+    """
+    conditions = separated(len(is_closed)).replaced(np.stack([is_closed, ~slips], axis=1), held)
+    return conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
+
+
 def augmented(
     gap: FloatArray, reference_slip: FloatArray, multiplier: FloatArray, rho_n: float, rho_t: float
 ) -> LinearConditions:
