@@ -108,7 +108,8 @@ class FrictionLaw(Protocol):
 class _LawOfCoefficients(FrictionLaw):
     """A law whose fields are coefficients: checked, evaluated, rescaled and compared in one way.
 
-    Two are equal if their classes and coefficients are; arrays are compared as a whole.
+    Two are equal if their classes and coefficients are; arrays are compared as a whole. `stresses` names the
+    coefficients [Pa], which change with the unit of stress.
     """
 
     stresses: ClassVar[tuple[str, ...]] = ()
