@@ -310,7 +310,8 @@ def test_an_interrupt_leaves_no_file(
 
 
 def test_a_real_ctrl_c_ends_with_130() -> None:
-    code = "import sys; from bemkit.cli.main import main; print('ready', flush=True); main(sys.argv[1:])"
+    heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # a background job does not
+    code = f"{heeds}; import sys; from bemkit.cli.main import main; print('ready', flush=True); main(sys.argv[1:])"
     process = subprocess.Popen(
         [sys.executable, "-c", code, "run", "paper-1", "--elements", "3000", "-o", "r.h5"],
         stdout=subprocess.PIPE,
