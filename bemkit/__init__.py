@@ -77,20 +77,20 @@ if TYPE_CHECKING:
     from bemkit.runs.run import run as run
     from bemkit.runs.run import run_all as run_all
     from bemkit.runs.run import run_probe as run_probe
-    from bemkit.scene.scene import Clamped as Clamped
-    from bemkit.scene.scene import ConstantCollocation as ConstantCollocation
-    from bemkit.scene.scene import Contact as Contact
-    from bemkit.scene.scene import Galerkin as Galerkin
-    from bemkit.scene.scene import HpGalerkin as HpGalerkin
-    from bemkit.scene.scene import LinearGalerkin as LinearGalerkin
-    from bemkit.scene.scene import MeshOptions as MeshOptions
-    from bemkit.scene.scene import Part as Part
-    from bemkit.scene.scene import PrescribedDisplacement as PrescribedDisplacement
-    from bemkit.scene.scene import Pressure as Pressure
-    from bemkit.scene.scene import QuadraticGalerkin as QuadraticGalerkin
-    from bemkit.scene.scene import Roller as Roller
+    from bemkit.scene.conditions import Clamped as Clamped
+    from bemkit.scene.conditions import Contact as Contact
+    from bemkit.scene.conditions import Part as Part
+    from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement
+    from bemkit.scene.conditions import Pressure as Pressure
+    from bemkit.scene.conditions import Roller as Roller
+    from bemkit.scene.conditions import Traction as Traction
+    from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
+    from bemkit.scene.discretisation import Galerkin as Galerkin
+    from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
+    from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
+    from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
+    from bemkit.scene.mesh_options import MeshOptions as MeshOptions
     from bemkit.scene.scene import Scene as Scene
-    from bemkit.scene.scene import Traction as Traction
     from bemkit.scene.toml import load_scene as load_scene
     from bemkit.scene.toml import scene_from_toml as scene_from_toml
     from bemkit.scene.toml import scene_to_toml as scene_to_toml
@@ -129,22 +129,10 @@ _HOME = {
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
-    "scene.scene": (
-        "Clamped",
-        "ConstantCollocation",
-        "Contact",
-        "Galerkin",
-        "HpGalerkin",
-        "LinearGalerkin",
-        "MeshOptions",
-        "Part",
-        "PrescribedDisplacement",
-        "Pressure",
-        "QuadraticGalerkin",
-        "Roller",
-        "Scene",
-        "Traction",
-    ),
+    "scene.conditions": ("Clamped", "Contact", "Part", "PrescribedDisplacement", "Pressure", "Roller", "Traction"),
+    "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
+    "scene.mesh_options": ("MeshOptions",),
+    "scene.scene": ("Scene",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),
     "solvers.alm": ("AugmentedLagrangian",),
     "solvers.base": ("ContactSolver", "Status", "solve"),

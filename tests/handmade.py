@@ -4,8 +4,25 @@ import zlib
 
 import numpy as np
 
+from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, contact_frame, nodes_on
+from bemkit.contact.condensation.reduction import condensed_body
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
+from bemkit.geometry.spaces import dof_points, dof_weights
+
+
+def contact_along_normals(space, elements, *, is_frictionless=False):
+    """Return the nodes of elements (m,), in order along the boundary, with contact along the body's normals."""
+    nodes, normals = nodes_on(space, elements)
+    law = np.full(nodes.size, is_frictionless)
+    weights = dof_weights(space, elements)[nodes]
+    return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights, law)
+
+
+def condense(elastic, supports, candidates, force):
+    """Reduce an elastic body with supports to those of the candidates that can touch."""
+    conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
+    return condensed_body(elastic, conditions, contact, force)
 
 
 def block_stiffness(n, poisson_ratio):

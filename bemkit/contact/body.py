@@ -75,10 +75,6 @@ class ContactState:
         other : ContactState
         fraction : float
             Zero gives this state, one gives `other`.
-
-        Returns
-        -------
-        ContactState
         """
         if fraction == 1.0:
             return other
@@ -139,10 +135,6 @@ class LinearBody(Protocol):
         ----------
         conditions : LinearConditions
             At nodes whose tangent is eliminated the second one is ``sigma_t = 0``.
-
-        Returns
-        -------
-        ContactState
 
         Raises
         ------

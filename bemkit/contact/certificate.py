@@ -69,15 +69,6 @@ class Certificate:
 def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     """Measure a state against conditions (6) to (8), whoever produced it.
 
-    Parameters
-    ----------
-    problem : ContactProblem
-    state : ContactState
-
-    Returns
-    -------
-    Certificate
-
     Notes
     -----
     Tractions are measured by the largest traction in the state or in the sticking state (all nodes held), whichever is

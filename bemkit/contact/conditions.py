@@ -61,10 +61,6 @@ class LinearConditions:
         rows : (n_contact, 2) bool array
             Which conditions (normal, tangential) of which nodes to replace.
         other : LinearConditions
-
-        Returns
-        -------
-        LinearConditions
         """
         return LinearConditions(
             np.where(rows[:, :, None], other.on_displacement, self.on_displacement),
@@ -106,10 +102,6 @@ class LinearConditions:
         displacement : (n_contact, 2) array [m]
             Where the springs are without force.
         stiffness : float [Pa/m]
-
-        Returns
-        -------
-        LinearConditions
         """
         spring = np.where(np.any(self.on_displacement != 0.0, axis=2), 0.0, stiffness)
         return LinearConditions(
@@ -120,16 +112,7 @@ class LinearConditions:
 
 
 def separated(n_contact: int) -> LinearConditions:
-    """Return the conditions of open nodes: ``t = 0``.
-
-    Parameters
-    ----------
-    n_contact : int
-
-    Returns
-    -------
-    LinearConditions
-    """
+    """Return the conditions of open nodes: ``t = 0``."""
     return LinearConditions(np.zeros((n_contact, 2, 2)), _unit_blocks(n_contact), np.zeros((n_contact, 2)))
 
 
@@ -141,10 +124,6 @@ def stick(gap: FloatArray, reference_slip: FloatArray) -> LinearConditions:
     gap : (n_contact,) array [m]
     reference_slip : (n_contact,) array [m]
         Tangential displacement at which the node was last at rest (zero for the static law).
-
-    Returns
-    -------
-    LinearConditions
     """
     n_contact = len(gap)
     value = np.stack([gap, reference_slip], axis=1)
@@ -166,10 +145,6 @@ def slip(
     bound_intercept : (n_contact,) array [Pa]
         The linearised bound is ``bound_slope * t_n + bound_intercept``.
 
-    Returns
-    -------
-    LinearConditions
-
     Notes
     -----
     Algorithm 2 of the paper prints the slip traction with the opposite sign; equation (16) implies the one used here.
@@ -181,6 +156,22 @@ def slip(
     on_traction[:, 1, 0] = direction * bound_slope
     on_traction[:, 1, 1] = 1.0
     return LinearConditions(on_displacement, on_traction, np.stack([gap, -direction * bound_intercept], axis=1))
+
+
+def of_statuses(
+    is_closed: BoolArray, slips: BoolArray, held: LinearConditions, sliding: LinearConditions
+) -> LinearConditions:
+    """Return the conditions of nodes in different statuses.
+
+    Parameters
+    ----------
+    is_closed, slips : (n_contact,) bool arrays
+        Where the normal condition is that of `held` (elsewhere ``t_n = 0``), and where the tangential one is that of
+        `sliding` (elsewhere that of `held`).
+    held, sliding : LinearConditions
+    """
+    conditions = separated(len(is_closed)).replaced(np.stack([is_closed, ~slips], axis=1), held)
+    return conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
 
 
 def augmented(
@@ -197,10 +188,6 @@ def augmented(
     multiplier : (n_contact, 2) array [Pa]
         sigma^(k) of Algorithm 1, kept fixed during an inner loop.
     rho_n, rho_t : float [Pa/m]
-
-    Returns
-    -------
-    LinearConditions
     """
     n_contact = len(gap)
     rho = np.array([rho_n, rho_t])

@@ -12,7 +12,7 @@ which `FrictionLaw.at` turns into numbers per node.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import ClassVar, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -105,8 +105,50 @@ class FrictionLaw(Protocol):
         return RescaledLaw(self, stress_scale)
 
 
-@dataclass(frozen=True)
-class Frictionless(FrictionLaw):
+class _LawOfCoefficients(FrictionLaw):
+    """A law whose fields are coefficients: checked, evaluated, rescaled and compared in one way.
+
+    Two are equal if their classes and coefficients are; arrays are compared as a whole. `stresses` names the
+    coefficients [Pa], which change with the unit of stress.
+    """
+
+    stresses: ClassVar[tuple[str, ...]] = ()
+    may_be_infinite: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in self._coefficients.items():
+            value = _coefficient(name, value, may_be_infinite=name in self.may_be_infinite)
+            object.__setattr__(self, name, value)
+
+    def scaled(self, stress_scale: float) -> Self:
+        """Return the law with its stresses in units of `stress_scale`."""
+        _check_scale(stress_scale)
+        values = {name: _numbers(name, self._coefficients[name]) / stress_scale for name in self.stresses}
+        return replace(self, **values) if values else self  # type: ignore[type-var]
+
+    def at(self, points: FloatArray) -> Self:
+        """Return the law with its coefficients evaluated at (n_contact, 2) points [m]."""
+        values = {name: _evaluated(name, value, points) for name, value in self._coefficients.items()}
+        return replace(self, **values) if values else self  # type: ignore[type-var]
+
+    @property
+    def _coefficients(self) -> dict[str, Coefficient]:
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}  # type: ignore[arg-type]
+
+    def _compared(self) -> tuple[object, ...]:
+        """Return class and coefficients in a form that compares and hashes."""
+        values = self._coefficients.values()
+        return type(self), *(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _LawOfCoefficients) and self._compared() == other._compared()
+
+    def __hash__(self) -> int:
+        return hash(self._compared())
+
+
+@dataclass(frozen=True, eq=False)
+class Frictionless(_LawOfCoefficients):
     """No tangential traction at all."""
 
     @property
@@ -122,24 +164,9 @@ class Frictionless(FrictionLaw):
         """Return zeros."""
         return np.zeros_like(sigma_n)
 
-    def scaled(self, stress_scale: float) -> "Frictionless":
-        """Return the law itself, which knows no stress."""
-        _check_scale(stress_scale)
-        return self
-
-
-class _EqualByCoefficients:
-    """Laws are equal if their classes and coefficients are; arrays are compared as a whole."""
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and _compared(self) == _compared(other)
-
-    def __hash__(self) -> int:
-        return hash((type(self), _compared(self)))
-
 
 @dataclass(frozen=True, eq=False)
-class Tresca(_EqualByCoefficients, FrictionLaw):
+class Tresca(_LawOfCoefficients):
     """Given friction: a bound that does not depend on the pressure.
 
     Parameters
@@ -155,9 +182,7 @@ class Tresca(_EqualByCoefficients, FrictionLaw):
     """
 
     bound_value: Coefficient
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "bound_value", _coefficient("bound_value", self.bound_value))
+    stresses = ("bound_value",)
 
     @property
     def is_frictionless(self) -> bool:
@@ -177,17 +202,9 @@ class Tresca(_EqualByCoefficients, FrictionLaw):
         """Return zeros."""
         return np.zeros_like(sigma_n)
 
-    def scaled(self, stress_scale: float) -> "Tresca":
-        """Return the law with its bound in units of `stress_scale`."""
-        return Tresca(_numbers("bound_value", self.bound_value) / _check_scale(stress_scale))
-
-    def at(self, points: FloatArray) -> "Tresca":
-        """Return the law with its bound evaluated at (n_contact, 2) points [m]."""
-        return replace(self, **_evaluated(self, points))
-
 
 @dataclass(frozen=True, eq=False)
-class Coulomb(_EqualByCoefficients, FrictionLaw):
+class Coulomb(_LawOfCoefficients):
     """Coulomb's law: ``bound = s |sigma_n|``, equations (7) and (8) of the paper.
 
     Parameters
@@ -197,10 +214,6 @@ class Coulomb(_EqualByCoefficients, FrictionLaw):
     """
 
     friction_coefficient: Coefficient
-
-    def __post_init__(self) -> None:
-        value = _coefficient("friction_coefficient", self.friction_coefficient)
-        object.__setattr__(self, "friction_coefficient", value)
 
     @property
     def is_frictionless(self) -> bool:
@@ -217,18 +230,9 @@ class Coulomb(_EqualByCoefficients, FrictionLaw):
         s = _numbers("friction_coefficient", self.friction_coefficient)
         return np.where(sigma_n <= 0.0, -np.asarray(s), 0.0)
 
-    def scaled(self, stress_scale: float) -> "Coulomb":
-        """Return the law itself, which knows no stress."""
-        _check_scale(stress_scale)
-        return self
-
-    def at(self, points: FloatArray) -> "Coulomb":
-        """Return the law with its coefficient evaluated at (n_contact, 2) points [m]."""
-        return replace(self, **_evaluated(self, points))
-
 
 @dataclass(frozen=True, eq=False)
-class CohesiveCoulomb(_EqualByCoefficients, FrictionLaw):
+class CohesiveCoulomb(_LawOfCoefficients):
     """Coulomb's law with cohesion and cap: ``bound = min(c + s |sigma_n|, tau_max)``.
 
     Parameters
@@ -249,11 +253,11 @@ class CohesiveCoulomb(_EqualByCoefficients, FrictionLaw):
     friction_coefficient: Coefficient
     cohesion: Coefficient = 0.0
     cap: Coefficient = float("inf")
+    stresses = ("cohesion", "cap")
+    may_be_infinite = ("cap",)
 
     def __post_init__(self) -> None:
-        for name in ("friction_coefficient", "cohesion"):
-            object.__setattr__(self, name, _coefficient(name, getattr(self, name)))
-        object.__setattr__(self, "cap", _coefficient("cap", self.cap, may_be_infinite=True))
+        super().__post_init__()
         if not (callable(self.cap) or callable(self.cohesion)) and np.any(self.cap < np.asarray(self.cohesion)):
             raise InputError(
                 f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
@@ -273,16 +277,6 @@ class CohesiveCoulomb(_EqualByCoefficients, FrictionLaw):
         """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
         is_rising = (self._uncapped(sigma_n) < _numbers("cap", self.cap)) & (sigma_n <= 0.0)
         return np.where(is_rising, -np.asarray(_numbers("friction_coefficient", self.friction_coefficient)), 0.0)
-
-    def scaled(self, stress_scale: float) -> "CohesiveCoulomb":
-        """Return the law with cohesion and cap in units of `stress_scale`."""
-        scale = _check_scale(stress_scale)
-        cohesion, cap = _numbers("cohesion", self.cohesion), _numbers("cap", self.cap)
-        return CohesiveCoulomb(self.friction_coefficient, cohesion / scale, cap / scale)
-
-    def at(self, points: FloatArray) -> "CohesiveCoulomb":
-        """Return the law with its coefficients evaluated at (n_contact, 2) points [m]."""
-        return replace(self, **_evaluated(self, points))
 
     def _uncapped(self, sigma_n: FloatArray) -> FloatArray:
         s = _numbers("friction_coefficient", self.friction_coefficient)
@@ -315,6 +309,10 @@ class RescaledLaw(FrictionLaw):
     def acts_across_gap(self) -> bool | BoolArray:
         """What the law says."""
         return self.law.acts_across_gap
+
+    def at(self, points: FloatArray) -> FrictionLaw:
+        """Return the law evaluated at (n_contact, 2) points [m], in the same unit of stress."""
+        return self.law.at(points).scaled(self.stress_scale)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``bound(sigma_n * stress_scale) / stress_scale``."""
@@ -355,35 +353,26 @@ def _is_zero(value: Coefficient) -> bool:
     return not callable(value) and not np.any(value)
 
 
-def _evaluated(law: Tresca | Coulomb | CohesiveCoulomb, points: FloatArray) -> dict[str, FloatArray]:
-    """Evaluate every coefficient of a law that is a formula or function at (n_contact, 2) points [m]."""
-    values = {}
-    for entry in fields(law):
-        coefficient = getattr(law, entry.name)
-        if isinstance(coefficient, np.ndarray) and len(coefficient) != len(points):
-            raise LawError(
-                f"{entry.name} has {len(coefficient)} values for {len(points)} contact nodes: give one number, "
-                "one for each node, or a formula of x and y"
-            )
-        if callable(coefficient):
-            value = values[entry.name] = evaluate_field(coefficient, points)
-            if np.any(value < 0.0):
-                node = int(np.argmin(value))
-                x, y = points[node]
-                raise LawError(
-                    f"{entry.name} = {coefficient!r} is {value[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); "
-                    "it must be zero or positive on the whole contact part"
-                )
+def _evaluated(name: str, value: Coefficient, points: FloatArray) -> Coefficient:
+    """Return a coefficient in numbers, evaluated at (n_contact, 2) points [m] if it is a formula or function."""
+    if isinstance(value, np.ndarray) and len(value) != len(points):
+        raise LawError(
+            f"{name} has {len(value)} values for {len(points)} contact nodes: give one number, one for each node, or a "
+            "formula of x and y"
+        )
+    if not callable(value):
+        return value
+    values = evaluate_field(value, points)
+    if np.any(values < 0.0):
+        node = int(np.argmin(values))
+        x, y = points[node]
+        raise LawError(
+            f"{name} = {value!r} is {values[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); it must be zero or positive on "
+            "the whole contact part"
+        )
     return values
 
 
-def _compared(law: Any) -> tuple[object, ...]:
-    """Return the coefficients of a law in a form that compares and hashes."""
-    coefficients = [getattr(law, entry.name) for entry in fields(law)]
-    return tuple(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in coefficients)
-
-
-def _check_scale(stress_scale: float) -> float:
+def _check_scale(stress_scale: float) -> None:
     if not (np.isfinite(stress_scale) and stress_scale > 0.0):
         raise InputError(f"stress_scale = {stress_scale:g}; give a positive finite stress")
-    return stress_scale

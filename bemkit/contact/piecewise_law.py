@@ -12,7 +12,7 @@ from bemkit.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
-class PartwiseLaw(FrictionLaw):
+class PiecewiseLaw(FrictionLaw):
     """Each contact node under the law of its part.
 
     Parameters
@@ -55,9 +55,9 @@ class PartwiseLaw(FrictionLaw):
         """Return the derivative by the law of each node."""
         return self._assembled([law.bound_derivative(sigma_n[nodes]) for law, nodes in self._pairs])
 
-    def scaled(self, stress_scale: float) -> "PartwiseLaw":
+    def scaled(self, stress_scale: float) -> "PiecewiseLaw":
         """Return the laws in units of `stress_scale`."""
-        return PartwiseLaw([law.scaled(stress_scale) for law in self.laws], self.nodes)
+        return PiecewiseLaw([law.scaled(stress_scale) for law in self.laws], self.nodes)
 
     @property
     def _pairs(self) -> list[tuple[FrictionLaw, IntArray]]:
@@ -74,6 +74,6 @@ def law_name(law: FrictionLaw) -> str:
     """Return the name of the class that the user gave, also of a law wrapped by others, for messages."""
     if isinstance(law, RescaledLaw):
         return law_name(law.law)
-    if isinstance(law, PartwiseLaw):
+    if isinstance(law, PiecewiseLaw):
         return " or ".join(dict.fromkeys(law_name(part) for part in law.laws))
     return type(law).__name__

@@ -57,14 +57,6 @@ class UnsolvableLoad:
 def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     """Return a rigid motion on which the load cannot be balanced, or None if contact tractions may balance it.
 
-    Parameters
-    ----------
-    problem : ContactProblem
-
-    Returns
-    -------
-    UnsolvableLoad or None
-
     Notes
     -----
     A motion v escapes if it nowhere presses into the obstacle harder than friction can wedge, ``v_n + s |v_t| <= 0``,

@@ -10,8 +10,7 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.validity.chords import RESOLUTION, make_pieces, resolution
 from bemkit.geometry.validity.loops import check_loops
-from bemkit.geometry.validity.magnitude import check_magnitude
-from bemkit.geometry.vectors import norms
+from bemkit.geometry.vectors import check_magnitude, norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
 _N_SEEN = 4  # points of a side that tell its size, also of a closed one

@@ -22,10 +22,6 @@ from bemkit.geometry.symmetry import is_reversing
 def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, IntArray]]:
     """Yield how a space on a half covers the whole boundary, image by image.
 
-    Parameters
-    ----------
-    space : BoundarySpace
-
     Yields
     ------
     elements : slice
@@ -78,10 +74,6 @@ def reflected_to_whole(space: BoundarySpace, whole: BoundarySpace, values: Float
 
 def antisymmetric_dofs(space: BoundarySpace) -> BoolArray:
     """Tell which vector dofs are zero, because the function goes over into its image on a symmetry line.
-
-    Parameters
-    ----------
-    space : BoundarySpace
 
     Returns
     -------

@@ -12,6 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
+from bemkit.geometry.vectors import angles_between
 
 LARGEST_DEGREE = 12
 """Highest polynomial degree of an element; integrals are exact to round-off up to it."""
@@ -133,12 +134,7 @@ class ConstantSpace:
 
 @dataclass(frozen=True, eq=False)
 class ElementwiseSpace:
-    """The functions of another space with dofs of their own on each element, so that all of them may jump.
-
-    Parameters
-    ----------
-    space : BoundarySpace
-    """
+    """The functions of another space with dofs of their own on each element, so that all of them may jump."""
 
     space: BoundarySpace
 
@@ -293,8 +289,7 @@ def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
     incoming, outgoing = mesh.node_elements[:, 0], mesh.node_elements[:, 1]
     before = mesh.normals_at(incoming, np.array([1.0]))[:, 0]
     after = mesh.normals_at(outgoing, np.array([-1.0]))[:, 0]
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     shortest = np.minimum(mesh.lengths[incoming], mesh.lengths[outgoing])
     round_off = 8.0 * np.finfo(float).eps * np.abs(mesh.nodes).max(axis=1) / shortest
-    corners: BoolArray = np.abs(np.arctan2(cross, np.sum(before * after, axis=1))) > angle + round_off
+    corners: BoolArray = np.abs(angles_between(before, after)) > angle + round_off
     return corners

@@ -167,7 +167,9 @@ def unfold(symmetry: Symmetry, half: Elements) -> Elements:
     images = symmetry.images
     n_elements, n_curves = len(half.elements), len(half.curves)
     number, nodes = _unfolded_nodes(symmetry, half.nodes)
-    elements = [own[half.elements][:, :: _step(image)] for own, image in zip(number, images, strict=True)]
+    elements = [
+        own[half.elements][:, :: -1 if is_reversing(image) else 1] for own, image in zip(number, images, strict=True)
+    ]
     parts = {
         name: np.concatenate([members + g * n_elements for g in range(len(images))])
         for name, members in half.parts.items()
@@ -182,10 +184,6 @@ def unfold(symmetry: Symmetry, half: Elements) -> Elements:
     return Elements(
         nodes, np.concatenate(elements), parts, (*half.curves, *curves), np.concatenate(indices), np.concatenate(spans)
     )
-
-
-def _step(image: FloatArray) -> int:
-    return -1 if is_reversing(image) else 1
 
 
 def _unfolded_nodes(symmetry: Symmetry, nodes: FloatArray) -> tuple[IntArray, FloatArray]:

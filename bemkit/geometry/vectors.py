@@ -1,8 +1,12 @@
-"""Plane vectors, stored as (..., 2) arrays."""
+"""Plane vectors, stored as (..., 2) arrays, and how large they may be."""
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.errors import GeometryError
+
+SMALLEST, LARGEST = 1e-140, 1e140
+"""With their squares, and those times a few powers of ten, these lie within the range of numbers, 1e-308 to 1e308."""
 
 
 def norms(vectors: FloatArray) -> FloatArray:
@@ -26,3 +30,13 @@ def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
 def turned_right(vectors: FloatArray) -> FloatArray:
     """Turn vectors clockwise by a right angle: tangents to outward normals."""
     return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)
+
+
+def check_magnitude(points: FloatArray, owner: str) -> None:
+    """Raise unless (n, 2) points are neither so far out nor so close together that areas overflow or vanish."""
+    farthest, size = float(np.abs(points).max()), float(np.ptp(points, axis=0).max())
+    if not (farthest <= LARGEST and size >= SMALLEST):
+        raise GeometryError(
+            f"{owner}: the boundary measures {size:.3g} and its coordinates reach {farthest:.3g}, the squares of which "
+            f"are no numbers any more: choose a unit of length in which both lie between {SMALLEST:g} and {LARGEST:g}"
+        )

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.condensation.nodes import ContactNodes, contact_along_normals, contact_frame, nodes_on
+from bemkit.contact.condensation.nodes import ContactNodes, contact_frame, nodes_on
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
-from bemkit.scene.scene import Contact, Scene
+from bemkit.scene.conditions import Contact
+from bemkit.scene.scene import Scene
 
 SMOOTH_SIDE_COSINE = 0.866
 """Cosine of 30 degrees: directions of contact at one node that differ by less belong to one smooth side."""
@@ -88,9 +89,9 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
         if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
     }
     if not obstacles:
-        return ContactData(
-            contact_along_normals(space, np.zeros(0, np.intp)), (), *(np.zeros(0),) * 3, np.zeros((0, 2))
-        )
+        none, nowhere = np.zeros(0), np.zeros((0, 2))
+        nodes = ContactNodes(none.astype(np.intp), nowhere, contact_frame(nowhere), none, none.astype(bool))
+        return ContactData(nodes, (), none, none, none, nowhere)
     sides = [_Side.of(obstacle, mesh.part(name), mesh, space) for name, obstacle in obstacles.items()]
     owner = _owners(sides, space.n_dofs // 2, GAP_TOLERANCE * mesh.diameter)
     directions = np.zeros((owner.size, 2))

@@ -19,7 +19,7 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.validity.magnitude import LARGEST, SMALLEST
+from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory

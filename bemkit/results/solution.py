@@ -223,10 +223,6 @@ class Solution:
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
             ``estimated_traction_error`` (None without an estimate),
-            ``transitions``, ``certificate``, ``timings`` [s], ``plan``, ``work``, ``memory`` [bytes].
-
-        @cached_property
-            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
             ``work``, ``memory`` [bytes].
         """

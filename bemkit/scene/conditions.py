@@ -143,6 +143,20 @@ class Contact:
 Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
 
 
+def with_fields(
+    condition: Condition, load: Callable[[ScalarField], ScalarField], motion: Callable[[ScalarField], ScalarField]
+) -> Condition:
+    """Return a condition whose loads and prescribed displacements are functions of what they were."""
+    match condition:
+        case Traction(x, y):
+            return Traction(load(x), load(y))
+        case Pressure(pressure, shear):
+            return Pressure(load(pressure), load(shear))
+        case PrescribedDisplacement(x, y):
+            return PrescribedDisplacement(*(None if value is None else motion(value) for value in (x, y)))
+    return condition
+
+
 @dataclass(frozen=True)
 class Part:
     """A named piece of the boundary with its condition.

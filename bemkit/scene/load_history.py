@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression, ScalarField
-from bemkit.scene.conditions import Condition, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.conditions import with_fields
 from bemkit.scene.scene import Scene
 
 
@@ -32,17 +32,16 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
 def with_scaled_loads(scene: Scene, factor: float) -> Scene:
     """Return a scene whose tractions, pressures and prescribed displacements are multiplied by a number.
 
-    Parameters
-    ----------
-    scene : Scene
-    factor : float
-
     Returns
     -------
     Scene
         With the load factor 1; obstacles and the law are unchanged.
     """
-    parts = tuple(replace(part, condition=_scaled(part.condition, factor)) for part in scene.parts)
+
+    def scaled(field: ScalarField) -> ScalarField:
+        return _times(factor, field)
+
+    parts = tuple(replace(part, condition=with_fields(part.condition, scaled, scaled)) for part in scene.parts)
     return replace(scene, parts=parts, load_factors=(1.0,))
 
 
@@ -57,21 +56,9 @@ class _ScaledFunction:
         return self.factor * self.function(x, y)
 
 
-def _scaled(condition: Condition, factor: float) -> Condition:
-    match condition:
-        case _ if factor == 1.0:
-            return condition
-        case Traction(x, y):
-            return Traction(_times(factor, x), _times(factor, y))
-        case Pressure(pressure, shear):
-            return Pressure(_times(factor, pressure), _times(factor, shear))
-        case PrescribedDisplacement(x, y):
-            scaled = [None if value is None else _times(factor, value) for value in (x, y)]
-            return PrescribedDisplacement(*scaled)
-    return condition
-
-
 def _times(factor: float, value: ScalarField) -> ScalarField:
+    if factor == 1.0:
+        return value
     if isinstance(value, Expression):
         return Expression(f"{factor!r} * ({value.text})")
     if callable(value):

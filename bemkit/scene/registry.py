@@ -40,6 +40,9 @@ class Registry:
                 return {name: item for name, item in table.items() if name != key} | {"kind": word}
         return dict(table)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "built_in", MappingProxyType(self.built_in))
+
     def find(self, kind: str) -> type:
         """Return the class that a word names.
 
@@ -99,107 +102,91 @@ class Registry:
 
 SHAPES = Registry(
     "shape",
-    MappingProxyType(
-        {
-            "rectangle": "bemkit.geometry.shapes:Rectangle",
-            "polygon": "bemkit.geometry.shapes:Polygon",
-            "disk": "bemkit.geometry.shapes:Disk",
-            "sector": "bemkit.geometry.shapes:Sector",
-            "ring": "bemkit.geometry.shapes:Ring",
-            "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
-            "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
-        }
-    ),
+    {
+        "rectangle": "bemkit.geometry.shapes:Rectangle",
+        "polygon": "bemkit.geometry.shapes:Polygon",
+        "disk": "bemkit.geometry.shapes:Disk",
+        "sector": "bemkit.geometry.shapes:Sector",
+        "ring": "bemkit.geometry.shapes:Ring",
+        "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
+        "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
+    },
     "bemkit.shapes",
 )
 
 GRADINGS = Registry(
     "grading",
-    MappingProxyType(
-        {
-            "uniform": "bemkit.geometry.grading:Uniform",
-            "algebraic": "bemkit.geometry.grading:Algebraic",
-            "geometric": "bemkit.geometry.grading:Geometric",
-        }
-    ),
+    {
+        "uniform": "bemkit.geometry.grading:Uniform",
+        "algebraic": "bemkit.geometry.grading:Algebraic",
+        "geometric": "bemkit.geometry.grading:Geometric",
+    },
 )
 
 CONDITIONS = Registry(
     "condition",
-    MappingProxyType(
-        {
-            "clamped": "bemkit.scene.conditions:Clamped",
-            "roller": "bemkit.scene.conditions:Roller",
-            "displacement": "bemkit.scene.conditions:PrescribedDisplacement",
-            "traction": "bemkit.scene.conditions:Traction",
-            "pressure": "bemkit.scene.conditions:Pressure",
-            "contact": "bemkit.scene.conditions:Contact",
-        }
-    ),
+    {
+        "clamped": "bemkit.scene.conditions:Clamped",
+        "roller": "bemkit.scene.conditions:Roller",
+        "displacement": "bemkit.scene.conditions:PrescribedDisplacement",
+        "traction": "bemkit.scene.conditions:Traction",
+        "pressure": "bemkit.scene.conditions:Pressure",
+        "contact": "bemkit.scene.conditions:Contact",
+    },
 )
 
 OBSTACLES = Registry(
     "obstacle",
-    MappingProxyType(
-        {
-            "half-plane": "bemkit.contact.obstacle:HalfPlane",
-            "circle": "bemkit.contact.obstacle:Circle",
-            "cavity": "bemkit.contact.obstacle:Cavity",
-            "polygon": "bemkit.contact.polygon:PolygonalObstacle",
-            "gap": "bemkit.contact.obstacle:Gap",
-        }
-    ),
+    {
+        "half-plane": "bemkit.contact.obstacle:HalfPlane",
+        "circle": "bemkit.contact.obstacle:Circle",
+        "cavity": "bemkit.contact.obstacle:Cavity",
+        "polygon": "bemkit.contact.polygon:PolygonalObstacle",
+        "gap": "bemkit.contact.obstacle:Gap",
+    },
     "bemkit.obstacles",
 )
 
 LAWS = Registry(
     "friction law",
-    MappingProxyType(
-        {
-            "frictionless": "bemkit.contact.laws:Frictionless",
-            "tresca": "bemkit.contact.laws:Tresca",
-            "coulomb": "bemkit.contact.laws:Coulomb",
-            "cohesive-coulomb": "bemkit.contact.laws:CohesiveCoulomb",
-        }
-    ),
+    {
+        "frictionless": "bemkit.contact.laws:Frictionless",
+        "tresca": "bemkit.contact.laws:Tresca",
+        "coulomb": "bemkit.contact.laws:Coulomb",
+        "cohesive-coulomb": "bemkit.contact.laws:CohesiveCoulomb",
+    },
     "bemkit.laws",
 )
 
 DISCRETISATIONS = Registry(
     "discretisation",
-    MappingProxyType(
-        {
-            "galerkin": "bemkit.scene.discretisation:Galerkin",
-            "hp": "bemkit.scene.discretisation:HpGalerkin",
-            "linear": "bemkit.scene.discretisation:LinearGalerkin",
-            "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
-            "constant": "bemkit.scene.discretisation:ConstantCollocation",
-        }
-    ),
+    {
+        "galerkin": "bemkit.scene.discretisation:Galerkin",
+        "hp": "bemkit.scene.discretisation:HpGalerkin",
+        "linear": "bemkit.scene.discretisation:LinearGalerkin",
+        "quadratic": "bemkit.scene.discretisation:QuadraticGalerkin",
+        "constant": "bemkit.scene.discretisation:ConstantCollocation",
+    },
     "bemkit.discretisations",
-    MappingProxyType({("galerkin", "degree", "hp"): "hp"}),
+    {("galerkin", "degree", "hp"): "hp"},
 )
 
 LINEAR_SOLVERS = Registry(
     "linear solver",
-    MappingProxyType(
-        {
-            "automatic": "bemkit.operators.linear.solvers:Automatic",
-            "direct": "bemkit.operators.linear.solvers:DenseCholesky",
-            "krylov": "bemkit.operators.linear.solvers:Krylov",
-        }
-    ),
+    {
+        "automatic": "bemkit.operators.linear.solvers:Automatic",
+        "direct": "bemkit.operators.linear.solvers:DenseCholesky",
+        "krylov": "bemkit.operators.linear.solvers:Krylov",
+    },
 )
 
 SOLVERS = Registry(
     "solver",
-    MappingProxyType(
-        {
-            "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
-            "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
-            "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
-            "lemke": "bemkit.testing.lemke:LemkePivoting",
-        }
-    ),
+    {
+        "semismooth-newton": "bemkit.solvers.ssn:SemismoothNewton",
+        "augmented-lagrangian": "bemkit.solvers.alm:AugmentedLagrangian",
+        "fixed-point": "bemkit.solvers.fixed_point:FixedPoint",
+        "lemke": "bemkit.testing.lemke:LemkePivoting",
+    },
     "bemkit.solvers",
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.contact.piecewise_law import PartwiseLaw
+from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.formulas import closest
@@ -24,21 +24,9 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material
-from bemkit.scene.conditions import Clamped as Clamped
-from bemkit.scene.conditions import Condition as Condition
-from bemkit.scene.conditions import Contact as Contact
-from bemkit.scene.conditions import Part as Part
-from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement
-from bemkit.scene.conditions import Pressure as Pressure
-from bemkit.scene.conditions import Roller as Roller
-from bemkit.scene.conditions import Traction as Traction
-from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
-from bemkit.scene.discretisation import Discretisation as Discretisation
-from bemkit.scene.discretisation import Galerkin as Galerkin
-from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
-from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
-from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
-from bemkit.scene.mesh_options import MeshOptions as MeshOptions
+from bemkit.scene.conditions import Contact, Part
+from bemkit.scene.discretisation import Discretisation, LinearGalerkin
+from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.symmetry import check_symmetry
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -212,7 +200,7 @@ class Scene:
             return self.law
         if len(laws) == 1 or all(law is laws[0] for law in laws):
             return laws[0]
-        return PartwiseLaw(laws, nodes)
+        return PiecewiseLaw(laws, nodes)
 
     def build_mesh(self) -> BoundaryMesh:
         """Divide the boundary into elements, with one mesh part for each part of the scene.

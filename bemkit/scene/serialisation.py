@@ -27,6 +27,8 @@ from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
+from bemkit.scene.conditions import Condition, Part
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import (
     CONDITIONS,
     DISCRETISATIONS,
@@ -38,7 +40,6 @@ from bemkit.scene.registry import (
     SOLVERS,
     Registry,
 )
-from bemkit.scene.scene import Condition, Discretisation, Part
 from bemkit.solvers.base import ContactSolver
 
 T = TypeVar("T")

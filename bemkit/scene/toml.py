@@ -14,9 +14,10 @@ from typing import Any, Literal, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
+from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
-from bemkit.scene.scene import Discretisation, Galerkin, HpGalerkin, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 
@@ -53,10 +54,6 @@ def load_scene(source: str | Path) -> Scene:
     ----------
     source : str or Path
         Path of a TOML file, or the name of a shipped scene such as ``"paper-1"``.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------
@@ -95,10 +92,6 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
     name : str
         Where the text comes from, for messages.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError
@@ -118,10 +111,6 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
 
 def scene_to_toml(scene: Scene) -> str:
     """Write a scene as TOML text, leaving out what has its default value.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------
@@ -169,10 +158,6 @@ def with_overrides(
         Of Galerkin elements, instead of a discretisation; "hp" rises until an accuracy is reached.
     rho : float, optional
         Penalty of the solver in units of E'/L; sets all penalties it has.
-
-    Returns
-    -------
-    Scene
 
     Raises
     ------

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.laws import FrictionLaw, RescaledLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.formulas import ScalarField, evaluate_field
 from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Region, Traction
+from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
 from bemkit.scene.scene import Scene
 
 
@@ -115,34 +115,14 @@ class TransformedObstacle:
 
 
 @dataclass(frozen=True)
-class TransformedLaw(FrictionLaw):
-    """A friction law at moved points, its stresses multiplied by `stress`."""
+class TransformedLaw(RescaledLaw):
+    """A friction law at moved points, in another unit of stress."""
 
-    law: FrictionLaw
     affine: AffineMap
-    stress: float
 
     def at(self, points: FloatArray) -> FrictionLaw:
         """Return the law for contact nodes given by their moved points."""
-        return self.law.at(self.affine.back(points)).scaled(1.0 / self.stress)
-
-    @property
-    def is_frictionless(self) -> bool:
-        """Whether the original law knows no friction."""
-        return self.law.is_frictionless
-
-    @property
-    def acts_across_gap(self) -> bool | BoolArray:
-        """Whether the original law acts where the gap is open."""
-        return self.law.acts_across_gap
-
-    def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the bound of a law without coordinates."""
-        return self.law.scaled(1.0 / self.stress).bound(sigma_n)
-
-    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return the derivative of the bound of a law without coordinates."""
-        return self.law.scaled(1.0 / self.stress).bound_derivative(sigma_n)
+        return super().at(self.affine.back(points))
 
 
 @dataclass(frozen=True)
@@ -186,7 +166,7 @@ def transformed_scene(
     factor = affine.factor[0] if displacement is None else displacement
     material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
     parts = tuple(_transformed_part(part, affine, stress, factor) for part in scene.parts)
-    law = TransformedLaw(scene.law, affine, stress)
+    law = TransformedLaw(scene.law, 1.0 / stress, affine)
     symmetry = None if scene.symmetry is None else affine.transformed(scene.symmetry)
     return replace(
         scene, shape=TransformedShape(scene.shape, affine), material=material, parts=parts, law=law, symmetry=symmetry
@@ -241,21 +221,14 @@ def _transformed_part(part: Part, affine: AffineMap, stress: float, displacement
 
 
 def _transformed_condition(condition: Condition, affine: AffineMap, stress: float, displacement: float) -> Condition:
-    def moved(field: ScalarField, factor: float) -> TransformedField:
-        return TransformedField(field, affine, factor)
-
-    match condition:
-        case Traction(x, y):
-            return Traction(moved(x, stress), moved(y, stress))
-        case Pressure(pressure, shear):
-            return Pressure(moved(pressure, stress), moved(shear, stress))
-        case PrescribedDisplacement(x, y):
-            components = [None if value is None else moved(value, displacement) for value in (x, y)]
-            return PrescribedDisplacement(*components)
-        case Contact(obstacle, law):
-            own = None if law is None else TransformedLaw(law, affine, stress)
-            return Contact(TransformedObstacle(obstacle, affine, displacement), own)
-    return condition
+    if isinstance(condition, Contact):
+        own = None if condition.law is None else TransformedLaw(condition.law, 1.0 / stress, affine)
+        return Contact(TransformedObstacle(condition.obstacle, affine, displacement), own)
+    return with_fields(
+        condition,
+        lambda load: TransformedField(load, affine, stress),
+        lambda motion: TransformedField(motion, affine, displacement),
+    )
 
 
 def _transformed_curve(curve: Curve, affine: AffineMap) -> Curve:

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.contact.conditions import LinearConditions, augmented, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.contact.projection import (
     clip_to_bound,
@@ -156,9 +156,7 @@ class ProjectionEquations:
         intercept = residual.bound - residual.slope * residual.predicted_sigma_n
         sliding = slip(problem.gap, sets.direction.astype(float), residual.slope, intercept)
         slides = (sets.direction != 0) | residual.is_free
-        conditions = separated(problem.n_contact)
-        conditions = conditions.replaced(np.stack([sets.is_closed, ~slides], axis=1), held)
-        return conditions.replaced(np.stack([np.zeros_like(slides), slides], axis=1), sliding)
+        return of_statuses(sets.is_closed, slides, held, sliding)
 
     def through_stick(self, residual: Residual, previous: ActiveSets) -> ActiveSets:
         """Return the sets of `residual` with every direct change of slip direction replaced by stick.

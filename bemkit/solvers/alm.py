@@ -9,9 +9,8 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
-from bemkit.solvers.base import Iterate
+from bemkit.solvers.base import Iterate, check_count, check_max_steps, check_rho
 from bemkit.solvers.newton import negligible, respond
-from bemkit.solvers.options import check_count, check_max_steps, check_rho
 from bemkit.solvers.progress import OuterIterate
 
 _AUTOMATIC_RHO = 100.0

@@ -1,5 +1,6 @@
 """The one loop that all drivers share: steps, certificate, status, history."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
@@ -91,10 +92,6 @@ class ContactSolver(Protocol):
         problem : ContactProblem
         start : ContactState
             A response of the body.
-
-        Returns
-        -------
-        Iterate
         """
         ...
 
@@ -106,10 +103,6 @@ class ContactSolver(Protocol):
         problem : ContactProblem
         iterate : Iterate
             What `init` or `step` of the same driver returned.
-
-        Returns
-        -------
-        Iterate
 
         Raises
         ------
@@ -218,10 +211,6 @@ def solve(
     callback : callable, optional
         Receives each `StepRecord` as soon as it exists.
 
-    Returns
-    -------
-    ContactSolution
-
     Raises
     ------
     ContactFailure
@@ -240,6 +229,24 @@ def solve(
     if throw and not solution.is_converged:
         raise ContactFailure(solution)
     return solution
+
+
+def check_rho(name: str, rho: float | None) -> None:
+    """Raise ValueError unless `rho` is None (automatic) or a positive finite number."""
+    if rho is not None and not (math.isfinite(rho) and rho > 0.0):
+        raise InputError(f"{name} = {rho}; give a positive number, or leave it out for the automatic choice")
+
+
+def check_max_steps(max_steps: int) -> None:
+    """Raise ValueError unless `max_steps` is positive."""
+    if max_steps < 1:
+        raise InputError(f"max_steps = {max_steps}; allow at least one step")
+
+
+def check_count(name: str, count: int) -> None:
+    """Raise ValueError if `count` is negative."""
+    if count < 0:
+        raise InputError(f"{name} = {count}; give zero or a positive number")
 
 
 @dataclass(frozen=True)

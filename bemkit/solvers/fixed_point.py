@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from bemkit.contact.laws import Tresca
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.errors import InputError
-from bemkit.solvers.base import Iterate, solve
-from bemkit.solvers.options import check_max_steps
+from bemkit.solvers.base import Iterate, check_max_steps, solve
 from bemkit.solvers.progress import OuterIterate
 from bemkit.solvers.ssn import SemismoothNewton
 

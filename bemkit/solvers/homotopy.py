@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.conditions import LinearConditions, separated, slip, stick
+from bemkit.contact.conditions import LinearConditions, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.solvers.active_sets import ActiveSets
 
@@ -237,11 +237,9 @@ class _Path:
         is_free = self.is_free(is_closed)
         slips = (direction != 0) | is_free
         sticks = ~slips & ~problem.body.tangent_is_eliminated  # an eliminated tangent is followed by the body
-        conditions = separated(problem.n_contact)
         held = stick(problem.gap, problem.slip_origin)
-        conditions = conditions.replaced(np.stack([is_closed, ~slips], axis=1), held)
         sliding = slip(problem.gap, direction.astype(float), bound.slope, bound.intercept)
-        conditions = conditions.replaced(np.stack([np.zeros_like(slips), slips], axis=1), sliding)
+        conditions = of_statuses(is_closed, slips, held, sliding)
 
         # The body carries contact traction plus extra pressure; the conditions speak of contact tractions alone.
         extras = self.extras

@@ -5,10 +5,9 @@ from enum import Enum, auto
 
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
-from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.base import Iterate, Status, check_count, check_max_steps, check_rho
 from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
 from bemkit.solvers.newton import merit, negligible, respond
-from bemkit.solvers.options import check_count, check_max_steps, check_rho
 
 _MOST_PATHS = 5
 """Paths followed to their ends before giving up. One is enough for bounds that are affine in the pressure; for others

@@ -12,9 +12,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.conditions import stick
 from bemkit.contact.piecewise_law import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
-from bemkit.solvers.base import Iterate, Status
+from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
-from bemkit.solvers.options import check_max_steps
 
 _WEAKER = 1e-2
 """Springs on free rigid motions, in units of those of the other drivers: the body may have to slide far in a few steps,

@@ -20,13 +20,12 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.contact.condensation.nodes import contact_along_normals
-from bemkit.contact.condensation.reduction import condense
 from bemkit.operators.linear.choice import direct_cost, krylov_cost
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.steklov_poincare import CondensedMap
 from bemkit.operators.stopwatch import assembly_time
+from tests.handmade import condense, contact_along_normals
 
 L_SHAPE = bk.Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 BODIES = {

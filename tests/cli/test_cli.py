@@ -23,7 +23,8 @@ import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import main
 from bemkit.results.result_file import read_result
-from bemkit.scene.scene import MeshOptions, QuadraticGalerkin
+from bemkit.scene.discretisation import QuadraticGalerkin
+from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
 
@@ -309,7 +310,8 @@ def test_an_interrupt_leaves_no_file(
 
 
 def test_a_real_ctrl_c_ends_with_130() -> None:
-    code = "import sys; from bemkit.cli.main import main; print('ready', flush=True); main(sys.argv[1:])"
+    heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # a background job does not
+    code = f"{heeds}; import sys; from bemkit.cli.main import main; print('ready', flush=True); main(sys.argv[1:])"
     process = subprocess.Popen(
         [sys.executable, "-c", code, "run", "paper-1", "--elements", "3000", "-o", "r.h5"],
         stdout=subprocess.PIPE,

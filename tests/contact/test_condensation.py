@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.condensation.nodes import ContactNodes, contact_along_normals
-from bemkit.contact.condensation.reduction import CondensedBody, condense
+from bemkit.contact.condensation.nodes import ContactNodes
+from bemkit.contact.condensation.reduction import CondensedBody
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless
 from bemkit.contact.problem import ContactProblem, ContactState
@@ -24,6 +24,7 @@ from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, supported
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
+from tests.handmade import condense, contact_along_normals
 
 MAPS = [GalerkinMap, CollocationMap]
 MATERIAL = Material(1.0, 0.3)

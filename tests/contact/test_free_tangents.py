@@ -10,16 +10,16 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.condensation.nodes import retained_tangents
-from bemkit.contact.condensation.reduction import condense
 from bemkit.contact.conditions import separated, stick
 from bemkit.contact.problem import ContactState, LawError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import nodal_forces, prepare, supports_on
 from bemkit.runs.run import UnsolvableSceneError
-from bemkit.scene.scene import Discretisation
+from bemkit.scene.discretisation import Discretisation
 from bemkit.solvers.base import ContactSolver, Status, solve
 from bemkit.solvers.homotopy import AffineBound, follow_path
 from bemkit.testing.lemke import LemkePivoting
+from tests.handmade import condense
 
 FLOOR = bk.HalfPlane()
 NEWTON = bk.SemismoothNewton()

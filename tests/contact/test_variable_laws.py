@@ -5,7 +5,7 @@ import pytest
 
 from bemkit.contact.certificate import certify
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, LawError, Tresca
-from bemkit.contact.piecewise_law import PartwiseLaw
+from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.formulas import Expression
 from bemkit.solvers.alm import AugmentedLagrangian
@@ -65,7 +65,7 @@ LEFT, RIGHT = np.arange(0, 12, 2), np.arange(1, 12, 2)
 
 
 def test_each_part_has_its_law():
-    law = PartwiseLaw([Coulomb(np.linspace(0.1, 0.6, 6)), Tresca(0.2)], [LEFT, RIGHT])
+    law = PiecewiseLaw([Coulomb(np.linspace(0.1, 0.6, 6)), Tresca(0.2)], [LEFT, RIGHT])
     sigma_n = -np.linspace(1.0, 2.0, 12)
     assert np.allclose(law.bound(sigma_n)[LEFT], np.linspace(0.1, 0.6, 6) * -sigma_n[LEFT])
     assert np.allclose(law.bound(sigma_n)[RIGHT], 0.2)
@@ -74,17 +74,17 @@ def test_each_part_has_its_law():
     assert np.array_equal(law.acts_across_gap, np.arange(12) % 2 == 1)
     check_law(law, n_contact=12)
     assert not law.is_frictionless
-    assert PartwiseLaw([Coulomb(0.0), Frictionless()], [LEFT, RIGHT]).is_frictionless
+    assert PiecewiseLaw([Coulomb(0.0), Frictionless()], [LEFT, RIGHT]).is_frictionless
     for nodes in ([LEFT, LEFT], [LEFT], [LEFT, RIGHT + 1]):
         with pytest.raises(ValueError, match="give every contact node to exactly one of 2 laws"):
-            PartwiseLaw([Coulomb(0.1), Tresca(0.1)], nodes)
+            PiecewiseLaw([Coulomb(0.1), Tresca(0.1)], nodes)
 
 
 @pytest.mark.parametrize("other", [Frictionless(), Tresca(0.05), Coulomb(0.2)], ids=repr)
 @pytest.mark.parametrize("press", [1.0, 0.1])
 def test_drivers_agree_on_mixed_laws(other, press):
     body = block_body(press=press)
-    problem = ContactProblem(body, np.zeros(12), PartwiseLaw([Coulomb(0.5), other], [LEFT, RIGHT]))
+    problem = ContactProblem(body, np.zeros(12), PiecewiseLaw([Coulomb(0.5), other], [LEFT, RIGHT]))
     assert not why_no_path(problem)
     referee = solve(problem, LemkePivoting())
     for driver in (SemismoothNewton(), AugmentedLagrangian(), FixedPoint()):
@@ -96,7 +96,7 @@ def test_drivers_agree_on_mixed_laws(other, press):
 
 
 def test_a_jump_on_one_part_alone_is_seen():
-    law = PartwiseLaw([Coulomb(0.5), CohesiveCoulomb(0.5, 0.1)], [LEFT, RIGHT])
+    law = PiecewiseLaw([Coulomb(0.5), CohesiveCoulomb(0.5, 0.1)], [LEFT, RIGHT])
     problem = ContactProblem(block_body(), np.zeros(12), law)
     assert why_no_path(problem)
     with pytest.raises(ValueError, match="LemkePivoting cannot treat the friction law Coulomb or CohesiveCoulomb"):

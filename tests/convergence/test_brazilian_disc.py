@@ -7,7 +7,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.scene.scene import Discretisation
+from bemkit.scene.discretisation import Discretisation
 from tests.convergence.fields import observed_order
 
 HALF_ANGLE = np.radians(10.0)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.contact.condensation.nodes import contact_along_normals
-from bemkit.contact.condensation.reduction import condense
 from bemkit.contact.laws import Coulomb, Frictionless
 from bemkit.contact.obstacle import Circle
 from bemkit.contact.problem import ContactProblem
@@ -15,6 +13,7 @@ from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
+from tests.handmade import condense, contact_along_normals
 
 RADIUS = 0.7
 MATERIAL = Material(2.0, 0.3)

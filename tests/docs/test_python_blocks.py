@@ -1,4 +1,7 @@
-"""Every Python block of the documentation and the README runs, page by page, in a folder of its own."""
+"""Every Python block of the documentation and the README runs, page by page, in a folder of its own.
+
+Blocks between outputs that a page shows run in `test_shown_outputs`.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ import pytest
 from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
 
-from tests.docs.pages import DOCS
+from tests.docs.pages import DOCS, OUTPUTS_SHOWN
 
 ROOT = DOCS.parent
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(set(DOCS.rglob("*.md")) - {DOCS / page for page in OUTPUTS_SHOWN})]
 
 
 @pytest.mark.parametrize(

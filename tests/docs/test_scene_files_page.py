@@ -15,7 +15,9 @@ from bemkit.formulas import Expression
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import registry as kinds
-from bemkit.scene.scene import MeshOptions, Part, Scene
+from bemkit.scene.conditions import Part
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml
 from tests.docs.pages import Row, blocks, plain, read, section, table

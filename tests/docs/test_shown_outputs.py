@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from bemkit.cli.main import main
-from tests.docs.pages import blocks, read
+from tests.docs.pages import OUTPUTS_SHOWN, blocks, read
 
 
 def run_command(line: str) -> None:
@@ -38,10 +38,7 @@ def test_the_comparison_can_fail() -> None:
     assert not matches("a\nb\n", "a\nx\nb\n")
 
 
-@pytest.mark.parametrize(
-    ("page", "fewest"),
-    [("tutorials/first-steps.md", 4), ("command-line.md", 4), ("plan.md", 2), ("paper-tables.md", 1)],
-)
+@pytest.mark.parametrize(("page", "fewest"), OUTPUTS_SHOWN.items())
 def test_shown_output(
     page: str, fewest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

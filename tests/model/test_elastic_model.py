@@ -25,7 +25,8 @@ from bemkit.results.tables import to_csv, to_json
 from bemkit.runs.history import run_history
 from bemkit.runs.nested import CascadeError, run_cascade
 from bemkit.runs.run import run_probe
-from bemkit.scene.scene import Discretisation, NoContactError
+from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.scene import NoContactError
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml
 from bemkit.solvers.base import StepRecord
 from bemkit.studies.stability.axes import AXES

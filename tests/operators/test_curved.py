@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from functools import partial
+from functools import cache
 
 import mpmath
 import numpy as np
@@ -82,10 +82,11 @@ POINTS = [  # parameters of points seen from an arc: next to it on both sides, a
 ]
 
 
-INTEGRANDS = (
-    lambda place, x, bend, b, t: mpmath.legendre(b, t) * mpmath.log(abs(x - place(t))),
-    lambda place, x, bend, b, t: mpmath.legendre(b, t) * (x - place(t)) / mpmath.conj(x - place(t)),
-    lambda place, x, bend, b, t: mpmath.legendre(b, t) * mpmath.im(mpmath.expj(bend * t) / (x - place(t))),
+legendre = cache(mpmath.legendre)
+INTEGRANDS = (  # of the vector d from the arc to the point, and the direction of the arc; times P_b
+    lambda d, direction: mpmath.log(abs(d)),
+    lambda d, direction: d / mpmath.conj(d),
+    lambda d, direction: mpmath.im(direction / d),
 )
 
 
@@ -95,20 +96,24 @@ def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
     with mpmath.workdps(25):
         bend = mpmath.pi / n_elements
         scale = mpmath.mpc(0, 1) * bend * mpmath.mpf(1.3) * mpmath.expj(bend)
+        direction = cache(lambda t: mpmath.expj(bend * t))
 
         def place(t: mpmath.mpc) -> mpmath.mpc:
-            return (mpmath.expj(bend * t) - 1) / (mpmath.mpc(0, 1) * bend)
+            return (direction(t) - 1) / (mpmath.mpc(0, 1) * bend)
 
         for real, imaginary in POINTS:
             x = place(mpmath.mpc(real, imaginary))
             from_ends = [np.array([complex((x - place(end)) * scale)]) for end in (-1, 1)]
             inner = inner_integrals(panels, Degrees(log=(0, 12), double=(0, 12)), np.array([0]), *from_ends)
             ends = [-1, real, 1] if -1 < real < 1 else [-1, 1]
+            integrands = [cache(lambda t, f=f, x=x: f(x - place(t), direction(t))) for f in INTEGRANDS]
             for b in (0, 1, 5, 12):
                 # the arc is known to the round-off of its coordinates, eps R / half length = eps n / pi; next to
                 # an end P_b, whose slope is b (b + 1) / 2 there, magnifies the round-off of the parameter
                 tolerance = 2e-15 * (n_elements + 10 + b * (b + 1) / 2)
-                log, quotient, angle = (mpmath.quad(partial(f, place, x, bend, b), ends) for f in INTEGRANDS)
+                log, quotient, angle = (
+                    mpmath.quad(lambda t, f=f, b=b: legendre(b, t) * f(t), ends) for f in integrands
+                )
                 assert inner.log[b][0] == pytest.approx(float(log), abs=tolerance)
                 assert inner.quotient[b][0] == pytest.approx(complex(quotient), abs=tolerance)
                 assert inner.double[b][0] == pytest.approx(float(angle), abs=tolerance)

@@ -7,13 +7,13 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import ContactNodes, contact_along_normals
-from bemkit.contact.condensation.reduction import condense
+from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.conditions import separated, stick
 from bemkit.geometry import BoundaryMesh, Selection
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
+from tests.handmade import condense, contact_along_normals
 
 RUBBER = bk.Material(3.0, 0.5)  # shear modulus 1
 PURE_SHEAR = np.array([[0.4, 0.3], [-0.1, -0.4]])

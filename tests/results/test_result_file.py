@@ -19,7 +19,7 @@ from bemkit.hdf5 import MARK, Reader, seal
 from bemkit.results.result_file import OutputFileError, ResultFileError, read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
-from bemkit.scene.scene import Part, Traction
+from bemkit.scene.conditions import Part, Traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
 from bemkit.solvers.base import Status
 

@@ -86,9 +86,8 @@ def test_printable() -> None:
     assert printable("a\nb\x1b[31m\u202eü") == "a b?[31m?ü"
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-def test_a_scene_with_any_title_runs_in_any_encoding(scene: Path, encoding: str) -> None:
-    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+def test_a_scene_with_any_title_runs_in_a_poor_encoding(scene: Path) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     ran = subprocess.run([*PROGRAM, "run", scene, "-o", scene.parent / "r.h5"], capture_output=True, env=environment)
     assert (ran.returncode, ran.stderr) == (0, b"")
     assert b"\\u63a5\\u89e6" in ran.stdout

@@ -9,7 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.validity.magnitude import check_magnitude
+from bemkit.geometry.vectors import check_magnitude
 from bemkit.model.contact_model import Model
 from bemkit.model.prepared import OutOfRangeError
 

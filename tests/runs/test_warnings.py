@@ -27,16 +27,10 @@ from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_warnings
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
-from bemkit.scene.scene import (
-    Clamped,
-    Contact,
-    LinearGalerkin,
-    MeshOptions,
-    Part,
-    PrescribedDisplacement,
-    Scene,
-    Traction,
-)
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
+from bemkit.scene.discretisation import LinearGalerkin
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status

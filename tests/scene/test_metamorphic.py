@@ -147,7 +147,8 @@ def test_frictionless_pressure_does_not_depend_on_poissons_ratio() -> None:
 
 def test_sets_do_not_depend_on_rho() -> None:
     reference = plain("linear", "newton").contact
-    for rho in (1e-4, 1.0, 1e8):
-        for solver in (bk.SemismoothNewton(rho=rho), bk.AugmentedLagrangian(rho_n=max(rho, 1.0), rho_t=max(rho, 1.0))):
-            scene = replace(example_1(Change(), "linear", "newton"), solver=solver)
-            np.testing.assert_array_equal(bk.run(scene).contact.status, reference.status)
+    drivers = [bk.SemismoothNewton(rho=rho) for rho in (1e-4, 1.0, 1e8)]
+    drivers += [bk.AugmentedLagrangian(rho_n=rho, rho_t=rho) for rho in (1.0, 1e8)]
+    for driver in drivers:
+        scene = replace(example_1(Change(), "linear", "newton"), solver=driver)
+        np.testing.assert_array_equal(bk.run(scene).contact.status, reference.status)

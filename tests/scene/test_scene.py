@@ -13,17 +13,9 @@ from bemkit.formulas import Expression
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.operators.material import Material
-from bemkit.scene.scene import (
-    Clamped,
-    Contact,
-    MeshOptions,
-    Part,
-    PrescribedDisplacement,
-    Pressure,
-    Roller,
-    Scene,
-    Traction,
-)
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 
 FOUNDATION = Part("foundation", Contact(HalfPlane()), ("bottom",))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.piecewise_law import PartwiseLaw
+from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, shipped_files
@@ -53,7 +53,7 @@ def test_each_part_may_have_its_own_law() -> None:
     assert scene_from_toml(scene_to_toml(scene)).parts[1].condition.law.friction_coefficient == 0.1
     model = build_model(prepare(scene, scene.build_mesh()))
     parts = model.contact.parts
-    assert isinstance(model.problem.law, PartwiseLaw)
+    assert isinstance(model.problem.law, PiecewiseLaw)
     expected = np.where(np.array(parts) == "foundation", 0.5, 0.1)
     np.testing.assert_array_equal(model.problem.friction_bound(np.full(len(parts), -1.0)), expected)
     solution = bk.run(scene)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
@@ -17,19 +17,10 @@ from bemkit.formulas import Expression
 from bemkit.geometry.grading import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
-from bemkit.scene.scene import (
-    Clamped,
-    ConstantCollocation,
-    Contact,
-    LinearGalerkin,
-    MeshOptions,
-    Part,
-    PrescribedDisplacement,
-    Pressure,
-    Roller,
-    Scene,
-    Traction,
-)
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.discretisation import ConstantCollocation, LinearGalerkin
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, shipped_scenes, with_overrides
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate, InnerNewton
 from bemkit.solvers.fixed_point import FixedPoint
@@ -145,19 +136,12 @@ def scenes(draw: st.DrawFn) -> Scene:
     )
 
 
-def comparable(scene: Scene) -> Scene:
-    """Replace the law, whose arrays have no equality, by one that has."""
-    return dataclasses.replace(scene, law=Frictionless())
-
-
+@settings(max_examples=60)
 @given(scenes())
 def test_a_scene_survives_the_way_to_toml_and_back(scene: Scene) -> None:
     text = scene_to_toml(scene)
     again = scene_from_toml(text)
-    assert comparable(again) == comparable(scene)
-    assert type(again.law) is type(scene.law)
-    sigma_n = np.array([-3.0, 0.0])
-    np.testing.assert_array_equal(again.law.bound(sigma_n), scene.law.bound(sigma_n))
+    assert again == scene
     assert scene_to_toml(again) == text
 
 
@@ -309,7 +293,7 @@ def test_classes_without_a_word_cannot_be_written() -> None:
 def test_scenes_are_found_by_name_or_path(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(BLOCK, "utf-8")
-    assert comparable(load_scene(file)) == comparable(load_scene(str(file))) == comparable(scene_from_toml(BLOCK))
+    assert load_scene(file) == load_scene(str(file)) == scene_from_toml(BLOCK)
     with pytest.raises(SceneError, match=r"papr-1: no such file.*paper-1, paper-2.*did you mean 'paper-1'"):
         load_scene("papr-1")
     with pytest.raises(SceneError, match="cannot be read"):
@@ -331,7 +315,7 @@ def test_overrides_of_the_command_line() -> None:
     assert changed.discretisation == LinearGalerkin()
     assert changed.solver == AugmentedLagrangian(rho_n=10.0, rho_t=10.0)
     assert with_overrides(scene, rho=2.0).solver == SemismoothNewton(rho=2.0)
-    assert comparable(with_overrides(scene)) == comparable(scene)
+    assert with_overrides(scene) == scene
     with pytest.raises(SceneError, match="elements is 1"):
         with_overrides(scene, elements=1)
     with pytest.raises(SceneError, match="unknown solver 'bogus'"):

@@ -14,7 +14,7 @@ from bemkit.solvers.base import Status, solve
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.homotopy import why_no_path
 from bemkit.solvers.newton import negligible
-from bemkit.solvers.progress import Progress
+from bemkit.solvers.progress import OuterIterate
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import Inexact, block_body, block_problem, hard_problem
@@ -66,9 +66,9 @@ def test_residuals_and_states_are_compared_by_the_accuracy(accuracy):
     assert negligible(problem.body) == pytest.approx(100.0 * accuracy)
     state = problem.sticking_state
     moved = replace(state, traction=(1.0 + 3.0 * accuracy) * state.traction)
-    assert Progress.begun(problem, state).after(problem, moved).ended is Status.STALLED
+    assert OuterIterate.begun(problem, state).followed_by(problem, moved, 1).ended is Status.STALLED
     moved = replace(state, traction=(1.0 + 30.0 * accuracy) * state.traction)
-    assert Progress.begun(problem, state).after(problem, moved).ended is None
+    assert OuterIterate.begun(problem, state).followed_by(problem, moved, 1).ended is None
 
 
 def test_the_path_of_solutions_is_left_out_where_responses_are_costly():

@@ -70,7 +70,7 @@ def test_spaces_conform(mesh: BoundaryMesh, number: int) -> None:
     check_space(spaces_on(mesh)[number])
 
 
-@pytest.mark.parametrize("shape", CURVES, ids=repr)
+@pytest.mark.parametrize("shape", CURVES, ids=lambda curve: type(curve).__name__)
 def test_curves_conform(shape: curves.Curve) -> None:
     check_curve(shape)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
 APPROACH_TOLERANCE = 1e-3
@@ -92,28 +92,6 @@ def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatA
     np.add.at(normals, dofs, local_normals * space.mesh.lengths[elements][:, None, None])
     normals /= np.maximum(np.hypot(*normals.T), np.finfo(float).tiny)[:, None]
     return order, normals[order]
-
-
-def contact_along_normals(space: BoundarySpace, elements: IntArray, *, is_frictionless: bool = False) -> ContactNodes:
-    """Return the nodes of some elements, contact acting along the body's normals.
-
-    Parameters
-    ----------
-    space : BoundarySpace
-        The displacement space.
-    elements : (m,) array
-        Contact elements in order along the boundary.
-    is_frictionless : bool
-        Of all nodes.
-
-    Returns
-    -------
-    ContactNodes
-    """
-    nodes, normals = nodes_on(space, elements)
-    weights = dof_weights(space, elements)[nodes]
-    law = np.full(nodes.size, is_frictionless)
-    return ContactNodes(nodes, dof_points(space)[nodes], contact_frame(normals), weights, law)
 
 
 def contact_conditions(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
 from bemkit.contact.condensation.nodes import (
     ContactNodes,
     bound_tangents,
-    contact_conditions,
     find_tangents,
     free_motions,
     held_nodes,
@@ -25,7 +23,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 
 class NoContactNodesError(InputError):
@@ -197,10 +195,6 @@ class CondensedBody(DenseBody):
             Prescribed displacements in the frames of the nodes, as in `NodalConditions`.
         force : (n_nodes, 2) array [N/m]
             Given nodal forces.
-
-        Returns
-        -------
-        CondensedBody
         """
         conditions = replace(self.conditions, displacement=displacement)
         condensed = self.condensed.under(force, displacement)
@@ -254,42 +248,27 @@ class CondensedBody(DenseBody):
         return bool(np.abs(displacement.ravel() - rigid).max() <= 1e-6 * np.abs(displacement).max())
 
 
-def condense(
-    elastic: SteklovPoincare, supports: Sequence[Support], candidates: ContactNodes, force: FloatArray
+def condensed_body(
+    elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
 ) -> CondensedBody:
     """Reduce a body to its contact boundary.
 
     Parameters
     ----------
     elastic : SteklovPoincare
-    supports : sequence of Support
-    candidates : ContactNodes
-        Nodes that may touch an obstacle, whatever holds them.
+    conditions : NodalConditions
+    contact : ContactNodes
+        Both as `contact_conditions` has found them.
     force : (n_nodes, 2) array [N/m]
         Given nodal forces.
-
-    Returns
-    -------
-    CondensedBody
-        Its `nodes` are the candidates that can touch; the others are left to their supports.
 
     Raises
     ------
     NoContactNodesError
         If supports leave no node of the contact boundary free to move towards the obstacle.
-    ConflictingSupportsError
-        If supports contradict each other at a node.
     SingularMatrixError
         If even tied contact does not hold the body.
     """
-    conditions, contact = contact_conditions(elastic.displacement_space, supports, candidates)
-    return condensed_body(elastic, conditions, contact, force)
-
-
-def condensed_body(
-    elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
-) -> CondensedBody:
-    """Reduce a body to its contact boundary, with the conditions and nodes that `contact_conditions` has found."""
     space, condensed = elastic.displacement_space, elastic.condense(conditions, force)
     if not contact.nodes.size:
         raise NoContactNodesError(

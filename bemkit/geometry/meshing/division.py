@@ -12,6 +12,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.selection import N_SAMPLES, Selection, breakpoints, merge_breakpoints
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.geometry.validity.loops import following_in_loops
 from bemkit.geometry.vectors import norms
 
 _INNER = np.array([0.25, 0.5, 0.75])
@@ -143,9 +144,7 @@ class Division:
     @property
     def following(self) -> IntArray:
         """(n_pieces,) array: the piece that starts where each one ends; -1 on a symmetry line."""
-        next_side = np.arange(1, len(self.outline.sides) + 1)
-        after = np.cumsum([len(sides) for sides in self.outline.loops])
-        next_side[after - 1] = [0, *after[:-1].tolist()]
+        next_side = following_in_loops(np.array([len(sides) for sides in self.outline.loops]))
         starting = {(piece.side, piece.span[0]): k for k, piece in enumerate(self.pieces)}
         places = [
             (int(next_side[piece.side]), 0.0) if piece.span[1] == 1.0 else (piece.side, piece.span[1])
@@ -190,10 +189,6 @@ def divide(outline: Outline, parts: Mapping[str, Selection]) -> Division:
     outline : Outline
     parts : mapping of str to Selection
         Boundary parts by name; they must not overlap, and need not cover the boundary.
-
-    Returns
-    -------
-    Division
 
     Raises
     ------

@@ -125,10 +125,6 @@ def better_partition(
     spread_over : collection of str
         Parts that share `SPREAD` of the elements among their pieces by the square roots of lengths, each graded
         towards its ends; the rest follows the density.
-
-    Returns
-    -------
-    Partition
     """
     division = old.base.cut(cuts)
     shares = np.sqrt(division.piece_lengths) * [piece.part in spread_over for piece in division.pieces]

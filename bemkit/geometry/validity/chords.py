@@ -6,7 +6,8 @@ chord by at most tan(turning / 2) / 2 chord lengths, and leaves its ends within 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +63,10 @@ class Pieces:
         return len(self.start)
 
     @property
+    def _columns(self) -> tuple[Any, ...]:
+        return self.start, self.end, self.curve, self.span, self.turning, self.owner
+
+    @property
     def chord_length(self) -> FloatArray:
         """(n,) array [m]: distance of the ends."""
         return norms(self.end - self.start)
@@ -78,15 +83,7 @@ class Pieces:
 
     def take(self, index: IntArray) -> "Pieces":
         """Return the pieces with these indices, in this order."""
-        return Pieces(
-            self.curves,
-            self.start[index],
-            self.end[index],
-            self.curve[index],
-            self.span[index],
-            self.turning[index],
-            self.owner[index],
-        )
+        return Pieces(self.curves, *(column[index] for column in self._columns))
 
     def halves(self) -> tuple["Pieces", "Pieces"]:
         """Split curved pieces in the middle of their parameter interval."""
@@ -130,7 +127,7 @@ def split_until_flat(pieces: Pieces, describe: Callable[[int], str], least_split
         bent = np.flatnonzero(is_bent)
         first, second = pieces.take(bent).halves()
         order = np.argsort(np.concatenate([np.flatnonzero(~is_bent), bent, bent]), kind="stable")
-        pieces = _joined(pieces.take(np.flatnonzero(~is_bent)), _joined(first, second)).take(order)
+        pieces = concatenate([pieces.take(np.flatnonzero(~is_bent)), first, second]).take(order)
     kinked = int(np.argmax(pieces.turning))
     raise GeometryError(
         f"the curve of {describe(int(pieces.owner[kinked]))} has a kink near s={pieces.span[kinked].mean():.6g}: "
@@ -180,22 +177,7 @@ def evaluate_curves(
 
 def concatenate(parts: list[Pieces]) -> Pieces:
     """Return all pieces in one."""
-    whole = parts[0]
-    for part in parts[1:]:
-        whole = _joined(whole, part)
-    return whole
-
-
-def _joined(first: Pieces, second: Pieces) -> Pieces:
-    return Pieces(
-        first.curves,
-        np.concatenate([first.start, second.start]),
-        np.concatenate([first.end, second.end]),
-        np.concatenate([first.curve, second.curve]),
-        np.concatenate([first.span, second.span]),
-        np.concatenate([first.turning, second.turning]),
-        np.concatenate([first.owner, second.owner]),
-    )
+    return Pieces(parts[0].curves, *map(np.concatenate, zip(*(part._columns for part in parts), strict=True)))
 
 
 def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: FloatArray) -> Pieces:
@@ -208,4 +190,4 @@ def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: Floa
         s = span[rows, :1] * (1.0 - fractions) + span[rows, 1:] * fractions
         tangent = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
         turning[rows] = _TURNING_SAFETY * np.abs(angles_between(tangent[:, :-1], tangent[:, 1:])).sum(axis=1)
-    return Pieces(pieces.curves, start, end, pieces.curve, span, turning, pieces.owner)
+    return replace(pieces, start=start, end=end, span=span, turning=turning)

@@ -11,8 +11,7 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, point_on, resolution
 from bemkit.geometry.validity.loops import check_loops
-from bemkit.geometry.validity.magnitude import check_magnitude
-from bemkit.geometry.vectors import norms
+from bemkit.geometry.vectors import check_magnitude, norms
 
 _CURVE_TOLERANCE = 1e-2  # of the chord: finds a wrong curve or span, forgives a body moved here from far away
 _N_SPEEDS = 5

@@ -30,21 +30,22 @@ def assert_honest(trials: list[Trial]) -> None:
             assert REMEDY.search(trial.message), f"no remedy: {trial.index}: {trial.message}"
 
 
-def random_trials(seed: int, count: int) -> list[Trial]:
-    return list(compute_with_progress(trial_tasks(seed, range(count)), "random scenes", is_live=False, processes=2))
+def random_trials(seed: int, count: int, processes: int = 1) -> list[Trial]:
+    tasks = trial_tasks(seed, range(count))
+    return list(compute_with_progress(tasks, "random scenes", is_live=False, processes=processes))
 
 
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = random_trials(1, 200)
+    trials = random_trials(1, 120)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 80  # a generator of scenes without answers tests nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 48  # a generator of scenes without answers tests nothing
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_many_random_scenes(seed: int) -> None:
-    assert_honest(random_trials(seed, 2000))
+    assert_honest(random_trials(seed, 2000, processes=2))
 
 
 def test_a_scene_is_a_function_of_its_numbers() -> None:
@@ -61,7 +62,8 @@ def test_scenes_are_the_same_after_a_scene_file() -> None:
 
 
 def test_every_kind_is_drawn() -> None:
-    scenes = [scene for index in range(150) for scene in random_case(3, index).scenes]
+    cases = [random_case(3, index) for index in range(150)]
+    scenes = [scene for case in cases for scene in case.scenes]
     drawn = Counter(type(value).__name__ for scene in scenes for value in kinds_in(scene))
     wanted = (
         *("Rectangle", "Polygon", "Disk", "Sector", "Ring", "PlateWithHole", "ExteriorOf"),
@@ -73,7 +75,7 @@ def test_every_kind_is_drawn() -> None:
     )
     assert not [name for name in wanted if not drawn[name]]
     assert any(len(scene.load_factors) > 1 for scene in scenes)
-    assert any(len(random_case(3, index).scenes) > 1 for index in range(100))
+    assert any(len(case.scenes) > 1 for case in cases)
     assert any(scene.mesh.accuracy is not None for scene in scenes)
     assert any(scene.material.poisson_ratio == 0.5 for scene in scenes)
     assert any(len(scene.contact_parts) > 1 for scene in scenes)
