@@ -51,7 +51,8 @@ def study() -> None:
 @click.argument("scene")
 @click.option("--elements", default="40,80,160,320", metavar="N,...", help="Sizes of uniform and graded meshes.")
 @click.option("--accuracies", default="1e-2,1e-3,1e-4", metavar="E,...", help="Aims of adaptive meshes.")
-@click.option("--discretisation", default="constant,linear,quadratic", metavar="WORD,...", help="Element types.")
+@click.option("--discretisation", metavar="WORD,...", help="Element types (constant,linear,quadratic).")
+@click.option("--degrees", metavar="P,...", help="Galerkin elements of these degrees instead, such as 1,2,4,8,hp.")
 @click.option("--solver", default="semismooth-newton,augmented-lagrangian", metavar="WORD,...", help="Drivers.")
 @click.option("--meshes", default="uniform,graded,adaptive", metavar="WORD,...", help="Sequences of meshes.")
 @click.option("--exponent", type=float, default=3.0, metavar="P", help="Grading of graded meshes (3).")
@@ -66,6 +67,15 @@ def study() -> None:
 @click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
 def errors(
     scene: str,
+    elements: str,
+    accuracies: str,
+    discretisation: str | None,
+    degrees: str | None,
+    solver: str,
+    meshes: str,
+    exponent: float,
+    most_elements: int,
+    over_resolve: int | None,
     repeat: int | None,
     jobs: int,
     measures: str,
@@ -73,7 +83,6 @@ def errors(
     csv_file: str | None,
     folder: str | None,
     quiet: bool,
-    **asked: Any,
 ) -> int:
     """Measure errors and run times of SCENE over element types, meshes and drivers.
 
@@ -97,7 +106,18 @@ def errors(
     # sharp at the width of a page, and a small file
     outputs = Outputs((table,), folder, figures, FIGURE, dots_per_inch=110)
     click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    options = StudyOptions(**asked, repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT)
+    options = StudyOptions(
+        elements=elements,
+        accuracies=accuracies,
+        discretisation=discretisation,
+        degrees=degrees,
+        meshes=meshes,
+        solver=solver,
+        exponent=exponent,
+        most_elements=most_elements,
+        over_resolve=over_resolve,
+        repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
+    )
     runs = options.runs(problem)
     shows_tables = not quiet and not outputs.uses_stdout
     with concerning(scene):

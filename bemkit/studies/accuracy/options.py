@@ -10,17 +10,18 @@ from bemkit.formulas import closest
 from bemkit.plan import make_plan
 from bemkit.reference.compare import MEASURES, Reference, over_resolved
 from bemkit.reference.shipped import find_reference
-from bemkit.scene.discretisation import QuadraticGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin, LinearGalerkin, QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
-from bemkit.scene.toml import scene_to_toml, with_overrides
+from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.base import ContactSolver
 from bemkit.studies.accuracy.runs import MeshSequence, Run, adaptive, all_runs, graded, uniform
 from bemkit.studies.engine import StudyError
 
 Number = TypeVar("Number", int, float)
 
+DEFAULT_ELEMENTS = "constant,linear,quadratic"
 SUGGESTED = 600
 """Elements of an over-resolved solution whose error is small against that of the default meshes."""
 _MESHES_TOGETHER = 1.3
@@ -37,7 +38,8 @@ class StudyOptions:
 
     elements: str
     accuracies: str
-    discretisation: str
+    discretisation: str | None
+    degrees: str | None
     meshes: str
     solver: str
     exponent: float
@@ -60,14 +62,24 @@ class StudyOptions:
             "graded": graded(elements, self.exponent),
             "adaptive": adaptive(accuracies, self.most_elements),
         }
-        words, drivers = _words(self.discretisation, "discretisation"), _words(self.solver, "solver")
+        drivers = _words(self.solver, "solver")
         return all_runs(
             scene,
-            [with_overrides(scene, discretisation=word).discretisation for word in words],
+            self._element_types(),
             [sequences[word] for word in _known(self.meshes, "meshes", sequences)],
             # the scene's own driver, with its options, if it has that word
             [scene.solver if type(each) is type(scene.solver) else each for each in map(_solver, drivers)],
         )
+
+    def _element_types(self) -> list[Discretisation]:
+        if self.degrees is None:
+            words = _words(self.discretisation or DEFAULT_ELEMENTS, "discretisation")
+            return [structure(word, cast(Any, Discretisation)) for word in words]
+        if self.discretisation is not None:
+            raise StudyError(f"degrees is {self.degrees!r} and discretisation is {self.discretisation!r}: give one")
+        named: dict[str, Discretisation] = {"hp": HpGalerkin(), "1": LinearGalerkin(), "2": QuadraticGalerkin()}
+        words = _words(self.degrees, "degrees")
+        return [named.get(word) or Galerkin(_numbers(word, "degrees", int, "1,2,4,8,hp")[0]) for word in words]
 
     def labels(self, scene: Scene) -> dict[str, str]:
         """Return what must be the same when records of an earlier study are taken over."""

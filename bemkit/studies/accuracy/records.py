@@ -8,6 +8,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.hdf5 import FileFormat
 from bemkit.reference.compare import MEASURES
 from bemkit.results.outputs import csv_text
@@ -15,6 +16,10 @@ from bemkit.results.record_file import RecordFile
 
 N_FITTED = 3
 """Meshes, from the finest on, to which an order is fitted."""
+N_EXPONENTIAL = 4
+"""Meshes to which an exponential rate is fitted: three lie on either curve nearly as well."""
+BETTER = 0.5
+"""Share of the squared misfit of an order that the misfit of an exponential rate may have, to be taken instead."""
 EQUALITY_TOLERANCE = 1e-6
 """Relative difference below which errors are equal: drivers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
@@ -32,7 +37,8 @@ class ErrorRecord:
         Number of elements, or asked-for accuracy of adaptive meshes.
     status : str
         Of the driver in small letters, or ``refused``.
-    elements, contact_nodes, linear_solves, outer_steps : int
+    elements, unknowns, contact_nodes, linear_solves, outer_steps : int
+        The unknowns are the displacements of all nodes.
     seconds : float [s]
         Run time of everything; median over the repetitions, nan if it was not measured.
     seconds_mesh, seconds_assemble, seconds_condense, seconds_solve, seconds_recover : float [s]
@@ -54,6 +60,7 @@ class ErrorRecord:
     size: float
     status: str
     elements: int
+    unknowns: int
     contact_nodes: int
     linear_solves: int
     outer_steps: int
@@ -95,8 +102,35 @@ def by_series(records: Iterable[ErrorRecord]) -> list[list[ErrorRecord]]:
     return [list(group) for _, group in groupby(records, key=lambda record: record.series)]
 
 
+@dataclass(frozen=True)
+class Rate:
+    """How fast an error falls with the number n of unknowns: like n**-value, or like exp(-value sqrt(n))."""
+
+    value: float
+    is_exponential: bool = False
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.value):
+            return "-"
+        return f"exp(-{self.value:.2g}√n)" if self.is_exponential else f"{self.value:.1f}"
+
+
+def fitted_rate(records: Sequence[ErrorRecord], measure: str) -> Rate:
+    """Return the rate of an error over the last meshes of a series, by least squares; nan if it cannot be told.
+
+    It is exponential where that fits the last four meshes better, as with degrees that rise.
+    """
+    last = records[-N_EXPONENTIAL:]
+    n, errors = _sizes_and_errors(last, measure)
+    if len(last) == N_EXPONENTIAL and _is_good(n, errors) and np.all(np.diff(errors) < 0.0):
+        algebraic, exponential = (np.polyfit(x, np.log(errors), 1, full=True)[:2] for x in (np.log(n), np.sqrt(n)))
+        if np.sum(exponential[1]) < BETTER * np.sum(algebraic[1]):
+            return Rate(float(-exponential[0][0]), is_exponential=True)
+    return Rate(fitted_order(records, measure))
+
+
 def orders(records: Sequence[ErrorRecord], measure: str) -> list[float]:
-    """Return the orders p, error ~ N**-p, between each mesh of a series and the one before; nan where there is none."""
+    """Return the orders p, error ~ n**-p, between each mesh of a series and the one before; nan where there is none."""
     return [float("nan"), *(_slope((before, after), measure) for before, after in pairwise(records))][: len(records)]
 
 
@@ -106,12 +140,17 @@ def fitted_order(records: Sequence[ErrorRecord], measure: str) -> float:
 
 
 def _slope(records: Sequence[ErrorRecord], measure: str) -> float:
-    sizes = np.array([float(record.elements) for record in records])
-    errors = np.array([getattr(record, measure) for record in records], dtype=float)
-    is_good = np.isfinite(errors) & (errors > 0.0) & (sizes > 0.0)
-    if not is_good.all() or np.unique(sizes).size < 2:
-        return float("nan")
-    return float(-np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+    n, errors = _sizes_and_errors(records, measure)
+    return float(-np.polyfit(np.log(n), np.log(errors), 1)[0]) if _is_good(n, errors) else float("nan")
+
+
+def _sizes_and_errors(records: Sequence[ErrorRecord], measure: str) -> tuple[FloatArray, FloatArray]:
+    sizes = np.array([float(record.unknowns) for record in records])
+    return sizes, np.array([getattr(record, measure) for record in records], dtype=float)
+
+
+def _is_good(sizes: FloatArray, errors: FloatArray) -> bool:
+    return bool(np.all(np.isfinite(errors) & (errors > 0.0) & (sizes > 0.0))) and np.unique(sizes).size >= 2
 
 
 def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorRecord]:
@@ -127,7 +166,7 @@ def pareto_front(records: Sequence[ErrorRecord], measure: str) -> list[ErrorReco
     return front
 
 
-FORMAT = FileFormat("bemkit-study", 1, "bemkit study errors file", "bemkit study errors -o")
+FORMAT = FileFormat("bemkit-study", 2, "bemkit study errors file", "bemkit study errors -o")
 FILE = RecordFile(FORMAT, ErrorRecord, ("scene", "reference", "grading", "budget", "repetitions"))
 CSV_START = "discretisation,map,meshes,solver,size,"
 

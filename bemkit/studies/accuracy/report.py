@@ -13,7 +13,7 @@ from rich.text import Text
 from bemkit.reference.compare import MEASURES, Reference
 from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
-from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, orders, pareto_front
+from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, orders, pareto_front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,13 +89,13 @@ def _print_series(
 
 
 def _print_orders(records: Sequence[ErrorRecord], measures: Sequence[str], console: Console) -> None:
-    console.print(Text("observed orders in N, fitted to the last meshes", style="bold"))
+    console.print(Text("observed rates in the number n of unknowns, fitted to the last meshes", style="bold"))
     table = plain_table(("elements", "map", "meshes", "driver"), [SHORT[measure] for measure in measures])
     for column in table.columns[:3]:
         column.no_wrap = True
     for series in by_series(records):
         first = series[0]
-        cells = [_number(fitted_order(series, measure), ".1f") for measure in measures]
+        cells = [str(fitted_rate(series, measure)) for measure in measures]
         table.add_row(first.discretisation, first.map, first.meshes, first.solver, *cells)
     console.print(table)
 
@@ -139,7 +139,7 @@ def _console(console: Console | None) -> Console:
 
 
 def draw_errors(records: Sequence[ErrorRecord], measures: Sequence[str], *, title: str = "") -> Figure:
-    """Draw errors over run time, or over the number of elements where no times were measured, one panel for each."""
+    """Draw errors over run time, or over the number of unknowns where no times were measured, one panel for each."""
     n_columns = min(len(measures), 2)
     n_rows = -(-len(measures) // n_columns)
     figure = new_figure(5.2 * n_columns, 3.9 * n_rows + 1.1)
@@ -160,7 +160,7 @@ def _is_timed(records: Sequence[ErrorRecord]) -> bool:
 def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> None:
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    abscissa = "seconds" if _is_timed(records) else "elements"
+    abscissa = "seconds" if _is_timed(records) else "unknowns"
     front = pareto_front(records, measure)
     if front:
         x, y = _points(front, "seconds", measure)
@@ -171,17 +171,17 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
         x, y = _points(series, abscissa, measure)
         colour, line, marker = _style(records, series[0])
         panel.plot(x, y, color=colour, linestyle=line, marker=marker, markersize=4.5, linewidth=1.2)
-        order = fitted_order(series, measure)
-        # drivers reach the same state: the order is that of elements and meshes
-        if x.size and np.isfinite(order) and series[0].series[:2] not in named:
+        rate = fitted_rate(series, measure)
+        # drivers reach the same state: the rate is that of elements and meshes
+        if x.size and np.isfinite(rate.value) and series[0].series[:2] not in named:
             named.add(series[0].series[:2])
-            _write_order(panel, f"{order:.1f}", (x[-1], y[-1]), colour)
+            _write_order(panel, str(rate), (x[-1], y[-1]), colour)
     panel.set_xscale("log")
     panel.set_yscale("log")
     panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_xlabel("run time [s]" if abscissa == "seconds" else "number of elements")
+    panel.set_xlabel("run time [s]" if abscissa == "seconds" else "number of unknowns")
     panel.set_title(f"relative error: {MEASURES[measure]}", loc="left", fontsize=10)
     show_grid(panel)
 

@@ -17,7 +17,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic, Grading, Uniform
 from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
 from bemkit.runs.run import run as solve
-from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.discretisation import Discretisation, Galerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.scene import Scene
@@ -114,7 +114,9 @@ def all_runs(
     meshes: Sequence[MeshSequence],
     solvers: Sequence[ContactSolver],
 ) -> tuple[Run, ...]:
-    """Combine element types, meshes and drivers; constant elements have no error estimate and so no adaptive meshes.
+    """Combine element types, meshes and drivers.
+
+    Constant elements have no error estimate and so no adaptive meshes, rising degrees no others.
 
     The scene's own mesh, discretisation and solver do not matter. What it does not allow becomes a refused row.
 
@@ -129,7 +131,7 @@ def all_runs(
     try:
         runs = tuple(
             Run(
-                DISCRETISATIONS.kind_of(element),
+                _word_of(element),
                 element.method,
                 sequence.name,
                 SOLVERS.word_of(solver),
@@ -139,7 +141,7 @@ def all_runs(
             )
             for element in discretisations
             for sequence in meshes
-            if element.estimates_error or not sequence.needs_estimate
+            if (element.estimates_error if sequence.needs_estimate else not element.needs_accuracy)
             for solver in solvers
             for size in sequence.sizes
         )
@@ -147,14 +149,20 @@ def all_runs(
         raise StudyError(str(error)) from error
     if not runs:
         raise StudyError(
-            "nothing to run: give at least one element type, driver and mesh, and with constant elements other than "
-            "adaptive meshes, for which they have no error estimate"
+            "nothing to run: give at least one element type, driver and mesh, with constant elements other than "
+            "adaptive meshes, for which they have no error estimate, and with 'hp' adaptive ones"
         )
     keys = [run.key for run in runs]
     repeated = next((key for k, key in enumerate(keys) if key in keys[:k]), None)
     if repeated is not None:
         raise StudyError(f"{', '.join(map(str, repeated[:3]))} of size {repeated[3]:g} is given twice: leave one out")
     return runs
+
+
+def _word_of(element: Discretisation) -> str:
+    """Return what names an element type in a study: its word in scene files, or its degree where that says more."""
+    word = DISCRETISATIONS.kind_of(element)
+    return f"degree {element.degree}" if word == "galerkin" and isinstance(element, Galerkin) else word
 
 
 def error_tasks(runs: Sequence[Run], reference: Reference, repeat: int | None = None) -> tuple[Task[ErrorRecord], ...]:
@@ -219,6 +227,7 @@ def _record(run: Run, found: Attempt, reference: Reference, measured: Mapping[st
         size=run.size,
         status=found.status,
         elements=0 if solution is None else solution.mesh.n_elements,
+        unknowns=0 if solution is None else solution.boundary.displacement.size,
         contact_nodes=0 if solution is None else solution.contact.n_contact,
         linear_solves=0 if solution is None else solution.linear_solves,
         outer_steps=0 if solution is None else solution.outer_steps,

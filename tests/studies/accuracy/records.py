@@ -37,4 +37,5 @@ def row(**changes: Any) -> ErrorRecord:
         "transitions": 5e-3,
         "message": "",
     }
-    return ErrorRecord(**(values | changes))
+    given = values | changes
+    return ErrorRecord(**({"unknowns": 2 * given["elements"]} | given))

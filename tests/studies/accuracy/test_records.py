@@ -15,6 +15,7 @@ from bemkit.studies.accuracy.records import (
     ErrorRecord,
     by_series,
     fitted_order,
+    fitted_rate,
     orders,
     pareto_front,
     to_csv,
@@ -45,6 +46,19 @@ def test_orders_that_cannot_be_told_are_nan() -> None:
     same = [row(elements=10, energy=1.0), row(elements=10, energy=0.5)]  # two aims, one mesh
     assert math.isnan(fitted_order(same, "energy"))
     assert math.isnan(fitted_order(same[:1], "energy"))
+
+
+def test_exponential_rates_are_told_from_orders() -> None:
+    sizes = (40, 90, 160, 250)
+    falling = [row(size=float(n), elements=n, unknowns=n, energy=float(np.exp(-0.8 * np.sqrt(n)))) for n in sizes]
+    rate = fitted_rate(falling, "energy")
+    assert rate.is_exponential
+    assert rate.value == pytest.approx(0.8)
+    assert str(rate) == "exp(-0.8√n)"
+    # three meshes do not tell the two apart, nor does an order look exponential
+    assert not fitted_rate(falling[1:], "energy").is_exponential
+    assert str(fitted_rate(halving(2.5), "energy")) == "2.5"
+    assert str(fitted_rate(falling[:1], "energy")) == "-"
 
 
 def test_series_are_rows_that_differ_in_size() -> None:
