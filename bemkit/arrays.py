@@ -28,10 +28,10 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
     """
     if not indices.size:
         return []
-    steps = np.diff(indices)
+    steps = indices[1:] - indices[:-1]
     if steps.size and steps[0] > 1 and (steps == steps[0]).all():
         return [(slice(0, indices.size), slice(int(indices[0]), int(indices[-1]) + 1, int(steps[0])))]
-    breaks = np.flatnonzero(steps != 1) + 1
+    breaks = (steps != 1).nonzero()[0] + 1
     if breaks.size > 8:
         return [(slice(0, indices.size), indices)]
     edges = [0, *breaks.tolist(), indices.size]

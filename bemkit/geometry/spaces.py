@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
@@ -267,8 +267,9 @@ def check_degree(degree: int) -> None:
         raise GeometryError(f"degree is {degree!r}: give a whole number from 1 to {LARGEST_DEGREE}")
 
 
+@lru_cache(maxsize=4)
 def break_nodes(mesh: BoundaryMesh) -> BoolArray:
-    """Return the (n_nodes,) mask of nodes where tractions may jump: corners and ends of boundary parts."""
+    """Return the (n_nodes,) mask, read-only, of nodes where tractions may jump: corners and ends of boundary parts."""
     if mesh.symmetry is not None:
         return break_nodes(mesh.whole)[: mesh.n_nodes]
     owner = np.full(mesh.n_elements, -1)
@@ -276,6 +277,7 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
         owner[mesh.part(name)] = number
     changes = owner[mesh.node_elements[:, 0]] != owner[mesh.node_elements[:, 1]]
     breaks: BoolArray = corner_nodes(mesh) | changes
+    read_only(breaks)
     return breaks
 
 

@@ -7,6 +7,7 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -212,6 +213,12 @@ class Solution:
         """
         displacement, traction_dofs = self.boundary.displacement, self.boundary.traction_dofs
         return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs)
+
+    def with_warnings(self, warnings: tuple[str, ...]) -> Solution:
+        """Return the same solution with other warnings, and with all that has been estimated of it."""
+        result = copy(self)
+        object.__setattr__(result, "warnings", warnings)
+        return result
 
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields, under the stable names of the JSON output.

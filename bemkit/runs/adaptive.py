@@ -77,11 +77,12 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             obstacle = "the estimated error no longer falls"
         else:
             level = following
-            expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)
             if _size(level) > most_elements:
                 obstacle = f"more than {most_elements} elements would be needed"
-            elif options.most_seconds is not None and now - begin + expected > options.most_seconds:
-                obstacle = f"more than {options.most_seconds:g} s would be needed"
+            elif options.most_seconds is not None:
+                expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)
+                if now - begin + expected > options.most_seconds:
+                    obstacle = f"more than {options.most_seconds:g} s would be needed"
     return _ending(meshes, solutions, obstacle)
 
 

@@ -184,7 +184,7 @@ def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageC
         work=model.work,
         message=result.message,
     )
-    return replace(solution, warnings=(*find_warnings(solution), *warnings))
+    return solution.with_warnings((*find_warnings(solution), *warnings))
 
 
 def _contact_table(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -30,7 +31,7 @@ class Level:
     partition: Partition
     number: int = 0
 
-    @property
+    @cached_property
     def scene(self) -> Scene:
         """The scene with the discretisation of this level."""
         return replace(self.asked, discretisation=self.asked.discretisation.at_level(self.number))

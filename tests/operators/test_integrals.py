@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import mpmath
 import numpy as np
 import pytest
 
-from bemkit.geometry import BoundaryMesh
-from bemkit.operators.integrals.pairs import Degrees
+from bemkit.geometry import BoundaryMesh, Geometric, Rectangle, discretise
+from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.sweep import PairSweep
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))
@@ -77,6 +79,29 @@ def check_constants(mesh: BoundaryMesh, tolerance: float) -> None:
 
 def test_pairs_agree_with_exact_double_integrals() -> None:
     check_constants(mesh_of(OUTLINE), 1e-13)  # round-off of about a hundred outer points
+
+
+@lru_cache(maxsize=2)
+def graded_integrals(ratio: float) -> tuple[BoundaryMesh, PairIntegrals]:
+    """Return the integrals of a graded mesh by rules of ten points more than linear elements take."""
+    mesh = discretise(Rectangle(1.0, 1.0).outline(), n_elements=40, grading=Geometric(ratio, 6))
+    return mesh, PairSweep(mesh, Degrees(log=(20, 20), double=(20, 20))).chunk(slice(0, mesh.n_elements))
+
+
+@pytest.mark.parametrize("degree", range(1, 13))
+@pytest.mark.parametrize("ratio", [0.1, 0.2])
+def test_rules_suffice_for_odd_and_even_degrees_on_graded_meshes(ratio: float, degree: int) -> None:
+    # of far pairs either element may take the outer rule, with polynomials up to the degree of the displacements
+    mesh, expected = graded_integrals(ratio)
+    sweep = PairSweep(mesh, Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree)))
+    integrals = sweep.chunk(slice(0, mesh.n_elements))
+    area = np.multiply.outer(mesh.lengths, mesh.lengths)
+    distance = np.linalg.norm(mesh.centres[:, None] - mesh.centres, axis=2) + np.sqrt(area)
+    for name, size in (("log", area), ("quotient", area), ("double", area / distance)):
+        values = getattr(integrals, name)
+        n_test, n_trial = values.shape[:2]
+        # an odd degree costs one digit of the base of the error estimate; see GAUSS_LEVELS
+        assert np.abs((values - getattr(expected, name)[:n_test, :n_trial]) / size).max() < 1e-13, name
 
 
 @pytest.mark.parametrize("ratio", [1e-2, 1e-6, 1e-10, 1e-12])

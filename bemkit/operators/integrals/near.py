@@ -22,9 +22,10 @@ from bemkit.operators.integrals.panels import Panels, squared_distance
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
 # An analytic function whose nearest singularity lies z half lengths from the centre is integrated by n Gauss points
-# with an error of about (z + sqrt(z^2 - 1))^(-2n); the distances below make that 1e-15. A factor P_a costs a digits
-# of that base, so every rule has `Degrees.extra_points` more.
-GAUSS_LEVELS = ((2, 3.0e3), (3, 160.0), (4, 38.0), (6, 9.0), (10, 3.0))
+# with an error of about (z + sqrt(z^2 - 1))^(-2n). A factor P_a costs a digits of that base, and every rule has one
+# point more for every two degrees (`Degrees.extra_points`), so that an odd a costs one digit: the distances below make
+# the error 1e-15 for even a and at most 7e-14 for odd a, of what P_0 gives.
+GAUSS_LEVELS = ((2, 1.2e4), (3, 212.0), (4, 38.0), (6, 9.0), (10, 3.0))
 """Numbers of outer points, and the distance [half lengths of the outer element] from which each is enough."""
 N_REGULAR = 10
 N_TOUCHING = 30

@@ -124,13 +124,14 @@ class PairIntegrals:
     @classmethod
     def summed(cls, degrees: Degrees, points: FloatArray, weights: FloatArray, inner: Sequence[Inner]) -> PairIntegrals:
         """Sum inner integrals over the points of one rule on the test elements."""
+        n_polynomials = max((family[0] + 1 for family in (degrees.log, degrees.double) if family), default=1)
+        weighted = weights * kernels.legendre_values(n_polynomials - 1, points)
 
         def total(family: tuple[int, int] | None, values: Sequence[FloatArray]) -> FloatArray:
             # by trial degree, point and pair; the sums are contiguous by trial degree, test degree and pair
             stacked = np.stack(values, axis=1)
             n_test = 0 if family is None else family[0] + 1
-            factors = weights * kernels.legendre_values(max(n_test, 1) - 1, points)[:n_test]
-            sums = factors @ stacked.reshape(len(stacked), len(inner), math.prod(stacked.shape[2:]))
+            sums = weighted[:n_test] @ stacked.reshape(len(stacked), len(inner), math.prod(stacked.shape[2:]))
             return sums.reshape(len(stacked), n_test, *stacked.shape[2:]).swapaxes(0, 1)
 
         quotient = total(degrees.log, [one.quotient.view(float) for one in inner])

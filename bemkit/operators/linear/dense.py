@@ -91,9 +91,12 @@ class Cholesky:
 
     def solve_lower(self, right: FloatArray) -> FloatArray:
         """Solve L x = right with A = L L^T."""
-        from scipy.linalg.lapack import dtrtrs
+        from scipy.linalg.blas import dtrsm
 
-        return np.asarray(dtrtrs(self._factor, right, lower=1)[0])
+        # the transpose of a row-major matrix is column-major: x^T L^T = right^T is solved in its place, at once
+        x = np.array(right.reshape(len(right), -1), order="C")
+        dtrsm(1.0, self._factor, x.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        return x.reshape(right.shape)
 
     def solve_upper(self, right: FloatArray) -> FloatArray:
         """Solve L^T x = right with A = L L^T."""

@@ -253,7 +253,7 @@ def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
     """Return the symmetric part of `hyper` plus whitened_trace^T whitened_trace, read-only."""
     from scipy.linalg.blas import dsyrk
 
-    half: FloatArray = dsyrk(1.0, whitened_trace, trans=1, lower=1)  # column-major, zero above the diagonal
+    half: FloatArray = dsyrk(1.0, whitened_trace.T, lower=1)  # column-major, zero above the diagonal
     half[np.diag_indices_from(half)] *= 0.5
     half += 0.5 * hyper.T
     matrix = half + half.T

@@ -58,7 +58,7 @@ class Layers:
         trace = self.trace_operator if displacement is None else multiply(self.trace_operator, displacement)
         whitened = self.single_layer.solve_lower(trace)
         if self.resultant.shape[1]:
-            whitened -= multiply(self.resultant, multiply(self.resultant.T, whitened))
+            whitened -= multiply(multiply(whitened.T, self.resultant), self.resultant.T).T
         return whitened
 
     def tractions(self, displacement: FloatArray) -> FloatArray:
@@ -113,7 +113,7 @@ def assemble_layers(
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
     trace = _without(k, at_rest)
     del k
-    hyper = _without(_without(w, at_rest).T, at_rest)
+    hyper = _without(_without(w, at_rest).T, at_rest).T
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     idle = np.column_stack([resultants, annihilated, trace @ dilatation])
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
