@@ -101,6 +101,11 @@ class BoundaryMesh:
             check_half(self.symmetry, nodes, elements, self.is_exterior)
             _ = self.whole  # checks its loops
 
+    def __repr__(self) -> str:
+        """Return one line."""
+        parts = ", ".join(f"{name} ({elements.size})" for name, elements in self.parts.items())
+        return f"BoundaryMesh({self.n_elements} elements{'; ' if parts else ''}{parts})"
+
     def _keep(self, name: str, array: FloatArray | IntArray) -> None:
         read_only(array)
         object.__setattr__(self, name, array)

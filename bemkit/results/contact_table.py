@@ -71,6 +71,12 @@ class ContactTable:
         if wrong.size:
             raise InputError(f"status[{wrong[0]}] is {self.status[wrong[0]]}: give values of NodeStatus")
 
+    def __repr__(self) -> str:
+        """Return one line."""
+        words = self.status_words()
+        counts = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
+        return f"ContactTable({self.n_contact} nodes{': ' if counts else ''}{counts})"
+
     @classmethod
     def empty(cls) -> ContactTable:
         """Return the table of a scene without contact."""

@@ -73,6 +73,10 @@ class BoundaryFields:
             raise InputError(f"traction_dofs has the shape {dofs.shape}: give a multiple of {n} rows to match traction")
         read_only(dofs)
 
+    def __repr__(self) -> str:
+        """Return one line."""
+        return f"BoundaryFields({len(self.points)} points, {len(self.centres)} elements)"
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -125,6 +129,12 @@ class Solution:
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return one line; the fields hold thousands of numbers."""
+        nodes = f", {self.contact.n_contact} contact nodes" if self.contact.n_contact else ""
+        status = self.status.name.lower().replace("_", " ")
+        return f"Solution({self.scene.title!r}: {status}, {self.mesh.n_elements} elements{nodes})"
 
     @property
     def is_converged(self) -> bool:

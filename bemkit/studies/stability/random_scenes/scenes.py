@@ -15,7 +15,14 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.discretisation import ConstantCollocation, Discretisation, LinearGalerkin, QuadraticGalerkin
+from bemkit.scene.discretisation import (
+    ConstantCollocation,
+    Discretisation,
+    Galerkin,
+    HpGalerkin,
+    LinearGalerkin,
+    QuadraticGalerkin,
+)
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
@@ -71,9 +78,13 @@ def random_case(seed: int, index: int) -> RandomCase:
 
 def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Scene:
     constant = ConstantCollocation(slopes=not draw.chance(0.2))
-    discretisation = draw.one_of((LinearGalerkin(), QuadraticGalerkin(), constant))
+    discretisation: Discretisation = draw.one_of((LinearGalerkin(), QuadraticGalerkin(), constant))
     material = _material(draw, modulus)
+    if draw.chance(0.15):
+        discretisation = Galerkin(int(draw.integers(3, 9)))
     mesh = _mesh(draw, layout["shape"], discretisation)
+    if mesh.accuracy is not None and draw.chance(0.3):
+        discretisation = HpGalerkin()
     factors: tuple[float, ...] = (1.0,)
     if draw.chance(0.12):
         factors = draw.one_of(((0.5, 1.0), (0.3, 0.6, 1.0), (1.0, 0.5), (1.0, -0.3, 0.7), (1.0, 0.0), (2.0,)))
@@ -110,6 +121,8 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
     if discretisation.estimates_error and draw.chance(0.04):
         return MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 100)))
     low, high = draw.one_by_weight({(3, 9): 0.08, (10, 40): 0.67, (41, 80): 0.2, (81, 160): 0.05})
+    if isinstance(discretisation, Galerkin) and discretisation.degree > 2:
+        low, high = 3, 30  # of many nodes each
     gradings: dict[Grading, float] = {
         Uniform(): 6.0,
         Algebraic(draw.between(1.2, 3.0)): 3.0,

@@ -1,0 +1,25 @@
+"""What a session shows of results: one line each, whatever they hold."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import bemkit as bk
+
+
+def test_results_show_themselves_in_a_line() -> None:
+    mesh = bk.MeshOptions(elements=40)
+    solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=mesh))
+    shown = "Solution('Square on a rigid foundation, paper Example 1': converged, 40 elements, 10 contact nodes)"
+    assert repr(solution) == shown
+    assert repr(solution.mesh) == "BoundaryMesh(40 elements; foundation (10), wall (10), top-load (5), left-load (5))"
+    assert repr(solution.boundary) == "BoundaryFields(40 points, 40 elements)"
+    counts = {word: solution.contact.status_words().count(word) for word in ("separated", "slip", "stick")}
+    assert repr(solution.contact) == f"ContactTable(10 nodes: {', '.join(f'{n} {w}' for w, n in counts.items())})"
+
+
+def test_without_contact_nothing_is_said_of_it() -> None:
+    solution = bk.run(dataclasses.replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=20)))
+    assert "contact nodes" not in repr(solution)
+    assert repr(solution.contact) == "ContactTable(0 nodes)"
+    assert repr(bk.discretise(bk.Disk(1.0).outline(), n_elements=8)) == "BoundaryMesh(8 elements)"
