@@ -17,7 +17,7 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, find_reference, over_resolved
-from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_order, pareto_front
+from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, pareto_front
 from bemkit.studies.accuracy.report import draw_errors
 from bemkit.studies.accuracy.runs import adaptive, all_runs, error_tasks, graded, uniform
 from bemkit.studies.engine import compute
@@ -27,12 +27,13 @@ IMAGES = Path(__file__).parent / "images"
 SCENES = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates", "clamped-angle")
 ELEMENTS = (40, 80, 160, 320, 640)
 ACCURACIES = (1e-2, 1e-3, 1e-4)
+RISING = (*ACCURACIES, 1e-5, 1e-6)
 FINEST = 600
 REPEAT = 3
 DOTS_PER_INCH = 90
 N_COLOURS = 48
 PANELS = ("energy", "sigma_n", "displacement", "transitions")
-TARGETS = (1e-1, 1e-2, 1e-3, 1e-4)
+TARGETS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 def main() -> None:
@@ -63,6 +64,7 @@ def study(scene: bk.Scene, reference: Reference) -> list[ErrorRecord]:
     elements = (bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin())
     meshes = (uniform(ELEMENTS), graded(ELEMENTS), adaptive(ACCURACIES))
     newton = all_runs(scene, elements, meshes, [bk.SemismoothNewton()])
+    newton += all_runs(scene, [bk.HpGalerkin()], [adaptive(RISING)], [bk.SemismoothNewton()])
     few = (uniform(ELEMENTS[:-1]), adaptive(ACCURACIES[:2]))
     augmented = all_runs(scene, elements, few, [bk.AugmentedLagrangian()])
     # the finest meshes are for constant elements, which are fast and need them
@@ -81,14 +83,14 @@ def reference_sentence(reference: Reference) -> str:
 
 
 def orders_table(rows: Sequence[ErrorRecord]) -> str:
-    """Return the observed orders in the number of elements, Newton only: other drivers reach the same state."""
+    """Return the observed rates in the number of unknowns, Newton only: other drivers reach the same state."""
     lines = [
         f"| elements | meshes | {' | '.join(MEASURES[name] for name in PANELS)} |",
         "|---|---|" + "---:|" * len(PANELS),
     ]
     for series in by_series(rows):
         if series[0].solver == "semismooth-newton":
-            cells = [short(fitted_order(series, name), ".1f") for name in PANELS]
+            cells = [str(fitted_rate(series, name)) for name in PANELS]
             lines.append(f"| {series[0].discretisation} | {series[0].meshes} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -110,11 +112,6 @@ def fastest(rows: Sequence[ErrorRecord], measure: str, target: float) -> str:
     row = good[0]
     driver = "" if row.solver == "semismooth-newton" else f", {row.solver}"
     return f"{row.discretisation}, {row.meshes}, {row.elements} elements{driver}: {1e3 * row.seconds:.0f} ms"
-
-
-def short(value: float, form: str) -> str:
-    """Format a number, a dash if there is none."""
-    return f"{value:{form}}" if math.isfinite(value) else "-"
 
 
 if __name__ == "__main__":
