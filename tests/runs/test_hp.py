@@ -216,3 +216,14 @@ def test_budgets_are_kept() -> None:
     assert "more than 100 elements would be needed; estimated error" in last.message
     assert ", of contact tractions" in last.message
     assert last.mesh.n_elements * degree_of(last) <= 200
+
+
+def test_elements_of_high_degree_are_judged_without_neighbours() -> None:
+    scene = bk.load_scene("bending")
+    coarse = bk.MeshOptions(elements=4)
+    low, high = (
+        bk.run(dataclasses.replace(scene, discretisation=bk.Galerkin(degree), mesh=coarse)) for degree in (2, 4)
+    )
+    assert any("no error can be estimated" in warning for warning in low.warnings)
+    assert high.warnings == ()
+    assert high.estimated_error is not None
