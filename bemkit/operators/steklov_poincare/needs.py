@@ -1,7 +1,7 @@
 """What a Steklov-Poincare map takes, foreseen from sizes alone: items, counts, memory and operations.
 
-Counts are exact. Memory adds up the matrices that are alive at the same time; the buffers of assembly in it, and the
-evaluations of its integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
+Counts are exact. Memory adds up the matrices that are alive at the same time and the buffers of assembly; those of
+collocation, and the evaluations of integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.integrals.sweep import CHUNK_PAIRS
+from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.integrals.sweep import CHUNK_PAIRS, sweep_memory
 from bemkit.operators.linear.choice import krylov_cost
 from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
 from bemkit.operators.linear.threads import n_threads
@@ -162,11 +163,10 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         factorisations=tuple(factorisations),
         right_hand_sides=n_columns,
     )
-    # bytes for each element and at most, of close pairs; for each element kept; for each pair of a chunk
-    close, most, listed, swept = (38e3, 14.5e6, 4e3, 330.0) if degree < 2 else (40e3, 10e6, 18e3, 130.0)
-    n = mesh.whole.n_elements
-    buffers = max(min(close * n, most), swept * _pairs_in_chunks(mesh)) + listed * n
-    memory = int(max(_BYTES * assembled + buffers, _BYTES * largest))
+    degrees, n_sources = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree)), mesh.whole.n_elements
+    n_together = n_threads(mesh.n_elements * n_sources)
+    buffers = sweep_memory(degrees, mesh.n_elements, n_sources, n_together, is_curved=is_curved)
+    memory = max(_BYTES * assembled + buffers, _BYTES * largest)
     straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
     evaluations = _evaluations(case, straight, curved)
     return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
