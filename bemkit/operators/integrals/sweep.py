@@ -182,7 +182,7 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
 
 
 def _rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:
-    """Return how many rows of `n_trial` pairs fit into the cache; the inner integrals of all points are held at once."""
+    """Return how many rows of pairs fit into the cache, where the inner integrals of all points are held at once."""
     n_rows = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products) // max(1, n_trial)
     return max(1, 3 * n_rows // max(3, n_points))
 
