@@ -164,11 +164,11 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         right_hand_sides=n_columns,
     )
     degrees, n_sources = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree)), mesh.whole.n_elements
-    n_together = n_threads(mesh.n_elements * n_sources)
-    buffers = sweep_memory(degrees, mesh.n_elements, n_sources, n_together, is_curved=is_curved)
+    threads = n_threads(mesh.n_elements * n_sources * degrees.n_products)
+    buffers = sweep_memory(degrees, mesh.n_elements, n_sources, threads, is_curved=is_curved)
     memory = max(_BYTES * assembled + buffers, _BYTES * largest)
     straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
-    evaluations = _evaluations(case, straight, curved)
+    evaluations = _evaluations(case, straight, curved) / threads
     return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
 
 
@@ -231,6 +231,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     system = (u + len(admissible_modes(mesh))) ** 2
     memory = _BYTES * (system + u * r) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * r))
     evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
+    evaluations /= n_threads(mesh.n_elements * mesh.whole.n_elements)
     flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * r)
     items = _collocation_items(case, order, n_loaded, n_moved, takes_slopes)
     return BodyNeeds(items, work, memory, _BYTES * (system + u * r), evaluations, flops)
@@ -290,4 +291,4 @@ def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[fl
     mesh, share = case.mesh, case.n_curved / case.mesh.n_elements
     far, near = ((1.0 - share) * one + share * other for one, other in zip(straight, curved, strict=True))
     n_sources = mesh.whole.n_elements
-    return mesh.n_elements * (n_sources * far + near) / n_threads(mesh.n_elements * n_sources)
+    return mesh.n_elements * (n_sources * far + near)
