@@ -1,4 +1,4 @@
-"""Threads: those of assembly change nothing, those of BLAS are right for any number of runs and as they were afterwards."""
+"""The threads of BLAS: right for any number of runs at the same time, and as they were afterwards."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import bemkit as bk
-from bemkit.operators.boundary import hypersingular
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.threads import blas_threads_for
 
@@ -104,21 +103,3 @@ def test_runs_in_threads_give_the_bits_of_runs_in_turn(monkeypatch: pytest.Monke
         assert np.array_equal(one.boundary.traction, other.boundary.traction)
         assert np.array_equal(one.contact.sigma_t, other.contact.sigma_t)
         assert (one.energy, one.linear_solves) == (other.energy, other.linear_solves)
-
-
-def test_large_work_takes_all_processors(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
-    assert threads.n_threads(threads.MANY_INTEGRALS - 1) == 1
-    assert threads.n_threads(threads.MANY_INTEGRALS) == 3
-
-
-def test_matrices_do_not_depend_on_the_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    # two chunks share the rows of one node, whose two contributions add up to the same in either order
-    mesh = bk.discretise(bk.Rectangle(1.0, 1.0).outline(), n_elements=40)
-    space = bk.LagrangeSpace(mesh, degree=6)
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: {0, 1, 2}, raising=False)
-    matrices = []
-    for many in (10**9, 0):
-        monkeypatch.setattr(threads, "MANY_INTEGRALS", many)
-        matrices.append(hypersingular(space, space, bk.Material(1.0, 0.3)).matrix)
-    assert np.array_equal(*matrices)
