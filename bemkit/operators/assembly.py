@@ -191,7 +191,8 @@ def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: 
                 target.add(rows, gathered)
         return block.test_half.size * block.trial_half.size
 
-    n_pairs = for_each_chunk(fill, sweep.row_slices(), n_pairs=sweep.test.size * sweep.trial.size)
+    n_integrals = sweep.test.size * sweep.trial.size * degrees.n_products
+    n_pairs = for_each_chunk(fill, sweep.row_slices(), n_integrals=n_integrals)
     return targets, sum(n_pairs)
 
 

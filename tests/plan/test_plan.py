@@ -165,6 +165,12 @@ TRACED = {
         with_overrides(load_scene("paper-1"), elements=160, discretisation="linear"), linear_solver=Krylov()
     ),
     "curved": with_overrides(load_scene("disc-between-plates"), elements=200, discretisation="linear"),
+    "few linear": with_overrides(load_scene("paper-1"), elements=100, discretisation="linear"),
+    "few curved": with_overrides(load_scene("disc-between-plates"), elements=50, discretisation="quadratic"),
+    "degree 3": with_overrides(load_scene("paper-1"), elements=36, degree=3),
+    "degree 5": with_overrides(load_scene("paper-1"), elements=60, degree=5),
+    "degree 9": with_overrides(load_scene("paper-1"), elements=40, degree=9),
+    "curved of degree 6": with_overrides(load_scene("disc-between-plates"), elements=50, degree=6),
 }
 
 

@@ -124,7 +124,7 @@ def sweep_rows(
 
     step = max(1, CHUNK_PAIRS // whole.n_elements)
     chunks = (slice(first, min(first + step, n)) for first in range(0, n, step))
-    for_each_chunk(evaluate, chunks, n_pairs=n * whole.n_elements)
+    for_each_chunk(evaluate, chunks, n_integrals=n * whole.n_elements)
     return n * sum(int(run.stop - run.start) for run, _ in runs)
 
 

@@ -43,6 +43,15 @@ CHUNK_INTEGRALS = 65536
 """Integrals of one kind treated at once, at most: those of all polynomials."""
 LISTED_COST = 1.5
 """Cost of a listed pair and point against one of the dense sweep (measured)."""
+LISTED_PAIRS = 60
+"""Listed pairs of an element, at most, where all are of like length: those within `DENSE_DISTANCE` and around corners
+(counted)."""
+LISTED_SHARE_OF_CURVED = 1.0 / 3.0
+"""Share of all pairs that is listed on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
+BATCH_MEMORY = 0.6e6
+"""Bytes of the temporary arrays of one batch of outer points (measured)."""
+CURVED_BATCH_MEMORY = 0.1e6, 8e6
+"""The same of curved elements: for each element, and at most."""
 
 
 class PairSweep:
@@ -69,13 +78,11 @@ class PairSweep:
         self.degrees = degrees
         self.test = everything if test_elements is None else test_elements
         self.trial = everything if trial_elements is None else trial_elements
-        n_pairs = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products)
-        self.rows_per_chunk = max(1, n_pairs // max(1, self.trial.size))
+        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, 1)
         level, is_close = self._classify()
         counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
         self.base = _cheapest_level(counts, degrees.extra_points)
-        # the inner integrals of all points are held at once
-        self.rows_per_chunk = max(1, 3 * self.rows_per_chunk // max(3, self._n_points(self.base)))
+        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, self._n_points(self.base))
         self._rows, self._columns = np.nonzero(is_close | (level > self.base))
         self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
@@ -152,6 +159,32 @@ class PairSweep:
     def _scaled(self, sums: PairIntegrals, test: IntArray, trial: IntArray) -> PairIntegrals:
         sums.scale(self.panels.half[test, None], self.panels.half[trial], self.panels.tangent[trial])
         return sums
+
+
+def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *, is_curved: bool) -> int:
+    """Foresee the largest memory of a sweep over elements of like length and of the chunks of its matrices [bytes]."""
+    (n_log, n_double), level = degrees.n_trial, 3 if n_trial <= 2 * LISTED_PAIRS else 2  # few elements are all near
+    n_points = GAUSS_LEVELS[level][0] + degrees.extra_points
+    n_inner, n_outer = 3 * n_log + 2 * n_double, max(n_log, n_double)
+    test_log, test_double = (0 if family is None else family[0] + 1 for family in (degrees.log, degrees.double))
+    n_integrals = 3 * test_log * n_log + test_double * n_double
+    n_near = LISTED_SHARE_OF_CURVED * n_trial if is_curved else n_trial
+    n_listed = int(n_test * min(n_near, LISTED_PAIRS))
+    n_chunk = n_trial * min(n_test, n_threads * _rows_per_chunk(degrees, n_trial, n_points))
+    # while pairs are listed: what is kept of them, and the sums that serve both orders of two elements, four times
+    listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
+    listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
+    # later: what is kept, and for each pair of a chunk its inner integrals at all points, those of the quotient copied,
+    # and their sums
+    of_pair = n_points * (n_inner + 2 * n_log) + n_integrals
+    sweeping = 8 * (n_listed * n_integrals + n_chunk * of_pair)
+    return max(listing, sweeping)
+
+
+def _rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:
+    """Return how many rows of pairs fit into the cache, where the inner integrals of all points are held at once."""
+    n_rows = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products) // max(1, n_trial)
+    return max(1, 3 * n_rows // max(3, n_points))
 
 
 def _cheapest_level(counts: IntArray, extra_points: int) -> int:

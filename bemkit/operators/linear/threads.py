@@ -18,8 +18,8 @@ Result = TypeVar("Result")
 
 LARGE = 2500
 """Order of a matrix above which several threads factor it faster than one."""
-MANY_PAIRS = 500_000
-"""Element pairs above which several threads assemble faster than one."""
+MANY_INTEGRALS = 300_000
+"""Integrals, of products of polynomials on pairs of elements, above which several threads assemble faster than one."""
 MAX_THREADS = 8
 
 
@@ -139,31 +139,31 @@ def _blas_libraries() -> ThreadpoolController:
     return ThreadpoolController().select(user_api="blas")
 
 
-def for_each_chunk(work: Callable[[slice], Result], chunks: Iterable[slice], *, n_pairs: int) -> list[Result]:
-    """Call a function on every chunk of rows, from several threads if there are many element pairs.
+def for_each_chunk(work: Callable[[slice], Result], chunks: Iterable[slice], *, n_integrals: int) -> list[Result]:
+    """Call a function on every chunk of rows, from several threads if there are many integrals.
 
     Parameters
     ----------
     work : callable
         Takes a slice of rows; array operations release the interpreter, so threads help although this is Python.
     chunks : iterable of slice
-    n_pairs : int
-        Element pairs in all chunks together.
+    n_integrals : int
+        Of one kind in all chunks together: element pairs times products of the polynomials on both elements.
 
     Returns
     -------
     list
         What the function returned, in the order of the chunks.
     """
-    count = n_threads(n_pairs)
+    count = n_threads(n_integrals)
     if count == 1:
         return [work(chunk) for chunk in chunks]
     with ThreadPoolExecutor(count) as pool:
         return list(pool.map(work, chunks))
 
 
-def n_threads(n_pairs: int) -> int:
-    """Return how many threads assemble a number of element pairs."""
+def n_threads(n_integrals: int) -> int:
+    """Return how many threads compute a number of integrals."""
     affinity = getattr(os, "sched_getaffinity", None)
     available = len(affinity(0)) if affinity else os.cpu_count() or 1
-    return 1 if n_pairs < MANY_PAIRS else min(available, MAX_THREADS)
+    return 1 if n_integrals < MANY_INTEGRALS else min(available, MAX_THREADS)

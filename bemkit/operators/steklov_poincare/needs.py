@@ -1,7 +1,7 @@
 """What a Steklov-Poincare map takes, foreseen from sizes alone: items, counts, memory and operations.
 
-Counts are exact. Memory adds up the matrices that are alive at the same time; the buffers of assembly in it, and the
-evaluations of its integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
+Counts are exact. Memory adds up the matrices that are alive at the same time and the buffers of assembly; those of
+collocation, and the evaluations of integrals, were fitted once to runs of the shipped scenes with 50 to 800 elements.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.integrals.sweep import CHUNK_PAIRS
+from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.integrals.sweep import CHUNK_PAIRS, sweep_memory
 from bemkit.operators.linear.choice import krylov_cost
 from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
 from bemkit.operators.linear.threads import n_threads
@@ -162,13 +163,12 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         factorisations=tuple(factorisations),
         right_hand_sides=n_columns,
     )
-    # bytes for each element and at most, of close pairs; for each element kept; for each pair of a chunk
-    close, most, listed, swept = (38e3, 14.5e6, 4e3, 330.0) if degree < 2 else (40e3, 10e6, 18e3, 130.0)
-    n = mesh.whole.n_elements
-    buffers = max(min(close * n, most), swept * _pairs_in_chunks(mesh)) + listed * n
-    memory = int(max(_BYTES * assembled + buffers, _BYTES * largest))
+    degrees, n_sources = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree)), mesh.whole.n_elements
+    threads = n_threads(mesh.n_elements * n_sources * degrees.n_products)
+    buffers = sweep_memory(degrees, mesh.n_elements, n_sources, threads, is_curved=is_curved)
+    memory = max(_BYTES * assembled + buffers, _BYTES * largest)
     straight, curved = ((15.0, 18e3), (20.0, 35e3)) if degree < 2 else ((40.0, 30e3), (100.0, 55e3))
-    evaluations = _evaluations(case, straight, curved)
+    evaluations = _evaluations(case, straight, curved) / threads
     return BodyNeeds(_galerkin_items(case, n_tractions), work, memory, _BYTES * kept, evaluations, flops)
 
 
@@ -231,6 +231,7 @@ def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     system = (u + len(admissible_modes(mesh))) ** 2
     memory = _BYTES * (system + u * r) + int(max(195.0 * _pairs_in_chunks(mesh), _BYTES * 3.0 * u * r))
     evaluations = _evaluations(case, (12.0, 500.0), (15.0, 9500.0)) * n_elements / mesh.n_elements
+    evaluations /= n_threads(mesh.n_elements * mesh.whole.n_elements)
     flops = 2.0 * (2.0 / 3.0 * order**3 + 2.0 * order**2 * r)
     items = _collocation_items(case, order, n_loaded, n_moved, takes_slopes)
     return BodyNeeds(items, work, memory, _BYTES * (system + u * r), evaluations, flops)
@@ -290,4 +291,4 @@ def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[fl
     mesh, share = case.mesh, case.n_curved / case.mesh.n_elements
     far, near = ((1.0 - share) * one + share * other for one, other in zip(straight, curved, strict=True))
     n_sources = mesh.whole.n_elements
-    return mesh.n_elements * (n_sources * far + near) / n_threads(mesh.n_elements * n_sources)
+    return mesh.n_elements * (n_sources * far + near)
