@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.geometry.meshing.layers import has_same_pieces, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import has_same_pieces, is_at_end, layered_partition, refined_partition
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
@@ -76,7 +76,7 @@ class LayeredMeshes:
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
             return Level(level.asked, fresh, 1)
-        rise = self._rise(solution) if has_same_pieces(partition, fresh) else 0
+        rise = self._rise(solution, ~is_at_end(partition)) if has_same_pieces(partition, fresh) else 0
         following = Level(level.asked, fresh, level.number + rise)
         degree, next_degree = (
             each.discretisation.displacement_space(solution.mesh).degree for each in (level.scene, following.scene)
@@ -84,14 +84,21 @@ class LayeredMeshes:
         excess = self._excess(solution, next_degree - degree)
         return replace(following, partition=refined_partition(partition, excess, cuts))
 
-    def _rise(self, solution: Solution) -> int:
-        """Return how many degrees the errors of elements need; none where only the places of change must be met."""
-        error = float(solution.estimated_error or 0.0)
-        if solution.coefficient_errors is not None and (size := solution.contact_traction_size) > 0.0:
-            squared = float(solution.coefficient_errors.traction[solution.contact_elements].sum())
-            error = max(error, np.sqrt(squared) / size)
-        needed = np.log(max(error, self.accuracy**2) / (SAFETY * self.accuracy)) / np.log(GAIN)
-        return int(np.clip(np.ceil(needed), 0, LARGEST_RISE))
+    def _rise(self, solution: Solution, inner: BoolArray) -> int:
+        """Return how many degrees the errors of the inner elements need, one for those at the ends, none for places."""
+        allowed = SAFETY * self.accuracy
+        needed = np.log(max(self._element_error(solution, inner), allowed) / allowed) / np.log(GAIN)
+        is_inexact = self._element_error(solution, np.ones_like(inner)) > allowed
+        return int(np.clip(np.ceil(needed), int(is_inexact), LARGEST_RISE))
+
+    def _element_error(self, solution: Solution, chosen: BoolArray) -> float:
+        """Return the larger one of the relative errors of some elements, in energy and in contact tractions."""
+        errors, size, contact = solution.coefficient_errors, solution.contact_traction_size, solution.contact_elements
+        if errors is None:
+            return float("inf")
+        energy = float(errors.energy[chosen].sum()) / (2.0 * solution.energy)
+        tractions = float(errors.traction[contact[chosen[contact]]].sum()) / size**2 if size > 0.0 else 0.0
+        return float(np.sqrt(max(energy, tractions)))
 
     def _excess(self, solution: Solution, rise: int) -> FloatArray:
         """Return by which factor (n_elements,) the errors at a higher degree would be above what is allowed to each."""

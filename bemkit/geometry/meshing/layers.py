@@ -84,6 +84,17 @@ def has_same_pieces(old: Partition, new: Partition) -> bool:
     return np.array_equal(_owners(old.base, old.division), _owners(new.base, new.division))
 
 
+def is_at_end(partition: Partition) -> BoolArray:
+    """Tell (n_elements,) which elements stand at an end of their piece that is off symmetry lines."""
+    result = np.zeros(len(partition.sides), bool)
+    counts = np.array([len(s) - 1 for s in partition.parameters])
+    at_start, at_end = _singular_ends(partition.division)
+    last = np.cumsum(counts) - 1
+    result[(last + 1 - counts)[at_start]] = True
+    result[last[at_end]] = True
+    return result
+
+
 def _first_layers(n_left: int, n_right: int) -> FloatArray:
     left, right = (0.5 * FACTOR ** np.arange(n, 0, -1.0) for n in (n_left, n_right))
     return np.concatenate([[0.0], left, [0.5], 1.0 - right[::-1], [1.0]])
