@@ -179,7 +179,17 @@ def print_ratios(console: Console, repetitions: int, clock: Clock) -> None:
             if pair is not None:
                 own.append(time_once(lambda p=pair: bk.run(p[0].scene(1)), clock))
     table = Table(title="Example 1 from scratch: rising degrees over adaptive quadratic elements")
-    for column in ("wanted", "accuracy", "reached", "transitions", "degree", "elements", "median [ms]", "ratio", "allowed"):
+    for column in (
+        "wanted",
+        "accuracy",
+        "reached",
+        "transitions",
+        "degree",
+        "elements",
+        "median [ms]",
+        "ratio",
+        "allowed",
+    ):
         table.add_column(column, justify="right")
     for target, pair, own, allowed in zip(wanted, found, times, (None, *RATIOS.values()), strict=True):
         if pair is None or not times[0]:
@@ -203,7 +213,9 @@ def print_ratios(console: Console, repetitions: int, clock: Clock) -> None:
 
 @click.command()
 @click.option("--repetitions", default=7, show_default=True, help="Timed runs of each line.")
-@click.option("--ratios", is_flag=True, help="Rising degrees over quadratic elements on Example 1 instead of the targets.")
+@click.option(
+    "--ratios", is_flag=True, help="Rising degrees over quadratic elements on Example 1 instead of the targets."
+)
 @click.option("--processor-time", is_flag=True, help="Measure processor time, not wall time.")
 def main(repetitions: int, ratios: bool, processor_time: bool) -> None:
     """Measure and print."""

@@ -140,9 +140,7 @@ def layered_line(breaks: Sequence[float], layers: Sequence[int], degree: int, fa
     lengths, ends = np.diff(breaks), [np.array(breaks)]
     for start, length, n_left, n_right in zip(breaks, lengths, layers, layers[1:], strict=False):
         n_spared = int(np.log(length / lengths.max()) / np.log(factor))
-        left, right = (
-            0.5 * length * factor ** np.arange(max(n - n_spared, 0), 0.0, -1.0) for n in (n_left, n_right)
-        )
+        left, right = (0.5 * length * factor ** np.arange(max(n - n_spared, 0), 0.0, -1.0) for n in (n_left, n_right))
         ends += [start + left, [start + 0.5 * length], start + length - right]
     return Line(np.sort(np.concatenate(ends)), degree)
 
