@@ -175,11 +175,14 @@ LAYERED = (
     (4, 4, 2, 0.3),
     (5, 3, 2, 0.17),
     (5, 4, 2, 0.17),
+    (5, 5, 2, 0.25),
     (6, 4, 2, 0.25),
     (6, 5, 2, 0.17),
     (7, 5, 2, 0.25),
+    (7, 6, 2, 0.25),
     (8, 6, 2, 0.25),
     (9, 6, 2, 0.25),
+    (10, 6, 2, 0.25),
 )
 # degree and layers of the meshes that find the transitions; those of a lower degree than the last mesh are used
 LOOKS = ((3, 2, 1, 0.17), (5, 4, 1, 0.17), (7, 5, 1, 0.25))
