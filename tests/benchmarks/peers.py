@@ -1,6 +1,6 @@
 """The paper's examples by finite elements and by bemkit: run times at equal errors, measured in turn in one run.
 
-    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N] [--processor-time]
+    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N] [--code C] [--processor-time]
 
 Every code climbs a ladder of meshes, and for each target of `accuracy.py` the cheapest mesh that meets it is timed
 again, in turn with bemkit's own run for that target. Ratios are to the median of that run. All errors are those of
@@ -38,7 +38,7 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, is_at_end, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import FACTOR, layered_partition, refined_partition
 from bemkit.reference import Answer, Zone, errors_of
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -87,13 +87,14 @@ def bemkit(example: int, scene: bk.Scene, clock: Clock) -> Outcome:
 
 
 def bemkit_told(example: int, degree: int, n_layers: int, clock: Clock) -> Outcome:
-    """Run bemkit on one mesh in layers, so many more than it begins with, towards the places of the reference."""
+    """Run bemkit on one mesh in layers, with so many more than it begins with towards the places of the reference."""
     scene, places = paper(example, bk.Galerkin(degree=degree)), [x / WIDTH[example] for x in places_of(example)]
     begin = clock()
     outline = scene.shape.outline()
     cuts = {outline.side_names.index("bottom"): places}
     partition = layered_partition(divide(outline, scene.selections), cuts)
-    excess = np.where(is_at_end(partition), FACTOR ** (0.5 - n_layers), 0.0)
+    is_beside = np.isin(partition.spans, places).any(axis=1) & (partition.sides == outline.side_names.index("bottom"))
+    excess = np.where(is_beside, FACTOR ** (0.5 - n_layers), 0.0)
     solution = bk.run(scene, mesh=refined_partition(partition, excess, cuts).mesh)
     seconds = clock() - begin
     return Outcome(measured_errors(solution, example) | NOT_FOUND, seconds)
@@ -187,7 +188,7 @@ LAYERED = (
 # degree and layers of the meshes that find the transitions; those of a lower degree than the last mesh are used
 LOOKS = ((3, 2, 1, 0.17), (5, 4, 1, 0.17), (7, 5, 1, 0.25))
 FIRST_LOOK = (3, 12, 8, 2.5)
-# degree, layers beyond those that `layered_partition` begins with
+# degree, layers at transitions beyond those that `layered_partition` begins with
 TOLD = ((2, 0), (3, 0), (4, 0), (4, 1), (5, 1), (6, 1), (6, 2), (7, 2), (8, 2), (8, 3), (9, 3), (10, 3))
 GETFEM_UNIFORM = (20, 40, 80)
 GETFEM_SLOW = (160, 320)
@@ -337,14 +338,23 @@ def _from_scratch(example: int, choice: Choice, clock: Clock) -> Setting:
 @click.option("--without-getfem", is_flag=True, help="Leave GetFEM out even if it is installed.")
 @click.option("--repetitions", default=7, show_default=True, help="Runs of each setting beyond the first.")
 @click.option("--example", type=click.IntRange(1, 2), multiple=True, default=(1, 2), show_default=True)
+@click.option("--code", multiple=True, help="Compare bemkit with this code alone, such as 'bemkit, told'; repeatable.")
 @click.option("--processor-time", is_flag=True, help="Measure processor time, not wall time.")
-def main(slow: bool, without_getfem: bool, repetitions: int, example: tuple[int, ...], processor_time: bool) -> None:
+def main(
+    slow: bool,
+    without_getfem: bool,
+    repetitions: int,
+    example: tuple[int, ...],
+    code: tuple[str, ...],
+    processor_time: bool,
+) -> None:
     """Compare finite elements with bemkit at equal errors."""
     clock = time.process_time if processor_time else time.perf_counter
     console = Console(width=140)
     with_getfem = not without_getfem and has_getfem()
     for number in example:
-        climbed = {name: climb(settings) for name, settings in ladders(number, with_getfem, slow, clock).items()}
+        settings_by_name = ladders(number, with_getfem, slow, clock)
+        climbed = {name: climb(settings_by_name[name]) for name in code or settings_by_name}
         for name, outcomes in climbed.items():
             for setting, got in outcomes:
                 errors = "  ".join(f"{key} {value:.1e}" for key, value in got.errors.items())
