@@ -1,6 +1,6 @@
 """The paper's examples by finite elements and by bemkit: run times at equal errors, measured in turn in one run.
 
-    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N] [--code C] [--processor-time]
+    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N] [--code C] [...]
 
 Every code climbs a ladder of meshes, and for each target of `accuracy.py` the cheapest mesh that meets it is timed
 again, in turn with bemkit's own run for that target. Ratios are to the median of that run. All errors are those of
@@ -93,8 +93,9 @@ def bemkit_told(example: int, degree: int, n_layers: int, clock: Clock) -> Outco
     outline = scene.shape.outline()
     cuts = {outline.side_names.index("bottom"): places}
     partition = layered_partition(divide(outline, scene.selections), cuts)
-    is_beside = np.isin(partition.spans, places).any(axis=1) & (partition.sides == outline.side_names.index("bottom"))
-    excess = np.where(is_beside, FACTOR ** (0.5 - n_layers), 0.0)
+    is_beside = np.isclose(partition.spans[:, :, None], places, atol=0.0).any(axis=(1, 2))
+    on_bottom = partition.sides == outline.side_names.index("bottom")
+    excess = np.where(is_beside & on_bottom, FACTOR ** (0.5 - n_layers), 0.0)
     solution = bk.run(scene, mesh=refined_partition(partition, excess, cuts).mesh)
     seconds = clock() - begin
     return Outcome(measured_errors(solution, example) | NOT_FOUND, seconds)
