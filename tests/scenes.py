@@ -37,8 +37,7 @@ def paper(example: int, discretisation: Any = None, mesh: bk.MeshOptions | None 
     """One of the paper's examples."""
     scene = bk.load_scene(f"paper-{example}")
     discretisation = bk.QuadraticGalerkin() if discretisation is None else discretisation
-    scene = dataclasses.replace(scene, discretisation=discretisation)
-    return dataclasses.replace(scene, mesh=scene.mesh if mesh is None else mesh)
+    return dataclasses.replace(scene, discretisation=discretisation, mesh=scene.mesh if mesh is None else mesh)
 
 
 def wavy() -> bk.Scene:

@@ -124,6 +124,27 @@ def graded_line(breaks: Sequence[float], n_elements: int, degree: int, exponent:
     return Line(np.concatenate(ends), degree)
 
 
+def layered_line(breaks: Sequence[float], layers: Sequence[int], degree: int, factor: float = 0.17) -> Line:
+    """Return a line whose pieces between breaks are cut in their middles and in geometric layers towards their ends.
+
+    Parameters
+    ----------
+    breaks : sequence of float [m]
+        From end to end.
+    layers : sequence of int
+        Layers on either side of each break; on a short piece fewer, so that they are as fine as those of the longest.
+    degree : int
+    factor : float
+        Length of a layer over that of the next one.
+    """
+    lengths, ends = np.diff(breaks), [np.array(breaks)]
+    for start, length, n_left, n_right in zip(breaks, lengths, layers, layers[1:], strict=False):
+        n_spared = int(np.log(length / lengths.max()) / np.log(factor))
+        left, right = (0.5 * length * factor ** np.arange(max(n - n_spared, 0), 0.0, -1.0) for n in (n_left, n_right))
+        ends += [start + left, [start + 0.5 * length], start + length - right]
+    return Line(np.sort(np.concatenate(ends)), degree)
+
+
 @lru_cache
 def _lobatto(degree: int) -> tuple[FloatArray, FloatArray]:
     """Return the Gauss-Lobatto points and weights on [-1, 1]."""

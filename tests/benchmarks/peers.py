@@ -1,18 +1,22 @@
 """The paper's examples by finite elements and by bemkit: run times at equal errors, measured in turn in one run.
 
-    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N]
+    python tests/benchmarks/peers.py [--slow] [--without-getfem] [--repetitions N] [--example N] [--code C] [...]
 
 Every code climbs a ladder of meshes, and for each target of `accuracy.py` the cheapest mesh that meets it is timed
-again, in turn with bemkit's own run for that target. Ratios are to the median of that run.
+again, in turn with bemkit's own run for that target. Ratios are to the median of that run. All errors are those of
+`bemkit.reference.errors_of`, at places that are dense where the contact status changes. On a busy machine take
+`--processor-time` and one core (`taskset -c 0`): wall times then say more about the neighbours.
 
 * uniform: square cells with quadratic elements (`fem.py`, PARDISO if `pypardiso` is installed).
-* graded, told: any degree, graded towards corners, jumps of the load and the transition points of the reference.
-* graded, finding: the same, but the transition points are found on two coarser meshes first.
+* graded, told: any degree, graded towards corners, jumps of the load and the transition points of the reference, by
+  powers of the distance or in geometric layers.
+* graded, finding: the same, but the transition points are found on two to four coarser meshes first.
 * GetFEM uniform and told: see `getfem_peer.py`; `--slow` adds its meshes of 160 and 320 cells, some five minutes.
-* bemkit: adaptive from scratch, with the accuracy as its only input; degree and number of elements are its own.
-* bemkit, told: one mesh of a given size, graded towards the transition points of the reference.
+* bemkit: adaptive from scratch, by an accuracy; degrees and numbers of elements are its own.
+* bemkit, told: one mesh of a given degree, in layers towards the transition points of the reference.
 
-The ladders are chosen with the reference at hand: only bemkit's own run estimates its error.
+The ladders, and the accuracies that bemkit is asked for, are chosen with the reference at hand: only bemkit's own run
+estimates its error.
 """
 
 from __future__ import annotations
@@ -33,22 +37,24 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.geometry.meshing.partition import better_partition
+from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.meshing.layers import FACTOR, layered_partition, refined_partition
+from bemkit.reference import Answer, Zone, errors_of
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
-from tests.benchmarks.accuracy import FIELDS, TARGETS, Target, errors_of, measured_errors
-from tests.benchmarks.fem import FiniteElementSolution, Line, graded_line, solve_scene, uniform_line
-from tests.scenes import paper, reference_table, reference_values
+from tests.benchmarks.accuracy import TARGETS, Choice, Clock, Target, degree_of, measured_errors, reference_of
+from tests.benchmarks.fem import FiniteElementSolution, Line, graded_line, layered_line, solve_scene, uniform_line
+from tests.scenes import paper
 
 GETFEM_PYTHON = "/usr/bin/python3"
 """Debian's `python3-getfem` is for Debian's interpreter."""
-SECONDS = 4.0
+SECONDS = 2.0
 """Time that the repetitions of one setting may take; the first two runs aside."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: its errors by name, and its wall time [s]."""
+    """One run: its errors by name, and its seconds."""
 
     errors: dict[str, float]
     seconds: float
@@ -62,50 +68,76 @@ class Setting:
     solve: Callable[[], Outcome]
 
 
-def bemkit(example: int, scene: bk.Scene, mesh: bk.BoundaryMesh | None = None) -> Outcome:
-    """Run bemkit, on the given mesh or from scratch."""
-    begin = time.perf_counter()
-    solution = bk.run(scene, mesh=mesh)
-    seconds = time.perf_counter() - begin
+FIELDS = ("u_n", "u_t", "sigma_n", "sigma_t")
+NOT_FOUND = {"transitions": float("inf")}
+"""The error of transition points that were told."""
+
+
+def places_of(example: int) -> list[float]:
+    """Return the transition points of the reference [m]."""
+    return [zone.s for zone in reference_of(example).answer.zones]
+
+
+def bemkit(example: int, scene: bk.Scene, clock: Clock) -> Outcome:
+    """Run bemkit from scratch."""
+    begin = clock()
+    solution = bk.run(scene)
+    seconds = clock() - begin
     return Outcome(measured_errors(solution, example), seconds)
 
 
-def bemkit_told(example: int, n_elements: int) -> Outcome:
-    """Run bemkit on one mesh that is graded towards the transition points of the reference."""
-    scene = paper(example, mesh=bk.MeshOptions(accuracy=0.5))  # the accuracy only says what kind of mesh is made first
-    begin = time.perf_counter()
-    outline, contact = scene.shape.outline(), [part.name for part in scene.contact_parts]
-    first = scene.mesh.first_partition(outline, scene.selections, contact)
-    places = [x / WIDTH[example] for x in reference_values(example)[1]]
+def bemkit_told(example: int, degree: int, n_layers: int, clock: Clock) -> Outcome:
+    """Run bemkit on one mesh in layers, with so many more than it begins with towards the places of the reference."""
+    scene, places = paper(example, bk.Galerkin(degree=degree)), [x / WIDTH[example] for x in places_of(example)]
+    begin = clock()
+    outline = scene.shape.outline()
     cuts = {outline.side_names.index("bottom"): places}
-    density = np.ones(len(first.sides))
-    mesh = better_partition(first, density, n_elements, cuts=cuts, spread_over=contact).mesh
-    solution = bk.run(scene, mesh=mesh)
-    seconds = time.perf_counter() - begin
-    return Outcome(measured_errors(solution, example) | {"transitions": float("inf")}, seconds)
+    partition = layered_partition(divide(outline, scene.selections), cuts)
+    is_beside = np.isclose(partition.spans[:, :, None], places, atol=0.0).any(axis=(1, 2))
+    on_bottom = partition.sides == outline.side_names.index("bottom")
+    excess = np.where(is_beside & on_bottom, FACTOR ** (0.5 - n_layers), 0.0)
+    solution = bk.run(scene, mesh=refined_partition(partition, excess, cuts).mesh)
+    seconds = clock() - begin
+    return Outcome(measured_errors(solution, example) | NOT_FOUND, seconds)
 
 
-def finite_elements(example: int, solve: Callable[[bk.Scene], FiniteElementSolution], is_told: bool = False) -> Outcome:
+def finite_elements(
+    example: int, solve: Callable[[bk.Scene], FiniteElementSolution], clock: Clock, is_told: bool = False
+) -> Outcome:
     """Run our own finite elements; transitions that were told do not count as found."""
-    scene = paper(example)
-    begin = time.perf_counter()
+    scene, reference = paper(example), reference_of(example)
+    begin = clock()
     solution = solve(scene)
-    seconds = time.perf_counter() - begin
-    x = reference_table(example)["x"]
-    fields = {name: solution.line.evaluated(getattr(solution.contact, name), x) for name in FIELDS}
-    places = [] if is_told else [transition.x for transition in solution.transitions]
-    return Outcome(errors_of(example, fields, solution.force_tangential, solution.energy, places), seconds)
+    seconds = clock() - begin
+    table, x = solution.contact, reference.places[0].s
+    fields = {name: solution.line.evaluated(getattr(table, name), x) for name in FIELDS}
+    answer = Answer(
+        **fields,
+        energy=solution.energy,
+        force_normal=float(table.weight @ table.sigma_n),
+        force_tangential=solution.force_tangential,
+        zones=tuple(Zone(t.part, t.s, t.from_status, t.to_status) for t in solution.transitions),
+    )
+    return Outcome(errors_of(answer, reference) | (NOT_FOUND if is_told else {}), seconds)
 
 
-def getfem(example: int, x: Line, y: Line) -> Outcome:
+def getfem(example: int, x: Line, y: Line, clock: Clock) -> Outcome:
     """Run GetFEM in a process of its own; its first run is as fast as any other."""
-    points = reference_table(example)["x"].tolist()
-    request = {"example": example, "x": x.ends.tolist(), "y": y.ends.tolist(), "points": points, "repetitions": 1}
+    reference = reference_of(example)
+    request = {
+        "example": example,
+        "degree": x.degree,
+        "x": x.ends.tolist(),
+        "y": y.ends.tolist(),
+        "points": reference.places[0].s.tolist(),
+        "clock": clock.__name__,
+    }
     command = [GETFEM_PYTHON, str(Path(__file__).with_name("getfem_peer.py"))]
     answered = subprocess.run(command, input=json.dumps(request), capture_output=True, text=True, check=True)
-    answer = json.loads(answered.stdout.splitlines()[-1])
-    fields = {name: np.array(answer[name]) for name in FIELDS}
-    return Outcome(errors_of(example, fields, answer["force"], answer["energy"], []), answer["times"][-1])
+    found = json.loads(answered.stdout.splitlines()[-1])
+    fields = {name: np.array(found[name]) for name in FIELDS}
+    answer = Answer(**fields, energy=found["energy"], force_normal=np.nan, force_tangential=found["force"], zones=())
+    return Outcome(errors_of(answer, reference), found["seconds"])
 
 
 def has_getfem() -> bool:
@@ -136,12 +168,33 @@ GRADED = (
     (4, 24, 16, 3.5),
     (4, 32, 20, 3.5),
     (5, 24, 16, 3.5),
-    (6, 24, 16, 4.0),
 )
+# degree, layers at transitions, layers at corners and jumps, factor from layer to layer
+LAYERED = (
+    (3, 2, 1, 0.17),
+    (3, 3, 1, 0.3),
+    (4, 3, 1, 0.17),
+    (4, 4, 2, 0.3),
+    (5, 3, 2, 0.17),
+    (5, 4, 2, 0.17),
+    (5, 5, 2, 0.25),
+    (6, 4, 2, 0.25),
+    (6, 5, 2, 0.17),
+    (7, 5, 2, 0.25),
+    (7, 6, 2, 0.25),
+    (8, 6, 2, 0.25),
+    (9, 6, 2, 0.25),
+    (10, 6, 2, 0.25),
+)
+# degree and layers of the meshes that find the transitions; those of a lower degree than the last mesh are used
+LOOKS = ((3, 2, 1, 0.17), (5, 4, 1, 0.17), (7, 5, 1, 0.25))
+FIRST_LOOK = (3, 12, 8, 2.5)
+# degree, layers at transitions beyond those that `layered_partition` begins with
+TOLD = ((2, 0), (3, 0), (4, 0), (4, 1), (5, 1), (6, 1), (6, 2), (7, 2), (8, 2), (8, 3), (9, 3), (10, 3))
 GETFEM_UNIFORM = (20, 40, 80)
 GETFEM_SLOW = (160, 320)
-TOLD = (40, 48, 56, 64, 80, 100, 130, 180, 260, 360)
 GETFEM_GRADED = ((16, 10), (24, 14), (32, 20), (40, 26), (48, 32), (64, 32))
+GETFEM_LAYERED = ((3, 3, 1, 0.3), (3, 4, 2, 0.3), (4, 4, 2, 0.3))  # degree 5 and steeper layers: errors of 10 per cent
 
 
 def uniform_lines(example: int, n_cells: int) -> tuple[Line, Line]:
@@ -158,7 +211,23 @@ def graded_lines(
     return graded_line(breaks, n_x, degree, exponent), graded_line([0.0, *jumps_y, 1.0], n_y, degree, exponent)
 
 
-def follow(scene: bk.Scene, example: int, degree: int, n_x: int, n_y: int, exponent: float) -> FiniteElementSolution:
+def layered_lines(
+    example: int, transitions: Sequence[float], degree: int, n_layers: int, n_others: int, factor: float
+) -> tuple[Line, Line]:
+    """Return lines in layers towards transitions (`n_layers`), and towards corners and jumps (`n_others`)."""
+    jumps_x, jumps_y = JUMPS[example]
+    layers_x = dict.fromkeys((0.0, *jumps_x), n_others) | dict.fromkeys(transitions, n_layers) | {WIDTH[example]: 0}
+    layers_y = {0.0: n_layers, 0.5: n_others if jumps_y else 0, 1.0: n_others}
+    x, y = (dict(sorted(layers.items())) for layers in (layers_x, layers_y))
+    return (
+        layered_line(list(x), list(x.values()), degree, factor),
+        layered_line(list(y), list(y.values()), degree, factor),
+    )
+
+
+def follow_graded(
+    scene: bk.Scene, example: int, degree: int, n_x: int, n_y: int, exponent: float
+) -> FiniteElementSolution:
     """Find the transitions on two coarser meshes before the last one is graded towards them."""
     places: list[float] = []
     for share in (0.4, 0.6, 1.0):
@@ -168,31 +237,45 @@ def follow(scene: bk.Scene, example: int, degree: int, n_x: int, n_y: int, expon
     return solution
 
 
-def ladders(example: int, with_getfem: bool, with_slow: bool) -> dict[str, list[Setting]]:
+def follow_layered(scene: bk.Scene, example: int, *last: float) -> FiniteElementSolution:
+    """Find the transitions on coarser meshes of lower degrees before the last one has layers towards them."""
+    solution = solve_scene(scene, *graded_lines(example, (), *FIRST_LOOK))
+    for look in (*(look for look in LOOKS if look[0] < last[0]), last):
+        places = [transition.x for transition in solution.transitions]
+        solution = solve_scene(scene, *layered_lines(example, places, *look))
+    return solution
+
+
+def ladders(example: int, with_getfem: bool, with_slow: bool, clock: Clock) -> dict[str, list[Setting]]:
     """Return the settings of all peers by name."""
-    places = reference_values(example)[1]
+    places = places_of(example)
     result: dict[str, list[Setting]] = {"uniform": [], "graded, told": [], "graded, finding": []}
+
+    def add(name: str, words: str, solve: Callable[[bk.Scene], FiniteElementSolution], is_told: bool = False) -> None:
+        result[name].append(Setting(words, partial(finite_elements, example, solve, clock, is_told)))
+
     for n_cells in UNIFORM + (UNIFORM_SLOW if with_slow else ()):
         x, y = uniform_lines(example, n_cells)
-        solve = partial(solve_scene, x=x, y=y)
-        result["uniform"].append(Setting(f"Q2, {n_cells} cells", partial(finite_elements, example, solve)))
-    for degree, n_x, n_y, exponent in GRADED:
-        words = f"Q{degree}, {n_x} x {n_y}"
-        x, y = graded_lines(example, places, degree, n_x, n_y, exponent)
-        solve = partial(solve_scene, x=x, y=y)
-        result["graded, told"].append(Setting(words, partial(finite_elements, example, solve, is_told=True)))
-        search = partial(follow, example=example, degree=degree, n_x=n_x, n_y=n_y, exponent=exponent)
-        result["graded, finding"].append(Setting(words, partial(finite_elements, example, search)))
-    result["bemkit, told"] = [Setting(f"degree 2, {n}", partial(bemkit_told, example, n)) for n in TOLD]
+        add("uniform", f"Q2, {n_cells} cells", partial(solve_scene, x=x, y=y))
+    for grades, lines_of, follow in ((GRADED, graded_lines, follow_graded), (LAYERED, layered_lines, follow_layered)):
+        for grade in grades:
+            x, y = lines_of(example, places, *grade)
+            words = f"Q{x.degree}, {x.half.size} x {y.half.size}, {grade[-1]}"
+            add("graded, told", words, partial(solve_scene, x=x, y=y), is_told=True)
+            add("graded, finding", words, lambda scene, follow=follow, grade=grade: follow(scene, example, *grade))
+    result["bemkit, told"] = [
+        Setting(f"degree {degree}, {n} layers more", partial(bemkit_told, example, degree, n, clock))
+        for degree, n in TOLD
+    ]
     if with_getfem:
-        result["GetFEM uniform"] = [
-            Setting(f"Q2, {n} cells", partial(getfem, example, *uniform_lines(example, n)))
-            for n in GETFEM_UNIFORM + (GETFEM_SLOW if with_slow else ())
-        ]
-        result["GetFEM told"] = [
-            Setting(f"Q2, {n_x} x {n_y}", partial(getfem, example, *graded_lines(example, places, 2, n_x, n_y, 2.5)))
-            for n_x, n_y in GETFEM_GRADED
-        ]
+        uniform = [uniform_lines(example, n) for n in GETFEM_UNIFORM + (GETFEM_SLOW if with_slow else ())]
+        told = [graded_lines(example, places, 2, n_x, n_y, 2.5) for n_x, n_y in GETFEM_GRADED]
+        told += [layered_lines(example, places, *grade) for grade in GETFEM_LAYERED]
+        for name, meshes in (("GetFEM uniform", uniform), ("GetFEM told", told)):
+            result[name] = [
+                Setting(f"Q{x.degree}, {x.half.size} x {y.half.size}", partial(getfem, example, x, y, clock))
+                for x, y in meshes
+            ]
     return result
 
 
@@ -215,33 +298,40 @@ def in_turn(chosen: dict[str, tuple[Setting, Outcome]], repetitions: int) -> dic
     return {name: statistics.median(values) for name, values in times.items()}
 
 
-def compare(example: int, climbed: dict[str, list[tuple[Setting, Outcome]]], repetitions: int, table: Table) -> None:
-    """Add a row for every target and every peer."""
-    for errors in {tuple(target.errors.items()): None for target in TARGETS}:
-        own = [target for target in TARGETS if tuple(target.errors.items()) == errors]
-        runs = {**climbed, "bemkit": climb([_from_scratch(example, target) for target in own])}
-        met = {
-            name: next(((setting, got) for setting, got in outcomes if own[0].is_met_by(got.errors)), None)
-            for name, outcomes in runs.items()
-        }
-        medians = in_turn({name: pair for name, pair in met.items() if pair is not None}, repetitions)
-        for name, pair in met.items():
-            if pair is None:
-                table.add_row(f"paper-{example}", own[0].words, name, "none of its meshes", "", "", "")
-                continue
-            setting, outcome = pair
-            reached = ", ".join(f"{outcome.errors[key]:.1e}" for key in own[0].errors)
-            ratio = f"{medians[name] / medians['bemkit']:.2g}" if "bemkit" in medians else ""
-            milliseconds = f"{1e3 * medians[name]:.0f}"
-            table.add_row(f"paper-{example}", own[0].words, name, setting.words, reached, milliseconds, ratio)
-        table.add_section()
+def compare(
+    example: int,
+    target: Target,
+    climbed: dict[str, list[tuple[Setting, Outcome]]],
+    repetitions: int,
+    clock: Clock,
+) -> Table:
+    """Return a table with a row for every peer."""
+    columns = ("code", "mesh", "reached", "median [ms]", "ratio")
+    table = Table(title=f"paper-{example}: {target.words}", title_justify="left")
+    for column in columns:
+        table.add_column(column, justify="left" if column in ("code", "mesh") else "right")
+    runs = {**climbed, "bemkit": climb([_from_scratch(example, choice, clock) for choice in target.choices])}
+    met = {
+        name: next(((setting, got) for setting, got in outcomes if target.is_met_by(got.errors)), None)
+        for name, outcomes in runs.items()
+    }
+    medians = in_turn({name: pair for name, pair in met.items() if pair is not None}, repetitions)
+    for name, pair in met.items():
+        if pair is None:
+            table.add_row(name, "none of its meshes", "", "", "")
+            continue
+        setting, outcome = pair
+        reached = ", ".join(f"{outcome.errors[key]:.1e}" for key in target.errors)
+        ratio = f"{medians[name] / medians['bemkit']:.2g}" if "bemkit" in medians else ""
+        table.add_row(name, setting.words, reached, f"{1e3 * medians[name]:.0f}", ratio)
+    return table
 
 
-def _from_scratch(example: int, target: Target) -> Setting:
-    scene = paper(example, target.discretisation, target.mesh)
-    mesh = bk.run(scene).mesh
-    words = f"degree {target.discretisation.displacement_space(mesh).degree}, {mesh.n_elements}"
-    return Setting(words, partial(bemkit, example, scene))
+def _from_scratch(example: int, choice: Choice, clock: Clock) -> Setting:
+    scene = choice.scene(example)
+    solution = bk.run(scene)
+    words = f"degree {degree_of(solution)}, {solution.mesh.n_elements}"
+    return Setting(words, partial(bemkit, example, scene, clock))
 
 
 @click.command()
@@ -249,23 +339,31 @@ def _from_scratch(example: int, target: Target) -> Setting:
 @click.option("--without-getfem", is_flag=True, help="Leave GetFEM out even if it is installed.")
 @click.option("--repetitions", default=7, show_default=True, help="Runs of each setting beyond the first.")
 @click.option("--example", type=click.IntRange(1, 2), multiple=True, default=(1, 2), show_default=True)
-def main(slow: bool, without_getfem: bool, repetitions: int, example: tuple[int, ...]) -> None:
+@click.option("--code", multiple=True, help="Compare bemkit with this code alone, such as 'bemkit, told'; repeatable.")
+@click.option("--processor-time", is_flag=True, help="Measure processor time, not wall time.")
+def main(
+    slow: bool,
+    without_getfem: bool,
+    repetitions: int,
+    example: tuple[int, ...],
+    code: tuple[str, ...],
+    processor_time: bool,
+) -> None:
     """Compare finite elements with bemkit at equal errors."""
+    clock = time.process_time if processor_time else time.perf_counter
     console = Console(width=140)
-    table = Table(title="Finite elements against bemkit: medians, and ratios to bemkit's run from scratch")
-    for column in ("example", "wanted", "code", "mesh", "reached", "median [ms]", "ratio"):
-        table.add_column(column, justify="right" if column in ("reached", "median [ms]", "ratio") else "left")
     with_getfem = not without_getfem and has_getfem()
     for number in example:
-        climbed = {name: climb(settings) for name, settings in ladders(number, with_getfem, slow).items()}
+        settings_by_name = ladders(number, with_getfem, slow, clock)
+        climbed = {name: climb(settings_by_name[name]) for name in code or settings_by_name}
         for name, outcomes in climbed.items():
             for setting, got in outcomes:
                 errors = "  ".join(f"{key} {value:.1e}" for key, value in got.errors.items())
                 console.print(
                     f"paper-{number}  {name}  {setting.words}  {1e3 * got.seconds:.0f} ms  {errors}", style="dim"
                 )
-        compare(number, climbed, repetitions, table)
-    console.print(table)
+        for target in TARGETS:
+            console.print(compare(number, target, climbed, repetitions, clock))
     if not with_getfem and not without_getfem:
         console.print(f"GetFEM was left out: {GETFEM_PYTHON} cannot import it (Debian: python3-getfem).")
 

@@ -41,3 +41,21 @@ def test_graded_elements_reach_the_reference(example: int, library: str) -> None
     assert solution.force_tangential == pytest.approx(values["Ft"], rel=8e-5)
     assert solution.energy == pytest.approx(values["energy"], rel=2e-5)
     assert [transition.x for transition in solution.transitions] == pytest.approx(places, abs=1e-3)
+
+
+def test_layers_shrink_towards_breaks_and_short_pieces_spare_some() -> None:
+    line = fem.layered_line([0.0, 1.0, 1.1], [2, 2, 0], degree=3, factor=0.2)
+    np.testing.assert_allclose(line.ends, [0.0, 0.02, 0.1, 0.5, 0.9, 0.98, 1.0, 1.01, 1.05, 1.1])
+
+
+@pytest.mark.parametrize("example", [1, 2])
+def test_layered_elements_reach_the_reference(example: int, library: str) -> None:
+    values, places = reference_values(example)
+    breaks = sorted({0.0, *places, *([0.5, 1.0] if example == 1 else [0.5])})
+    x = fem.layered_line(breaks, [1, 3, 3, *([1] if example == 1 else []), 0], 5, 0.25)
+    y = fem.layered_line([0.0, 0.5, 1.0], [3, 1, 1], 5, 0.25)
+    solution = fem.solve_scene(paper(example), x, y)
+    # twice what this mesh was seen to leave
+    assert solution.force_tangential == pytest.approx(values["Ft"], rel=2e-6)
+    assert solution.energy == pytest.approx(values["energy"], rel=1e-5)
+    assert [transition.x for transition in solution.transitions] == pytest.approx(places, abs=2e-5)
