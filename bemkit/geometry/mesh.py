@@ -102,9 +102,8 @@ class BoundaryMesh:
             _ = self.whole  # checks its loops
 
     def __repr__(self) -> str:
-        """Return one line."""
-        parts = ", ".join(f"{name} ({elements.size})" for name, elements in self.parts.items())
-        return f"BoundaryMesh({self.n_elements} elements{'; ' if parts else ''}{parts})"
+        parts = [f"{name} ({elements.size})" for name, elements in self.parts.items()]
+        return f"BoundaryMesh({', '.join([f'{self.n_elements} elements', *parts])})"
 
     def _keep(self, name: str, array: FloatArray | IntArray) -> None:
         read_only(array)

@@ -12,7 +12,7 @@ def test_results_show_themselves_in_a_line() -> None:
     solution = bk.run(dataclasses.replace(bk.load_scene("paper-1"), mesh=mesh))
     shown = "Solution('Square on a rigid foundation, paper Example 1': converged, 40 elements, 10 contact nodes)"
     assert repr(solution) == shown
-    assert repr(solution.mesh) == "BoundaryMesh(40 elements; foundation (10), wall (10), top-load (5), left-load (5))"
+    assert repr(solution.mesh) == "BoundaryMesh(40 elements, foundation (10), wall (10), top-load (5), left-load (5))"
     assert repr(solution.boundary) == "BoundaryFields(40 points, 40 elements)"
     counts = {word: solution.contact.status_words().count(word) for word in ("separated", "slip", "stick")}
     assert repr(solution.contact) == f"ContactTable(10 nodes: {', '.join(f'{n} {w}' for w, n in counts.items())})"
