@@ -118,8 +118,7 @@ class BoundaryMesh:
     def whole(self) -> "BoundaryMesh":
         """The mesh of the whole body: itself, or with the images that a symmetry adds.
 
-        Element e of image g (see `Symmetry.images`) has the number g * n_elements + e; the first nodes are those of
-        this mesh.
+        Element e of image g (see `Symmetry.images`) has the number g * n_elements + e; nodes of this mesh come first.
         """
         # a mesh that held itself would have to wait for the garbage collector
         return self if self.symmetry is None else self._unfolded

@@ -211,7 +211,7 @@ def trusted_stress(solution: Solution) -> float:
     tractions beyond 1e-10 of those by which the displacement would strain the whole body.
     """
     material, diameter = solution.scene.material, solution.mesh.diameter
-    freedom = 1.0 if material.is_incompressible else 1.0 - 2.0 * material.effective_poisson_ratio
+    freedom = 1.0 if material.is_incompressible else min(1.0, 1.0 - 2.0 * material.effective_poisson_ratio)
     lengths = solution.contact.weight if solution.contact.n_contact else solution.mesh.lengths
     digits = 64.0 * EPSILON * diameter / (float(lengths.min()) * freedom)
     strain = float(np.abs(solution.boundary.displacement).max()) / diameter
