@@ -194,7 +194,7 @@ TOLD = ((2, 0), (3, 0), (4, 0), (4, 1), (5, 1), (6, 1), (6, 2), (7, 2), (8, 2), 
 GETFEM_UNIFORM = (20, 40, 80)
 GETFEM_SLOW = (160, 320)
 GETFEM_GRADED = ((16, 10), (24, 14), (32, 20), (40, 26), (48, 32), (64, 32))
-GETFEM_LAYERED = ((3, 3, 1, 0.3), (3, 4, 2, 0.3), (4, 4, 2, 0.3))  # degree 5 and steeper layers: errors of 10 per cent
+GETFEM_LAYERED = ((3, 3, 1, 0.3), (3, 4, 2, 0.3), (4, 4, 2, 0.3))  # steeper layers do worse
 
 
 def uniform_lines(example: int, n_cells: int) -> tuple[Line, Line]:
