@@ -21,8 +21,10 @@ from rich.console import Console
 from rich.table import Table
 
 import bemkit as bk
-from bemkit.geometry.meshing.partition import Partition, better_partition
-from bemkit.runs import adaptive
+from bemkit.geometry.meshing.partition import Partition
+from bemkit.runs import mesh_sequence
+from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.density import DensityMeshes
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks.accuracy import measured_errors
@@ -79,20 +81,17 @@ def kept_share(old: Partition, new: Partition) -> float:
 
 def nested_levels(scene: bk.Scene) -> list[Level]:
     """Solve a scene as `run_adaptive` does, by its own rules, on nested meshes."""
-    accuracy = scene.mesh.accuracy
+    meshes = DensityMeshes(scene.mesh.accuracy)
     contact = [part.name for part in scene.contact_parts]
     partition = scene.mesh.first_partition(scene.shape.outline(), scene.selections, contact)
     levels = [Level(bk.run(scene, mesh=partition.mesh), 0.0)]
     while True:
         solution = levels[-1].solution
-        n_accurate = sum(level.solution.estimated_error <= accuracy for level in levels)
-        resolved = adaptive._resolves_transitions(solution, accuracy)
-        if (n_accurate and resolved) or n_accurate > adaptive.MOST_FOR_TRANSITIONS:
+        solutions = [level.solution for level in levels]
+        if meshes.is_enough(solutions):
             return levels
-        cuts = adaptive._cuts(partition, solution)
-        density, size = adaptive._target_density(solution), adaptive._next_size(solution, accuracy)
-        wanted = better_partition(partition, density, size, cuts=cuts, spread_over=contact)
-        new = nested_partition(partition, wanted, cuts)
+        wanted = meshes.following(mesh_sequence.Level(scene, partition), solutions).partition
+        new = nested_partition(partition, wanted, mesh_sequence.zone_cuts(partition, solution))
         levels.append(Level(bk.run(scene, mesh=new.mesh, start=solution), kept_share(partition, new)))
         partition = new
 
@@ -102,7 +101,7 @@ def add_rows(table: Table, example: int, accuracy: float, repetitions: int) -> N
     scene = paper(example, mesh=bk.MeshOptions(accuracy=accuracy))
     anew_times, nested_times, spared, assembly = [], [], [], []
     for _ in range(repetitions):
-        anew = adaptive.run_adaptive(scene)
+        anew = run_adaptive(scene)
         anew_times.append(anew[-1].timings["total"])
         levels = nested_levels(scene)
         nested_times.append(sum(level.solution.timings["total"] for level in levels))
