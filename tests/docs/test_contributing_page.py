@@ -40,7 +40,9 @@ def test_data_takes_nine_forms_in_this_order() -> None:
 
 
 def test_every_kind_of_addition_has_its_row() -> None:
-    names = "law, driver, space, discretisation, obstacle, operator, body, sequence of meshes, scene word, picture, study"
+    names = (
+        "law, driver, space, discretisation, obstacle, operator, body, sequence of meshes, scene word, picture, study"
+    )
     assert [row[0] for row in PLACES] == names.split(", ")
 
 

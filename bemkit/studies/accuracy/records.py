@@ -18,8 +18,8 @@ N_FITTED = 3
 """Meshes, from the finest on, to which an order is fitted."""
 N_EXPONENTIAL = 4
 """Meshes to which an exponential rate is fitted: three lie on either curve nearly as well."""
-BETTER = 0.5
-"""Share of the squared misfit of an order that the misfit of an exponential rate may have, to be taken instead."""
+RISING = "hp"
+"""The elements whose errors may fall exponentially: of a fixed degree they never do, whatever four meshes look like."""
 EQUALITY_TOLERANCE = 1e-6
 """Relative difference below which errors are equal: drivers agree on a state to their tolerances only."""
 STAGES = ("mesh", "assemble", "condense", "solve", "recover")
@@ -118,13 +118,14 @@ class Rate:
 def fitted_rate(records: Sequence[ErrorRecord], measure: str) -> Rate:
     """Return the rate of an error over the last meshes of a series, by least squares; nan if it cannot be told.
 
-    It is exponential where that fits the last four meshes better, as with degrees that rise.
+    With degrees that rise it is exponential where that fits the last four meshes better.
     """
     last = records[-N_EXPONENTIAL:]
     n, errors = _sizes_and_errors(last, measure)
-    if len(last) == N_EXPONENTIAL and _is_good(n, errors) and np.all(np.diff(errors) < 0.0):
+    is_rising = all(record.discretisation == RISING for record in last)
+    if is_rising and len(last) == N_EXPONENTIAL and _is_good(n, errors) and np.all(np.diff(errors) < 0.0):
         algebraic, exponential = (np.polyfit(x, np.log(errors), 1, full=True)[:2] for x in (np.log(n), np.sqrt(n)))
-        if np.sum(exponential[1]) < BETTER * np.sum(algebraic[1]):
+        if np.sum(exponential[1]) < np.sum(algebraic[1]):
             return Rate(float(-exponential[0][0]), is_exponential=True)
     return Rate(fitted_order(records, measure))
 

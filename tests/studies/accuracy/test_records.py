@@ -50,12 +50,17 @@ def test_orders_that_cannot_be_told_are_nan() -> None:
 
 def test_exponential_rates_are_told_from_orders() -> None:
     sizes = (40, 90, 160, 250)
-    falling = [row(size=float(n), elements=n, unknowns=n, energy=float(np.exp(-0.8 * np.sqrt(n)))) for n in sizes]
+    falling = [
+        row(discretisation="hp", size=float(n), elements=n, unknowns=n, energy=float(np.exp(-0.8 * np.sqrt(n))))
+        for n in sizes
+    ]
     rate = fitted_rate(falling, "energy")
     assert rate.is_exponential
     assert rate.value == pytest.approx(0.8)
     assert str(rate) == "exp(-0.8√n)"
-    # three meshes do not tell the two apart, nor does an order look exponential
+    # three meshes do not tell the two apart, nor does an order look exponential, nor can a fixed degree be
+    fixed = [dataclasses.replace(record, discretisation="linear") for record in falling]
+    assert not fitted_rate(fixed, "energy").is_exponential
     assert not fitted_rate(falling[1:], "energy").is_exponential
     assert str(fitted_rate(halving(2.5), "energy")) == "2.5"
     assert str(fitted_rate(falling[:1], "energy")) == "-"
