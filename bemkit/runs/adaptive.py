@@ -73,11 +73,17 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             obstacle = f"the solve on {solution.mesh.n_elements} elements failed"
         elif meshes.is_enough(solutions):
             break
-        elif (following := meshes.following(level, solutions)) is None:
-            obstacle = "the estimated error no longer falls"
         else:
-            level = following
-            if _size(level) > most_elements:
+            try:
+                following = meshes.following(level, solutions)
+                level = level if following is None else following
+                _ = level.partition.mesh
+            except BemkitError as error:
+                obstacle = f"no finer mesh can be made ({error})"
+                break
+            if following is None:
+                obstacle = "the estimated error no longer falls"
+            elif _size(level) > most_elements:
                 obstacle = f"more than {most_elements} elements would be needed"
             elif options.most_seconds is not None:
                 expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)

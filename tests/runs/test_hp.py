@@ -11,9 +11,10 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, STEEPEST, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, refined_partition
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.hp import LayeredMeshes
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, with_overrides
 from tests.scenes import true_error
 
@@ -227,3 +228,25 @@ def test_elements_of_high_degree_are_judged_without_neighbours() -> None:
     assert any("no error can be estimated" in warning for warning in low.warnings)
     assert high.warnings == ()
     assert high.estimated_error is not None
+
+
+def test_layers_end_where_coordinates_do() -> None:
+    base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
+    partition = layered_partition(base, {})
+    for _ in range(12):  # 36 layers would be 1e-26 long
+        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {})
+        if len(partition.sides) > 2000:
+            break
+    assert partition.mesh.lengths.min() >= 0.9 * SHORTEST * partition.mesh.lengths.sum()
+
+
+def test_a_mesh_that_cannot_be_made_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refusing(self: LayeredMeshes, level: object, solutions: object) -> None:
+        raise InputError("no room")
+
+    monkeypatch.setattr(LayeredMeshes, "following", refusing)
+    scene = bk.load_scene("paper-1")
+    mesh = bk.MeshOptions(accuracy=1e-6)
+    solution = bk.run(dataclasses.replace(scene, discretisation=bk.HpGalerkin(), mesh=mesh))
+    assert solution.status is bk.Status.ACCURACY_NOT_REACHED
+    assert "no finer mesh can be made (no room)" in solution.message

@@ -23,6 +23,8 @@ FIRST_LAYERS = (1, 2)
 """Layers to begin with: at corners and ends of parts, and where the contact status changes."""
 MOST_LAYERS = 3
 """Layers that an end gains at once: the estimate behind them is one of the mesh before."""
+SHORTEST = 1e-10
+"""Least length of an element relative to the whole boundary: coordinates do not hold much shorter ones."""
 STEEPEST = 7.0
 """Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
 on a short one as a peak of its traction."""
@@ -64,9 +66,13 @@ def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Seq
     fresh = layered_partition(old.base, cuts)
     is_end = _singular_ends(old.division).T.tolist()
     excesses = np.split(excess, np.cumsum([len(s) - 1 for s in old.parameters])[:-1])
+    lengths = old.division.piece_lengths
+    shortest = (SHORTEST * lengths.sum() / lengths).tolist()
     refined = [
-        _refined(_fractions(piece, s), own, *ends)
-        for piece, s, own, ends in zip(old.division.pieces, old.parameters, excesses, is_end, strict=True)
+        _refined(_fractions(piece, s), own, least, *ends)
+        for piece, s, own, least, ends in zip(
+            old.division.pieces, old.parameters, excesses, shortest, is_end, strict=True
+        )
     ]
     before, now = _owners(old.base, old.division), _owners(old.base, fresh.division)
     fractions = []
@@ -107,9 +113,11 @@ def _fractions(piece: Piece, parameters: FloatArray) -> FloatArray:
     return fractions
 
 
-def _refined(fractions: FloatArray, excess: FloatArray, is_start: bool, is_end: bool) -> FloatArray:
+def _refined(fractions: FloatArray, excess: FloatArray, shortest: float, is_start: bool, is_end: bool) -> FloatArray:
     """Cut the elements of a piece; `is_start` and `is_end` tell whether fields may be singular at its ends."""
-    layers = np.clip(np.ceil(np.log(np.maximum(excess, 1.0)) / -np.log(FACTOR)), 0, MOST_LAYERS).astype(int).tolist()
+    wanted = np.ceil(np.log(np.maximum(excess, 1.0)) / -np.log(FACTOR))
+    possible = np.floor(np.log(np.maximum(np.diff(fractions) / shortest, 1.0)) / -np.log(FACTOR))
+    layers = np.minimum(wanted, np.minimum(possible, MOST_LAYERS)).astype(int).tolist()
     last, points = len(layers) - 1, [fractions[:1]]
     for number, n_layers in enumerate(layers):
         start, end = fractions[number : number + 2]
