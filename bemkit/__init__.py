@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
     from bemkit.geometry.meshing.discretise import discretise as discretise
+    from bemkit.geometry.placement import Placement as Placement
     from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
@@ -67,23 +68,33 @@ if TYPE_CHECKING:
     from bemkit.operators.steklov_poincare.maps import GalerkinMap as GalerkinMap
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
+    from bemkit.results.assembly_solution import AssemblySolution as AssemblySolution
     from bemkit.results.interior import interior_fields as interior_fields
     from bemkit.results.result_file import read_result as read_result
     from bemkit.results.result_file import write_result as write_result
     from bemkit.results.solution import Solution as Solution
+    from bemkit.runs.assembly import run_assembly_history as run_assembly_history
     from bemkit.runs.history import run_history as run_history
     from bemkit.runs.nested import run_cascade as run_cascade
     from bemkit.runs.run import FailedRun as FailedRun
     from bemkit.runs.run import run as run
     from bemkit.runs.run import run_all as run_all
     from bemkit.runs.run import run_probe as run_probe
+    from bemkit.scene.assembly import Assembly as Assembly
+    from bemkit.scene.assembly import ContactPair as ContactPair
+    from bemkit.scene.assembly import Touching as Touching
+    from bemkit.scene.body import Body as Body
     from bemkit.scene.conditions import Clamped as Clamped
     from bemkit.scene.conditions import Contact as Contact
+    from bemkit.scene.conditions import Free as Free
     from bemkit.scene.conditions import Part as Part
     from bemkit.scene.conditions import PrescribedDisplacement as PrescribedDisplacement
     from bemkit.scene.conditions import Pressure as Pressure
     from bemkit.scene.conditions import Roller as Roller
     from bemkit.scene.conditions import Traction as Traction
+    from bemkit.scene.copies import CircleCopies as CircleCopies
+    from bemkit.scene.copies import GridCopies as GridCopies
+    from bemkit.scene.copies import ListedCopies as ListedCopies
     from bemkit.scene.discretisation import ConstantCollocation as ConstantCollocation
     from bemkit.scene.discretisation import Galerkin as Galerkin
     from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
@@ -111,6 +122,7 @@ _HOME = {
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
     "geometry.meshing.discretise": ("discretise",),
+    "geometry.placement": ("Placement",),
     "geometry.selection": ("Selection",),
     "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring", "Sector"),
     "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
@@ -123,13 +135,20 @@ _HOME = {
     "operators.steklov_poincare.maps": ("CollocationMap", "GalerkinMap"),
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
+    "results.assembly_solution": ("AssemblySolution",),
     "results.interior": ("interior_fields",),
     "results.result_file": ("read_result", "write_result"),
     "results.solution": ("Solution",),
+    "runs.assembly": ("run_assembly_history",),
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
-    "scene.conditions": ("Clamped", "Contact", "Part", "PrescribedDisplacement", "Pressure", "Roller", "Traction"),
+    "scene.assembly": ("Assembly", "ContactPair", "Touching"),
+    "scene.body": ("Body",),
+    "scene.conditions": (
+        *("Clamped", "Contact", "Free", "Part", "PrescribedDisplacement", "Pressure", "Roller", "Traction"),
+    ),
+    "scene.copies": ("CircleCopies", "GridCopies", "ListedCopies"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
     "scene.mesh_options": ("MeshOptions",),
     "scene.scene": ("Scene",),

@@ -16,7 +16,7 @@ import click
 from bemkit.atomic_files import reserved
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, make_folder, plain_table, stdout_console
-from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
+from bemkit.scene.toml import load_single_body, scene_to_toml, with_overrides
 from bemkit.studies.engine import Task, compute_with_progress
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def errors(
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
     shown = read_measures(measures)
-    problem = load_scene(scene)
+    problem = load_single_body(scene)
 
     def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
         return {FIGURE: draw_errors(records, shown, title=problem.title)}
@@ -172,7 +172,7 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
 
     summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
     summaries.check()
-    chosen = with_overrides(load_scene(scene), elements=elements)
+    chosen = with_overrides(load_single_body(scene), elements=elements)
     with concerning(scene):
         found = run_probe(chosen, n_starts=starts)
     summaries.write(found)
@@ -279,7 +279,7 @@ def _sweep(
     )
     outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
     click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+    chosen = with_overrides(load_single_body(scene or "paper-1"), elements=elements, discretisation=discretisation)
     shows_tables = not quiet and not outputs.uses_stdout
     labels = {"scene": scene_to_toml(chosen) if output else ""}
     finished = FILE.finished(output, labels)

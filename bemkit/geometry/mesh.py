@@ -345,12 +345,13 @@ class BoundaryMesh:
     @cached_property
     def unit(self) -> "BoundaryMesh":
         """The same mesh about the origin, in units of its diameter."""
-        mesh = object.__new__(BoundaryMesh)  # coordinates lose nothing there: what was found valid is not checked again
-        for entry, value in zip(
-            fields(self), self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter), strict=True
-        ):
-            object.__setattr__(mesh, entry.name, value)
-        return mesh
+        # coordinates lose nothing there: what was found valid is not checked again
+        return _unchecked(self._moved(tuple(self.centre.tolist()), 1.0 / self.diameter))
+
+    def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> "BoundaryMesh":
+        """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
+        content = self._content._replace(nodes=_frozen(nodes), curves=curves)
+        return _unchecked((*content, self.is_exterior, None))
 
     @cached_property
     def _unfolded(self) -> "BoundaryMesh":
@@ -398,3 +399,11 @@ class BoundaryMesh:
 def _frozen(array: _Array) -> _Array:
     read_only(array)
     return array
+
+
+def _unchecked(content: tuple[Any, ...]) -> BoundaryMesh:
+    """Return a mesh from what its constructor takes, all of it valid."""
+    mesh = object.__new__(BoundaryMesh)
+    for entry, value in zip(fields(BoundaryMesh), content, strict=True):
+        object.__setattr__(mesh, entry.name, value)
+    return mesh

@@ -19,7 +19,8 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.boundary_tractions import insert_loads, projector
 from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
 from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
@@ -27,11 +28,8 @@ from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
-from bemkit.scene.conditions import Contact, Pressure, Traction
+from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
-
-_MORE_POINTS = 4
-"""Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,19 +125,12 @@ class Model:
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
         traction *= units.stress
-        self._insert_loads(traction)
+        insert_loads(traction, self.scene, self.mesh, self.elastic.traction_space)
         points = dof_points(self.prepared.space)
         # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
         strained = without_motion(mesh.unit, points, displacement)
         energy = 0.5 * float(np.sum(strained * force)) * units.stress * units.displacement * units.length
         return displacement * units.displacement, traction, energy
-
-    def mean_tractions(self, traction: FloatArray) -> FloatArray:
-        """Return the means (n_elements, 2) of tractions (n_elements, n_local, 2) at the local nodes."""
-        space = self.elastic.traction_space
-        xi, weights = gauss_legendre(space.degree + 1)
-        mean: FloatArray = np.einsum("l,elc->ec", space.basis(xi) @ weights / 2.0, traction)
-        return mean
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
@@ -147,7 +138,7 @@ class Model:
         at_rest = np.zeros((1, 2))  # at nodes that contact does not reach
         tractions = np.concatenate([np.einsum("nk,nkc->nc", state.traction, self.nodes.frame), at_rest])
         xi, weights = gauss_legendre(space.degree + 1)
-        projection = space.basis(xi) @ _projector(self.elastic.traction_space, xi, weights).T
+        projection = space.basis(xi) @ projector(self.elastic.traction_space, xi, weights).T
         for part, elements, _ in parts_on(self.scene, self.mesh):
             if isinstance(part.condition, Contact):
                 at_nodes = tractions[self._rows_of(part.name, elements)]
@@ -169,19 +160,6 @@ class Model:
             turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
             found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
         return found
-
-    def _insert_loads(self, traction: FloatArray) -> None:
-        """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero."""
-        xi, weights = gauss_legendre(self.elastic.traction_space.degree + 1 + _MORE_POINTS)
-        projector = _projector(self.elastic.traction_space, xi, weights)
-        is_free = np.ones(self.mesh.n_elements, bool)
-        for part, elements, _ in parts_on(self.scene, self.mesh):
-            is_free[elements] = False
-            if isinstance(part.condition, Traction | Pressure):
-                points, normals = self.mesh.points(elements, xi), self.mesh.normals_at(elements, xi)
-                values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
-                traction[elements] = np.einsum("lq,eqc->elc", projector, values)
-        traction[is_free] = 0.0
 
 
 def build_model(prepared: Prepared) -> Model:
@@ -215,9 +193,3 @@ def _problem(prepared: Prepared, body: CondensedBody | UntouchedBody) -> Contact
     contact, units = prepared.contact, prepared.units
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return ContactProblem(body, contact.gap / units.displacement, law.scaled(units.stress))
-
-
-def _projector(space: BoundarySpace, xi: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return (n_local, n_points): the local dofs of the least-squares fit to values at quadrature points."""
-    basis = space.basis(xi)
-    return np.asarray(np.linalg.solve((basis * weights) @ basis.T, basis * weights), float)

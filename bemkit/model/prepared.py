@@ -106,25 +106,32 @@ def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
         If results in these units could overflow or vanish.
     """
     modulus, length = scene.material.plane_modulus, mesh.diameter
-    stresses = [0.0]
-    gaps = [0.0]
+    load, motion, gap = largest_sizes(scene, mesh, length)
+    stress = max(load, motion / length * modulus) or gap / length * modulus or modulus
+    units = Units(mesh.centre, length, modulus, stress)
+    units.check_range()
+    return units
+
+
+def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
+    """Return the largest traction [Pa], the largest given displacement or interference, and the largest gap [m].
+
+    The length [m] tells which overlaps and gaps are the round-off of coordinates.
+    """
+    loads, motions, gaps = [0.0], [0.0], [0.0]
     places = np.array([-1.0, 0.0, 1.0])
     for part, elements, normals in parts_on(scene, mesh):
         points, normals = mesh.points(elements, places).reshape(-1, 2), np.repeat(normals, places.size, axis=0)
         if isinstance(part.condition, Traction | Pressure):
-            stresses.append(float(np.abs(part.condition.at(points, normals)).max()))
+            loads.append(float(np.abs(part.condition.at(points, normals)).max()))
         elif isinstance(part.condition, PrescribedDisplacement):
-            stresses.append(float(np.abs(part.condition.at(points)).max()) / length * modulus)
+            motions.append(float(np.abs(part.condition.at(points)).max()))
         elif isinstance(part.condition, Contact):
             gap, _ = measure_contact(part.condition.obstacle, points, normals)
-            # an overlap or gap below the round-off of the coordinates is no measure of anything
             gap = np.where(np.abs(gap) > 1e-18 * length, gap, 0.0)
-            stresses.append(float(np.maximum(-gap, 0.0).max()) / length * modulus)
+            motions.append(float(np.maximum(-gap, 0.0).max()))
             gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
-    stress = max(stresses) or max(gaps) / length * modulus or modulus
-    units = Units(mesh.centre, length, modulus, stress)
-    units.check_range()
-    return units
+    return max(loads), max(motions), max(gaps)
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:

@@ -22,7 +22,7 @@ from bemkit.reference.wavy import WavyObstacle
 from bemkit.scene.discretisation import LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.scene.toml import load_scene
+from bemkit.scene.toml import load_single_body
 from bemkit.solvers.ssn import SemismoothNewton
 
 
@@ -36,7 +36,7 @@ def find_reference(scene: Scene) -> Reference | None:
         solver are. A number that differs makes another problem.
     """
     for name, make in _REFERENCES.items():
-        if _problem(scene) == _problem(load_scene(name)):
+        if _problem(scene) == _problem(load_single_body(name)):
             return make(scene)
     return None
 

@@ -13,6 +13,7 @@ from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
+from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
@@ -157,7 +158,7 @@ def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageC
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
     warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
-    means = model.mean_tractions(traction_dofs)
+    means = mean_tractions(model.elastic.traction_space, traction_dofs)
     fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2))
     clock = clock.closed(Stage.RECOVER)
     if result.is_converged and not (

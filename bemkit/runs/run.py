@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, overload
 
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
@@ -16,41 +17,55 @@ from bemkit.results.solution import Solution
 from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
 from bemkit.runs.timing import Stage
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import StepRecord
 from bemkit.solvers.multistart import probe
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
 
 
 class LoadHistoryError(InputError):
     """A load history where only a single load makes sense."""
 
 
+@overload
 def run(
     scene: Scene,
     *,
     mesh: BoundaryMesh | None = None,
     start: Solution | None = None,
     callback: Callable[[StepRecord], None] | None = None,
-) -> Solution:
-    """Solve a scene.
+) -> Solution: ...
+@overload
+def run(scene: Assembly, *, callback: Callable[[StepRecord], None] | None = None) -> AssemblySolution: ...
+def run(
+    scene: Scene | Assembly,
+    *,
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> Solution | AssemblySolution:
+    """Solve a scene, or an assembly of several bodies.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Assembly
     mesh : BoundaryMesh, optional
-        A mesh of one's own with the parts of the scene; by default the one the scene describes, or as many as its
+        Of a single body: a mesh of one's own with the parts of the scene; by default the one the scene describes, or as many as its
         accuracy needs.
     start : Solution, optional
-        Where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node sticks. Where a scene
+        Of a single body: where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node sticks. Where a scene
         has several solutions the start chooses among them. Refused without contact, where there is only one.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 
     Returns
     -------
-    Solution
-        Look at `Solution.status` before you use it: a run that did not converge returns what it reached. Of a load
+    Solution or AssemblySolution
+        Look at its status before you use it: a run that did not converge returns what it reached. Of a load
         history this is the last step, with the linear solves and the records of all steps.
 
     Raises
@@ -62,11 +77,31 @@ def run(
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
+    if isinstance(scene, Assembly):
+        return _run_assembly(scene, mesh, start, callback)
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
         return run_adaptive(scene, callback=callback)[-1]
     return run_on_mesh(scene, mesh, start, callback)
+
+
+def _run_assembly(
+    assembly: Assembly,
+    mesh: BoundaryMesh | None,
+    start: Solution | None,
+    callback: Callable[[StepRecord], None] | None,
+) -> AssemblySolution:
+    for name, given in (("mesh", mesh), ("start", start)):
+        if given is not None:
+            raise InputError(f"{name} is given with an assembly of several bodies: leave it out")
+    if assembly.mesh.accuracy is not None:
+        from bemkit.runs.assembly_adaptive import run_assembly_adaptive
+
+        return run_assembly_adaptive(assembly, callback=callback)[-1]
+    from bemkit.runs.assembly import run_assembly
+
+    return run_assembly(assembly, callback=callback)
 
 
 def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = None) -> tuple[Solution, ...]:

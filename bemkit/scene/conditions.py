@@ -126,6 +126,11 @@ class Pressure:
 
 
 @dataclass(frozen=True)
+class Free:
+    """Nothing acts on the part but what contacts with other bodies do: a name for a piece of the boundary."""
+
+
+@dataclass(frozen=True)
 class Contact:
     """The part may touch a rigid obstacle.
 
@@ -140,7 +145,7 @@ class Contact:
     law: FrictionLaw | None = None
 
 
-Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact
+Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact | Free
 
 
 def with_fields(

@@ -132,6 +132,16 @@ CONDITIONS = Registry(
         "traction": "bemkit.scene.conditions:Traction",
         "pressure": "bemkit.scene.conditions:Pressure",
         "contact": "bemkit.scene.conditions:Contact",
+        "free": "bemkit.scene.conditions:Free",
+    },
+)
+
+COPIES = Registry(
+    "rule for copies",
+    {
+        "grid": "bemkit.scene.copies:GridCopies",
+        "circle": "bemkit.scene.copies:CircleCopies",
+        "list": "bemkit.scene.copies:ListedCopies",
     },
 )
 

@@ -12,7 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
-from functools import cache, reduce
+from functools import cache, partial, reduce
+from operator import eq
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -27,10 +28,13 @@ from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
+from bemkit.scene.body import Body
 from bemkit.scene.conditions import Condition, Part
+from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import (
     CONDITIONS,
+    COPIES,
     DISCRETISATIONS,
     GRADINGS,
     LAWS,
@@ -48,6 +52,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Shape, SHAPES),
     (Grading, GRADINGS),
     (Condition, CONDITIONS),
+    (Copies, COPIES),
     (Obstacle, OBSTACLES),
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),
@@ -56,7 +61,11 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (ContactSolver, SOLVERS),
 )
 
-_PARTS = tuple[Part, ...]
+_NAMED: tuple[tuple[Any, type, str], ...] = (
+    (tuple[Part, ...], Part, "parts"),
+    (tuple[Body, ...], Body, "bodies"),
+)
+"""Tuples whose entries stand in tables headed by their names: [parts.NAME]."""
 
 _MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
     {
@@ -65,7 +74,9 @@ _MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
         "material": "add a table [material] with youngs_modulus and poisson_ratio",
         "parts": "add tables [parts.NAME] with sides and condition",
         "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
-        "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
+        "bodies": "add tables [bodies.NAME], each with a shape and a material",
+    "sides": "add sides = ['one.top', 'two.bottom'], each a body and one of its sides",
+    "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
     }
 )
 
@@ -200,7 +211,8 @@ def _converter() -> Converter:
     converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
     add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
     add(lambda wanted: _registry(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
-    add(lambda wanted: wanted == _PARTS, lambda value, _: _parts(converter, value))
+    for declared, entry, heading in _NAMED:
+        add(partial(eq, declared), partial(_named, converter, entry, heading))
     return converter
 
 
@@ -337,15 +349,16 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
     return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
 
 
-def _parts(converter: Converter, value: object) -> tuple[Part, ...]:
-    parts = []
-    for name, options in _exactly(value, dict, "a table of parts: write [parts.NAME]").items():
+def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
+    found = []
+    word = wanted.__name__.lower()
+    for name, options in _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]").items():
         with _at(name):
-            table = _exactly(options, dict, "a table with sides and condition")
+            table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
-                raise InputError("unknown key 'name': the name of a part stands in its heading [parts.NAME]")
-            parts.append(converter.structure({"name": name, **table}, Part))
-    return tuple(parts)
+                raise InputError(f"unknown key 'name': the name of a {word} stands in its heading [{heading}.NAME]")
+            found.append(converter.structure({"name": name, **table}, wanted))
+    return tuple(found)
 
 
 @contextmanager

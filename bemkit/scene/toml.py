@@ -10,10 +10,11 @@ from dataclasses import fields, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, TypeVar, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
@@ -28,6 +29,11 @@ _SCENE_KEYS = (
     *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
     *("load_factors", "symmetry", "law", "shape", "material", "mesh", "parts"),
 )
+_ASSEMBLY_KEYS = (
+    *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
+    *("law", "touching", "mesh", "bodies", "contacts"),
+)
+_BODY_KEYS = ("shape", "material", "placement", "copies", "discretisation", "mesh", "parts")
 _PART_KEYS = ("sides", "where", "condition")
 
 
@@ -47,13 +53,18 @@ def shipped_scenes() -> dict[str, str]:
     return {name: tomllib.loads(file.read_text("utf-8"))["title"] for name, file in shipped_files().items()}
 
 
-def load_scene(source: str | Path) -> Scene:
+def load_scene(source: str | Path) -> Scene | Assembly:
     """Read a scene file, or a scene that is shipped with bemkit.
 
     Parameters
     ----------
     source : str or Path
         Path of a TOML file, or the name of a shipped scene such as ``"paper-1"``.
+
+    Returns
+    -------
+    Scene or Assembly
+        An assembly if the file has tables ``[bodies.NAME]``.
 
     Raises
     ------
@@ -83,8 +94,30 @@ def load_scene(source: str | Path) -> Scene:
     return scene_from_toml(text, name=name)
 
 
-def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
-    """Turn TOML text into a scene.
+def load_single_body(source: str | Path) -> Scene:
+    """Read a scene of one body; see `load_scene`.
+
+    Raises
+    ------
+    SceneError
+        As `load_scene`, also if there are several bodies.
+    """
+    return _single(load_scene(source), str(source))
+
+
+def single_body_from_toml(text: str, *, name: str = "scene") -> Scene:
+    """Turn TOML text into a scene of one body; see `scene_from_toml` and `load_single_body`."""
+    return _single(scene_from_toml(text, name=name), name)
+
+
+def _single(scene: Scene | Assembly, name: str) -> Scene:
+    if isinstance(scene, Assembly):
+        raise SceneError(f"{name}: there are {len(scene.placed_bodies)} bodies: only scenes of one body can do this")
+    return scene
+
+
+def scene_from_toml(text: str, *, name: str = "scene") -> Scene | Assembly:
+    """Turn TOML text into a scene, or an assembly if it has tables ``[bodies.NAME]``.
 
     Parameters
     ----------
@@ -104,12 +137,12 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene:
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
         raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
     try:
-        return structure(table, Scene)
+        return structure(table, Assembly) if "bodies" in table else structure(table, Scene)
     except StructureError as error:
         raise SceneError(f"{name}: {printable(str(error))}") from error
 
 
-def scene_to_toml(scene: Scene) -> str:
+def scene_to_toml(scene: Scene | Assembly) -> str:
     """Write a scene as TOML text, leaving out what has its default value.
 
     Returns
@@ -128,14 +161,22 @@ def scene_to_toml(scene: Scene) -> str:
         table = unstructure(scene, keep_defaults=True)
     except UnstructureError as error:
         raise SceneError(str(error)) from error
+    if isinstance(scene, Assembly):
+        for body in table["bodies"]:
+            body["parts"] = _named(body.get("parts", []), _PART_KEYS)
+        table["bodies"] = _named(table["bodies"], _BODY_KEYS)
+        return tomli_w.dumps(_ordered(table, _ASSEMBLY_KEYS), multiline_strings=True)
     if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
         del table["law"], table["solver"]
-    table["parts"] = {part["name"]: _ordered(part, _PART_KEYS) for part in table["parts"]}
+    table["parts"] = _named(table["parts"], _PART_KEYS)
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
 
+AnyScene = TypeVar("AnyScene", Scene, Assembly)
+
+
 def with_overrides(
-    scene: Scene,
+    scene: AnyScene,
     *,
     elements: int | None = None,
     accuracy: float | None = None,
@@ -143,13 +184,14 @@ def with_overrides(
     degree: int | Literal["hp"] | None = None,
     solver: str | None = None,
     rho: float | None = None,
-) -> Scene:
+) -> AnyScene:
     """Change a scene by the words and numbers of the command line; what is None stays.
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Assembly
     elements : int, optional
+        Of an assembly those of each body.
     accuracy : float, optional
         Instead of a number of elements.
     discretisation, solver : str, optional
@@ -196,4 +238,8 @@ def _with_rho(solver: Any, rho: float) -> Any:
 
 
 def _ordered(table: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    return {key: table[key] for key in keys if table.get(key, "") != ""}
+    return {key: table[key] for key in keys if table.get(key, "") not in ("", {}, [])}
+
+
+def _named(tables: list[dict[str, Any]], keys: tuple[str, ...]) -> dict[str, Any]:
+    return {table["name"]: _ordered(table, keys) for table in tables}

@@ -27,7 +27,7 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.results.outputs import csv_text, plain_table, stdout_console
 from bemkit.scene.discretisation import ConstantCollocation
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.toml import load_scene
+from bemkit.scene.toml import load_single_body
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.ssn import SemismoothNewton
@@ -121,7 +121,7 @@ def paper_tables(
 
 def paper_model(number: int) -> Model:
     """Return example 1 or 2 on the paper's uniform mesh of plain constant elements, made ready to solve."""
-    scene = load_scene(f"paper-{number}")
+    scene = load_single_body(f"paper-{number}")
     sides = [side for loop in scene.shape.outline().loops for side in loop]
     # as many elements on each side, whatever its length
     density = {

@@ -1,0 +1,104 @@
+"""Where a body stands: turned about the origin of its own coordinates, then shifted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.geometry.curves import Curve, as_point
+from bemkit.geometry.mesh import BoundaryMesh
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The motion x -> R x + shift from the coordinates of a shape to those of a scene.
+
+    Parameters
+    ----------
+    shift : (float, float) [m]
+    turn : float [degree]
+        Anticlockwise, about the origin of the shape's coordinates.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite.
+    """
+
+    shift: tuple[float, float] = (0.0, 0.0)
+    turn: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shift", as_point(self.shift, "Placement: shift"))
+        if not math.isfinite(self.turn):
+            raise InputError(f"Placement: turn is {self.turn}: give a finite angle in degrees")
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(2, 2) array: R, exact for multiples of 90 degrees."""
+        quarters, rest = divmod(self.turn, 90.0)
+        angle = math.radians(rest)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        for _ in range(int(quarters) % 4):
+            cosine, sine = -sine, cosine
+        return np.array([[cosine, -sine], [sine, cosine]]) + 0.0  # no negative zeros
+
+    @property
+    def is_shift(self) -> bool:
+        """Whether nothing turns."""
+        return self.turn % 360.0 == 0.0
+
+    def forward(self, points: FloatArray) -> FloatArray:
+        """Move points (..., 2) [m]."""
+        return self.turned(points) + np.array(self.shift)
+
+    def turned(self, vectors: FloatArray) -> FloatArray:
+        """Turn vectors (..., 2)."""
+        return vectors if self.is_shift else np.asarray(vectors @ self.rotation.T)
+
+    def turned_back(self, vectors: FloatArray) -> FloatArray:
+        """Turn vectors (..., 2) back into the coordinates of the shape."""
+        return vectors if self.is_shift else np.asarray(vectors @ self.rotation)
+
+    def after(self, first: Placement) -> Placement:
+        """Return the motion that comes of another one and then this one."""
+        x, y = self.forward(np.array(first.shift)).tolist()
+        return Placement((x, y), self.turn + first.turn)
+
+    def mesh(self, mesh: BoundaryMesh) -> BoundaryMesh:
+        """Return the mesh of the body in its place; what was found valid is not checked again.
+
+        Parameters
+        ----------
+        mesh : BoundaryMesh
+            Without symmetry.
+        """
+        if self == Placement():
+            return mesh
+        curves = tuple(PlacedCurve(curve, self) for curve in mesh.curves)
+        return mesh.unchecked_copy(self.forward(mesh.nodes), curves)
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedCurve:
+    """A curve that has been turned and shifted."""
+
+    curve: Curve
+    placement: Placement
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the original is straight."""
+        return self.curve.is_straight
+
+    def point(self, s: FloatArray) -> FloatArray:
+        """Evaluate the curve."""
+        return self.placement.forward(self.curve.point(s))
+
+    def derivative(self, s: FloatArray) -> FloatArray:
+        """Differentiate the curve with respect to s."""
+        return self.placement.turned(self.curve.derivative(s))

@@ -1,0 +1,1 @@
+"""Several elastic bodies made ready to solve."""

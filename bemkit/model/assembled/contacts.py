@@ -1,0 +1,228 @@
+"""The contacts of an assembly, node by node: between bodies by mortar integrals, and with rigid obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.condensation.nodes import nodes_on
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.mortar import ContactSide, MortarCoupling, couple, find_facing, is_better_non_mortar
+from bemkit.errors import InputError
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.assembled.placed import PlacedBody
+from bemkit.model.contact_data import find_contact
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.scene.assembly import Assembly, ContactPair
+from bemkit.scene.conditions import Contact
+
+OVERLAP_TOLERANCE = 1e-6
+"""Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
+HELD_COSINE = 1e-3
+"""Cosine of the angle between the free direction of a supported node and the direction of contact below which it does
+not approach."""
+
+
+class OverlapError(InputError):
+    """Bodies that overlap by more than an interference that was given."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRows:
+    """The nodes of one contact: where relative displacements and tractions are unknown.
+
+    Parameters
+    ----------
+    name : str
+        Of the contact; of a rigid obstacle ``"body.part"``.
+    law : FrictionLaw
+    body, other : int
+        The body whose nodes these are (the non-mortar side), and its partner; -1 for a rigid obstacle.
+    nodes : (n,) array
+        Scalar dofs of the body.
+    points : (n, 2) array [m]
+    arc_length : (n,) array [m]
+        From the start of the side.
+    frame : (n, 2, 2) array
+        Direction of contact, out of the body, and tangent.
+    weights, gap : (n,) arrays [m]
+    on_body, on_other : sparse (n, n_nodes) arrays
+        The relative displacement of row i is ``frame[i] @ (on_body[i] @ u - on_other[i] @ u_other)``.
+    is_held : (n,) bool array
+        Where a support holds the node in one direction: there is no friction of its own.
+    """
+
+    name: str
+    law: FrictionLaw
+    body: int
+    other: int
+    nodes: IntArray
+    points: FloatArray
+    arc_length: FloatArray
+    frame: FloatArray
+    weights: FloatArray
+    gap: FloatArray
+    on_body: sparse.csr_array
+    on_other: sparse.csr_array | None
+    is_held: BoolArray
+
+    @property
+    def n_contact(self) -> int:
+        """Number of nodes."""
+        return self.nodes.size
+
+
+def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
+    """Return all contacts between bodies: those that are listed, and those of bodies found touching."""
+    if assembly.touching is None:
+        return assembly.contacts
+    sides, names, owners = [], [], []
+    for number, body in enumerate(bodies):
+        for part in assembly.contact_parts(body.body):
+            sides.append(ContactSide(body.space, body.part_elements(part)))
+            names.append(f"{body.name}.{part}")
+            owners.append(number)
+    known = {frozenset(pair.sides) for pair in assembly.contacts}
+    law = assembly.law_of(assembly.touching)
+    found = []
+    for first, second in find_facing(sides, assembly.touching.within, owners=owners):
+        pair = ContactPair((names[first], names[second]), law, multipliers_on=names[first])
+        if frozenset(pair.sides) not in known:
+            found.append(pair)
+    return (*assembly.contacts, *found)
+
+
+def obstacle_rows(bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions]) -> Iterator[ContactRows]:
+    """Yield the contacts with rigid obstacles, part by part."""
+    for number, body in enumerate(bodies):
+        if not body.scene.contact_parts:
+            continue
+        found = find_contact(body.scene, body.mesh, body.own_space)
+        frames, fixed = conditions[number].frame, conditions[number].is_fixed
+        parts = np.array(found.parts)
+        for part in body.scene.contact_parts:
+            rows = (parts == part.name) & _approaches(found.nodes.nodes, found.nodes.directions, frames, fixed)
+            nodes = found.nodes.take(rows)
+            if not nodes.nodes.size or not isinstance(part.condition, Contact):
+                continue
+            n_nodes = body.space.n_dofs // 2
+            pick = sparse.csr_array(
+                (np.ones(nodes.nodes.size), (np.arange(nodes.nodes.size), nodes.nodes)), (nodes.nodes.size, n_nodes)
+            )
+            yield ContactRows(
+                f"{body.name}.{part.name}",
+                body.scene.laws[part.name],
+                number,
+                -1,
+                nodes.nodes,
+                found.points[rows],
+                found.arc_length[rows],
+                nodes.frame,
+                nodes.weights * body.mesh.diameter,
+                found.gap[rows],
+                pick,
+                None,
+                fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
+            )
+
+
+def body_rows(
+    assembly: Assembly,
+    pairs: Sequence[ContactPair],
+    bodies: Sequence[PlacedBody],
+    conditions: Sequence[NodalConditions],
+) -> Iterator[ContactRows]:
+    """Yield the contacts between bodies.
+
+    Notes
+    -----
+    Where two contact sides of one body meet in a corner, and both are in contact, the node there carries a multiplier
+    of the longer contact alone: three bodies that meet in one point would otherwise be tied in a circle, and their
+    tractions there could not be told apart. The other contact hands its share to its neighbours, as at crosspoints of
+    mortar methods [Wohlmuth2000].
+    """
+    numbers = {body.name: number for number, body in enumerate(bodies)}
+    ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
+    lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
+    taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
+    found: dict[int, ContactRows] = {}
+    for k in sorted(range(len(pairs)), key=lambda k: -lengths[k]):
+        (first, part, side), (second, other_part, other_side) = ordered[k]
+        own_nodes, normals = nodes_on(side.space, side.elements)
+        held = ~_approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)
+        crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
+        without = own_nodes[held | crossed]
+        try:
+            coupling = couple(side, other_side, without=without, reach=_reach(bodies[first], bodies[second]))
+        except ValueError as error:
+            raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
+        _check_overlap(pairs[k], coupling, bodies[first], bodies[second])
+        for number, name, one in ordered[k]:
+            for node in nodes_on(one.space, one.elements)[0].tolist():
+                taken[number].setdefault(node, name)
+        found[k] = ContactRows(
+            pairs[k].name,
+            assembly.law_of(pairs[k]),
+            first,
+            second,
+            coupling.nodes,
+            coupling.points,
+            coupling.arc_length,
+            coupling.frame,
+            coupling.weights,
+            coupling.gap + pairs[k].gap,
+            coupling.on_non_mortar,
+            coupling.on_mortar,
+            conditions[first].is_fixed[coupling.nodes].any(axis=1),
+        )
+    yield from (found[k] for k in range(len(pairs)))
+
+
+_NamedSide = tuple[int, str, ContactSide]
+
+
+def _ordered(
+    pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str, int]
+) -> tuple[_NamedSide, _NamedSide]:
+    """Return the sides of a contact, the one with the multipliers first."""
+    sides = []
+    for name in pair.sides:
+        body, part = name.split(".", 1)
+        number = numbers[body]
+        sides.append((number, part, ContactSide(bodies[number].space, bodies[number].part_elements(part))))
+    one, two = sides
+    is_first = (
+        is_better_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
+    )
+    return (one, two) if is_first else (two, one)
+
+
+def _approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
+    """Return (n,) bool: nodes that their supports let move along directions (n, 2)."""
+    free = np.where(is_fixed[nodes][:, :, None], 0.0, frame[nodes])
+    return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
+
+
+def _reach(one: PlacedBody, two: PlacedBody) -> float:
+    return 0.5 * min(one.mesh.diameter, two.mesh.diameter)
+
+
+def _check_overlap(pair: ContactPair, coupling: MortarCoupling, one: PlacedBody, two: PlacedBody) -> None:
+    overlap = -float(coupling.gap.min(initial=0.0))
+    allowed = pair.interference + OVERLAP_TOLERANCE * min(one.mesh.diameter, two.mesh.diameter)
+    if overlap > allowed:
+        node = int(np.argmin(coupling.gap))
+        x, y = coupling.points[node]
+        raise OverlapError(
+            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} m at ({x:.6g}, {y:.6g}), and an interference "
+            f"of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
+        )
+
+
+def node_points(body: PlacedBody) -> FloatArray:
+    """Return the displacement nodes (n_nodes, 2) [m] of a body in its place."""
+    return dof_points(body.space)

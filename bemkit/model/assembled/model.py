@@ -1,0 +1,234 @@
+"""From a prepared assembly to a dimensionless contact problem, and back to physical fields of each body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.joined import JoinedBodies, Member
+from bemkit.contact.problem import ContactProblem
+from bemkit.geometry.spaces import dof_points
+from bemkit.model.assembled.contacts import ContactRows
+from bemkit.model.assembled.placed import PlacedBody, groups
+from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.model.boundary_tractions import insert_loads
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.memory import physical_memory
+from bemkit.operators.linear.solvers import DenseCholesky, LinearSolver
+from bemkit.operators.rigid_modes import without_motion
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledModel:
+    """An assembly made ready to solve.
+
+    Parameters
+    ----------
+    prepared : PreparedAssembly
+    elastic : tuple of SteklovPoincare
+        Of each body; copies share theirs.
+    condensed : tuple of CondensedMap
+        Of each body; copies share their stiffness.
+    body : JoinedBodies
+    problem : ContactProblem
+    work : OperationCounts
+    """
+
+    prepared: PreparedAssembly
+    elastic: tuple[SteklovPoincare, ...]
+    condensed: tuple[CondensedMap, ...]
+    body: JoinedBodies
+    problem: ContactProblem
+    work: OperationCounts
+
+    def under(self, prepared: PreparedAssembly) -> AssembledModel:
+        """Return the same bodies under other loads, gaps and laws; nothing is factored again.
+
+        Parameters
+        ----------
+        prepared : PreparedAssembly
+            From `PreparedAssembly.under` of this model's.
+        """
+        condensed = tuple(
+            each.under(force, conditions.displacement)
+            for each, force, conditions in zip(self.condensed, prepared.forces, prepared.conditions, strict=True)
+        )
+        offset = _offset(prepared)
+        body = self.body.under([each.load for each in condensed], offset, prepared.tangent_is_eliminated)
+        return AssembledModel(prepared, self.elastic, condensed, body, _problem(prepared, body), self.work)
+
+    def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
+        """Return the physical fields of a contact state on the boundary of each body.
+
+        Returns
+        -------
+        list of (displacement, traction, energy)
+            (n_nodes, 2) [m]; (n_elements, n_local, 2) [Pa] at the local nodes of the traction space; elastic energy
+            1/2 a(u, u) [J/m].
+        """
+        units, fields = self.prepared.units, []
+        unknowns = self.body.member_displacements(state)
+        for body, elastic, condensed, own in zip(
+            self.prepared.bodies, self.elastic, self.condensed, unknowns, strict=True
+        ):
+            displacement, force = condensed.recover(own)
+            traction = elastic.element_tractions(displacement, force) * (self.prepared.force_unit / body.own_mesh.diameter)
+            traction = np.array(body.to_place(traction))
+            traction_space = body.scene.discretisation.traction_space(body.mesh)
+            insert_loads(traction, body.scene, body.mesh, traction_space)
+            strained = without_motion(body.own_mesh.unit, dof_points(body.own_space), displacement)
+            energy = 0.5 * float(np.sum(strained * force)) * self.prepared.force_unit * units.displacement
+            fields.append((body.to_place(displacement) * units.displacement, traction, energy))
+        return fields
+
+
+def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
+    """Assemble the operators of all bodies, and condense each onto its nodes in contact.
+
+    Raises
+    ------
+    SingularMatrixError
+        If supports and contacts, all sticking, do not hold a body.
+    """
+    bodies = prepared.bodies
+    elastic: list[SteklovPoincare | None] = [None] * len(bodies)
+    condensed: list[CondensedMap | None] = [None] * len(bodies)
+    work = OperationCounts()
+    for group in groups(bodies):
+        first = bodies[group[0]]
+        material = first.material.scaled(prepared.units.modulus)
+        map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, _linear_solver(prepared, int(group[0])))
+        base = map_.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
+        work += base.work
+        for number in group.tolist():
+            elastic[number] = map_
+            same = number == group[0]
+            condensed[number] = (
+                base if same else base.under(prepared.forces[number], prepared.conditions[number].displacement)
+            )
+    maps = tuple(each for each in condensed if each is not None)
+    members = tuple(
+        Member(
+            stiffness=maps[groups_first].stiffness,
+            load=each.load,
+            motions=_motions(body, conditions),
+            modulus=body.material.plane_modulus / prepared.units.modulus,
+            name=body.name,
+        )
+        for each, body, conditions, groups_first in zip(maps, bodies, prepared.conditions, _firsts(bodies), strict=True)
+    )
+    joined = JoinedBodies(
+        members=members,
+        relative=_relative(prepared),
+        offset=_offset(prepared),
+        weights=prepared.column("weights") / prepared.units.length,
+        tangent_is_eliminated=prepared.tangent_is_eliminated,
+    )
+    work += OperationCounts(contact_unknowns=2 * prepared.n_contact)
+    return AssembledModel(
+        prepared, tuple(each for each in elastic if each is not None), maps, joined, _problem(prepared, joined), work
+    )
+
+
+def _firsts(bodies: Sequence[PlacedBody]) -> list[int]:
+    """Return for each body the first one that shares its mesh."""
+    first = [0] * len(bodies)
+    for group in groups(bodies):
+        for number in group.tolist():
+            first[number] = int(group[0])
+    return first
+
+
+def _linear_solver(prepared: PreparedAssembly, number: int) -> LinearSolver:
+    body, conditions = prepared.bodies[number], prepared.conditions[number]
+    if not body.scene.discretisation.is_symmetric:
+        return DenseCholesky()
+    n_retained = int(np.count_nonzero(conditions.is_retained))
+    requested = prepared.assembly.linear_solver
+    return choose_linear_solver(requested, body.space.n_dofs, n_retained, physical_memory()).solver
+
+
+def _problem(prepared: PreparedAssembly, body: JoinedBodies) -> ContactProblem:
+    units = prepared.units
+    gap = prepared.column("gap") / units.displacement
+    return ContactProblem(body, gap, prepared.law.scaled(units.stress))
+
+
+def _motions(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
+    """Return the rigid motions (n_motions, n_retained) that no support resists."""
+    motions = free_modes(body.own_space, conditions)
+    along = np.einsum("nkc,mnc->mnk", conditions.frame, motions)
+    return np.asarray(along[:, conditions.is_retained])
+
+
+def _nodal(body: PlacedBody, conditions: NodalConditions) -> tuple[sparse.csr_array, FloatArray]:
+    """Return how the retained displacements move the nodes in the axes of the scene.
+
+    Returns
+    -------
+    sparse (2 n_nodes, n_retained) array, (2 n_nodes,) array
+        Displacements are the product, and the array what supports prescribe.
+    """
+    directions = body.to_place(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
+    node, k = np.nonzero(conditions.is_retained)
+    vectors = directions[node, k]
+    rows = 2 * node[:, None] + np.arange(2)
+    columns = np.broadcast_to(np.arange(node.size)[:, None], rows.shape)
+    shape = (2 * len(directions), node.size)
+    matrix = sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
+    given = np.einsum("nkc,nk->nc", directions, np.where(conditions.is_fixed, conditions.displacement, 0.0))
+    return matrix, given.ravel()
+
+
+def _in_frames(rows: ContactRows, on_nodes: sparse.csr_array) -> sparse.csr_array:
+    """Return the (n, t) components (2 n, 2 n_nodes) of what a coupling (n, n_nodes) makes of nodal displacements."""
+    n = rows.n_contact
+    blocks = sparse.bsr_array((rows.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n))
+    return sparse.csr_array(blocks @ sparse.kron(on_nodes, sparse.eye_array(2), format="csr"))
+
+
+def _couplings(rows: ContactRows) -> list[tuple[int, sparse.csr_array]]:
+    """Return the bodies that a contact involves, and how their nodes enter it."""
+    found = [(rows.body, _in_frames(rows, rows.on_body))]
+    if rows.on_other is not None:
+        found.append((rows.other, -_in_frames(rows, rows.on_other)))
+    return found
+
+
+def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
+    """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
+    nodal = [_nodal(*pair)[0] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    sizes = [matrix.shape[1] for matrix in nodal]
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    data, row, column, begin = [], [], [], 0
+    for rows in prepared.rows:
+        for number, coupling in _couplings(rows):
+            block = sparse.coo_array(coupling @ nodal[number])
+            data.append(block.data)
+            row.append(block.row + begin)
+            column.append(block.col + first[number])
+        begin += 2 * rows.n_contact
+    shape = (begin, int(first[-1]))
+    if not data:
+        return sparse.csr_array(shape)
+    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(column))
+    relative = sparse.csr_array(sparse.coo_array(entries, shape))
+    relative.eliminate_zeros()
+    return relative
+
+
+def _offset(prepared: PreparedAssembly) -> FloatArray:
+    """Return the relative displacements (2 n_contact,) that supports prescribe."""
+    given = [_nodal(*pair)[1] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    parts = [np.zeros(0)]
+    for rows in prepared.rows:
+        parts.append(np.sum([coupling @ given[number] for number, coupling in _couplings(rows)], axis=0))
+    return np.concatenate(parts)

@@ -1,0 +1,128 @@
+"""The bodies of an assembly in their places: meshes, spaces, supports and loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.placement import Placement
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.model.prepared import Units
+from bemkit.operators.material import Material
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
+from bemkit.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBody:
+    """A body of an assembly on a mesh.
+
+    Operators are assembled on its own mesh. That of a copy is the mesh of the shape where it was drawn, which all
+    copies share; a body that supports or rigid obstacles hold is alone, and its own mesh is the one in place.
+
+    Parameters
+    ----------
+    body : Body
+    scene : Scene
+        What is said of it alone; see `Assembly.scene_of`.
+    mesh : BoundaryMesh
+        In its place, in physical units.
+    own_mesh : BoundaryMesh
+    """
+
+    body: Body
+    scene: Scene
+    mesh: BoundaryMesh
+    own_mesh: BoundaryMesh
+
+    @property
+    def name(self) -> str:
+        """The name of the body."""
+        return self.body.name
+
+    @property
+    def material(self) -> Material:
+        """Its material, in physical units."""
+        return self.body.material
+
+    @property
+    def turn(self) -> Placement:
+        """The motion from the own mesh to the mesh in place."""
+        return Placement() if self.own_mesh is self.mesh else self.body.placement
+
+    @cached_property
+    def space(self) -> BoundarySpace:
+        """The space of the displacements on the mesh in place."""
+        return self.scene.discretisation.displacement_space(self.mesh)
+
+    @cached_property
+    def own_space(self) -> BoundarySpace:
+        """The space of the displacements on the dimensionless own mesh; its nodes have the same numbers."""
+        return self.scene.discretisation.displacement_space(self.own_mesh.unit)
+
+    def part_elements(self, part: str) -> IntArray:
+        """Return the elements of a part."""
+        return self.mesh.part(part)
+
+    def units(self, modulus: float, force: float, mesh: BoundaryMesh | None = None) -> Units:
+        """Return its units, in which forces and displacements are those of all bodies of the assembly.
+
+        Parameters
+        ----------
+        modulus : float [Pa]
+        force : float [N/m]
+        mesh : BoundaryMesh, optional
+            The mesh in place; the own one by default.
+        """
+        mesh = self.own_mesh if mesh is None else mesh
+        return Units(mesh.centre, mesh.diameter, modulus, force / mesh.diameter)
+
+    def to_place(self, vectors: FloatArray) -> FloatArray:
+        """Turn vectors (..., 2) from the axes of the own mesh to those of the scene."""
+        return self.turn.turned(vectors)
+
+
+def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> tuple[PlacedBody, ...]:
+    """Divide the bodies of an assembly and put them in their places.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    meshes : mapping of str to BoundaryMesh, optional
+        Meshes of bodies by name, in the coordinates of their shapes; by default what the assembly describes.
+
+    Raises
+    ------
+    GeometryError
+        If a body cannot be divided.
+    """
+    divided: dict[int, BoundaryMesh] = {}
+    placed = []
+    for body in assembly.placed_bodies:
+        scene = assembly.scene_of(body)
+        if meshes is not None and body.name in meshes:
+            drawn = meshes[body.name]
+        else:
+            drawn = divided.setdefault(id(scene), divided.get(id(scene)) or _divided(scene, assembly, body))
+        mesh = body.placement.mesh(drawn)
+        placed.append(PlacedBody(body, scene, mesh, mesh if body.is_held else drawn))
+    return tuple(placed)
+
+
+def _divided(scene: Scene, assembly: Assembly, body: Body) -> BoundaryMesh:
+    even = [*(part.name for part in scene.contact_parts), *assembly.contact_parts(body)]
+    return scene.mesh.divide(scene.shape.outline(), scene.selections, even)
+
+
+def groups(bodies: Sequence[PlacedBody]) -> list[IntArray]:
+    """Return the numbers of the bodies that share an own mesh, in the order of the first of each."""
+    found: dict[int, list[int]] = {}
+    for number, body in enumerate(bodies):
+        found.setdefault(id(body.own_mesh), []).append(number)
+    return [np.array(numbers) for numbers in found.values()]

@@ -1,0 +1,195 @@
+"""An assembly made ready to solve: units, conditions at nodes, forces and contact rows of all bodies, once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.laws import FrictionLaw, Frictionless
+from bemkit.contact.piecewise_law import PiecewiseLaw
+from bemkit.contact.problem import LawError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
+from bemkit.model.assembled.placed import PlacedBody, groups, place
+from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, supported
+from bemkit.scene.assembly import Assembly
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedAssembly:
+    """What an assembly says on meshes.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With all contacts listed.
+    bodies : tuple of PlacedBody
+    units : Units
+        Common to all bodies: the largest body's length, the modulus of the most compliant contact, the largest load.
+    conditions : tuple of NodalConditions
+        Of each body on its own mesh; the nodes in contact are retained.
+    forces : tuple of (n_nodes, 2) array [-]
+        Given nodal forces of each body, in the axes of its own mesh.
+    rows : tuple of ContactRows
+    """
+
+    assembly: Assembly
+    bodies: tuple[PlacedBody, ...]
+    units: Units
+    conditions: tuple[NodalConditions, ...]
+    forces: tuple[FloatArray, ...]
+    rows: tuple[ContactRows, ...]
+
+    @property
+    def force_unit(self) -> float:
+        """The unit of nodal forces [N/m]."""
+        return self.units.stress * self.units.length
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return sum(rows.n_contact for rows in self.rows)
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column of `ContactRows` for all contact nodes."""
+        shape = (0, 2) if name == "points" else (0,)
+        return np.concatenate([np.zeros(shape), *(getattr(rows, name) for rows in self.rows)])
+
+    @cached_property
+    def frame(self) -> FloatArray:
+        """(n_contact, 2, 2) array: direction of contact and tangent of all contact nodes."""
+        return np.concatenate([np.zeros((0, 2, 2)), *(rows.frame for rows in self.rows)])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The contact of each contact node."""
+        return tuple(rows.name for rows in self.rows for _ in range(rows.n_contact))
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The friction law of the contact nodes, in physical units.
+
+        Raises
+        ------
+        LawError
+            If a coefficient is not finite or negative somewhere; the message names the contact.
+        """
+        laws: list[FrictionLaw] = []
+        nodes, first = [], 0
+        for rows in self.rows:
+            numbers = first + np.arange(rows.n_contact)
+            first += rows.n_contact
+            for law, chosen in ((rows.law, ~rows.is_held), (Frictionless(), rows.is_held)):
+                try:
+                    laws.append(law.at(rows.points[chosen]))
+                except ValueError as error:
+                    raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
+                nodes.append(numbers[chosen])
+        pairs = [(law, own) for law, own in zip(laws, nodes, strict=True) if own.size]
+        if len(pairs) == 1:
+            return pairs[0][0]
+        return PiecewiseLaw(*zip(*pairs, strict=True)) if pairs else Frictionless()
+
+    @property
+    def tangent_is_eliminated(self) -> FloatArray:
+        """(n_contact,) bool array: nodes without friction, or held by a support."""
+        return np.concatenate(
+            [np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)]
+        )
+
+    def under(self, assembly: Assembly) -> PreparedAssembly:
+        """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
+
+        Parameters
+        ----------
+        assembly : Assembly
+            Differs in numbers of conditions and contacts alone.
+        """
+        bodies = tuple(
+            replace(body, body=other, scene=assembly.scene_of(other))
+            for body, other in zip(self.bodies, assembly.placed_bodies, strict=True)
+        )
+        return _prepared(assembly, bodies, self.units)
+
+
+def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> PreparedAssembly:
+    """Work out what an assembly says.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    meshes : mapping of str to BoundaryMesh, optional
+        Meshes of bodies by name, in the coordinates of their shapes.
+
+    Raises
+    ------
+    GeometryError
+        If a body cannot be divided, or sides in contact face away from each other.
+    OverlapError
+        If bodies overlap by more than the interference given.
+    ConflictingSupportsError
+        If supports contradict each other at a node.
+    """
+    bodies = place(assembly, meshes)
+    assembly = assembly.with_contacts(listed_contacts(assembly, bodies)) if assembly.touching else assembly
+    return _prepared(assembly, bodies, find_common_units(assembly, bodies))
+
+
+def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units:
+    """Choose units by the largest load, the size of the largest body and the most compliant contact."""
+    numbers = {body.name: body for body in bodies}
+    length = max(body.mesh.diameter for body in bodies)
+    moduli = [
+        1.0 / sum(1.0 / numbers[side.split(".", 1)[0]].material.plane_modulus for side in pair.sides)
+        for pair in assembly.contacts
+    ]
+    modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))
+    sizes = [largest_sizes(body.scene, body.mesh, length) for body in bodies]
+    overlap = max((max(-pair.gap, pair.interference) for pair in assembly.contacts), default=0.0)
+    stress = max(*(load for load, _, _ in sizes), max([overlap, *(motion for _, motion, _ in sizes)]) / length * modulus)
+    stress = stress or max(gap for _, _, gap in sizes) / length * modulus or modulus
+    units = Units(np.mean([body.mesh.centre for body in bodies], axis=0), length, modulus, stress)
+    units.check_range()
+    return units
+
+
+def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) -> PreparedAssembly:
+    force_unit = units.stress * units.length
+    conditions, forces = [], []
+    for body in bodies:
+        own = body.units(units.modulus, force_unit)
+        supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
+        conditions.append(supported(body.own_space, supports))
+        in_place = body.units(units.modulus, force_unit, body.mesh)
+        space = body.own_space if body.own_mesh is body.mesh else body.scene.discretisation.displacement_space(
+            body.mesh.unit
+        )
+        forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, space, in_place)))
+    rows = (
+        *body_rows(assembly, assembly.contacts, bodies, conditions),
+        *obstacle_rows(bodies, conditions),
+    )
+    return PreparedAssembly(assembly, bodies, units, _retained(bodies, conditions, rows), tuple(forces), rows)
+
+
+def _retained(
+    bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions], rows: Sequence[ContactRows]
+) -> tuple[NodalConditions, ...]:
+    """Retain all nodes that a contact row involves, alike in all bodies that share a mesh."""
+    touched = [np.zeros(body.space.n_dofs // 2, bool) for body in bodies]
+    for one in rows:
+        touched[one.body][one.on_body.indices] = True
+        if one.on_other is not None:
+            touched[one.other][one.on_other.indices] = True
+    for group in groups(bodies):
+        union = np.any([touched[number] for number in group], axis=0)
+        for number in group.tolist():
+            touched[number] = union
+    return tuple(
+        replace(each, is_retained=own[:, None] & ~each.is_fixed) for each, own in zip(conditions, touched, strict=True)
+    )

@@ -1,0 +1,202 @@
+"""The result of an assembly: the fields of each body, the contacts between them, and how the solve ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.certificate import Certificate
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.counts import OperationCounts
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.part_forces import ContactForce, PartForce, part_force
+from bemkit.results.solution import BoundaryFields
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.solvers.base import Status, StepRecord
+
+
+@dataclass(frozen=True, eq=False)
+class BodyResult:
+    """One body of a solved assembly; `bemkit.interior_fields` takes it like a solution.
+
+    Parameters
+    ----------
+    name : str
+    scene : Scene
+        What was said of the body alone, its mesh in the coordinates of its shape.
+    mesh : BoundaryMesh
+        In its place.
+    boundary : BoundaryFields
+    energy : float [J/m]
+        Elastic energy of this body.
+    """
+
+    name: str
+    scene: Scene
+    mesh: BoundaryMesh
+    boundary: BoundaryFields
+    energy: float
+
+    def __repr__(self) -> str:
+        """Return one line."""
+        return f"BodyResult({self.name!r}: {self.mesh.n_elements} elements)"
+
+    @cached_property
+    def element_errors(self) -> FloatArray | None:
+        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
+        discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
+        if not discretisation.estimates_error:
+            return None
+        boundary, make_space = self.boundary, discretisation.displacement_space
+        if make_space(self.mesh).degree > 2:
+            from bemkit.results.coefficient_decay import coefficient_errors
+
+            tractions = discretisation.traction_space(self.mesh)
+            at_nodes = boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
+            space = make_space(self.mesh)
+            return coefficient_errors(space, tractions, boundary.displacement, at_nodes, modulus).energy
+        from bemkit.results.error_indicators import squared_errors
+
+        return squared_errors(self.mesh, make_space, boundary.displacement, boundary.traction, modulus)
+
+    @cached_property
+    def part_forces(self) -> tuple[PartForce, ...]:
+        """The resultants of the tractions on each part."""
+        space = self.scene.discretisation.traction_space(self.mesh)
+        traction = self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
+        return tuple(
+            part_force(f"{self.name}.{part}", self.mesh, space, traction, elements)
+            for part, elements in self.mesh.parts.items()
+        )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result without its fields."""
+        return {
+            "n_elements": self.mesh.n_elements,
+            "energy": self.energy,
+            "parts": {part: force.as_dict() for part, force in zip(self.mesh.parts, self.part_forces, strict=True)},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblySolution:
+    """What `bemkit.run` returns of an assembly.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With all contacts listed, those found by `Assembly.touching` among them.
+    bodies : mapping of str to BodyResult
+        By name, in the order of the assembly.
+    status : Status
+    certificate : Certificate
+    contact : ContactTable
+        One row for each multiplier node; `part` is the name of the contact, displacements are relative ones: those of
+        the body with the node less those of its partner.
+    contacts : tuple of ContactForce
+        What each contact transmits.
+    history : tuple of StepRecord
+    linear_solves, outer_steps : int
+    transitions : tuple of Transition
+    timings : mapping of str to float [s]
+    work : OperationCounts
+    message : str
+    memory : mapping of str to int [bytes]
+    warnings : tuple of str
+    """
+
+    assembly: Assembly
+    bodies: Mapping[str, BodyResult]
+    status: Status
+    certificate: Certificate
+    contact: ContactTable
+    contacts: tuple[ContactForce, ...]
+    history: tuple[StepRecord, ...]
+    linear_solves: int
+    outer_steps: int
+    transitions: tuple[Transition, ...]
+    timings: Mapping[str, float]
+    work: OperationCounts
+    message: str = ""
+    memory: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return one line; the fields hold thousands of numbers."""
+        status = self.status.name.lower().replace("_", " ")
+        sizes = f"{len(self.bodies)} bodies, {self.n_elements} elements, {self.contact.n_contact} contact nodes"
+        return f"AssemblySolution({self.assembly.title!r}: {status}, {sizes})"
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether contact, friction and equilibrium hold on the meshes, be they fine enough or not."""
+        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements of all bodies."""
+        return sum(body.mesh.n_elements for body in self.bodies.values())
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy of all bodies [J/m]."""
+        return sum(body.energy for body in self.bodies.values())
+
+    @property
+    def force_normal(self) -> float:
+        """Sum of the pressing forces of all contacts [N/m], positive."""
+        return sum(contact.force_normal for contact in self.contacts)
+
+    @property
+    def force_tangential(self) -> float:
+        """Sum of the friction forces of all contacts along their tangents [N/m]."""
+        return sum(contact.force_tangential for contact in self.contacts)
+
+    @cached_property
+    def estimated_error(self) -> float | None:
+        """Estimated error in the energy norm of all bodies, relative to the solution; None without an estimate."""
+        errors = [body.element_errors for body in self.bodies.values()]
+        if any(each is None for each in errors) or not self.energy > 0.0:
+            return None
+        return float(np.sqrt(sum(float(each.sum()) for each in errors if each is not None) / (2.0 * self.energy)))
+
+    def contact_elements(self, body: str) -> IntArray:
+        """Return the elements of a body that may touch other bodies."""
+        mesh = self.bodies[body].mesh
+        sides = [side.split(".", 1) for pair in self.assembly.contacts for side in pair.sides]
+        parts = dict.fromkeys(part for owner, part in sides if owner == body)
+        return np.concatenate([np.zeros(0, np.intp), *(mesh.part(part) for part in parts)])
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result without its fields, under the names of the JSON output; see `Solution.summary`."""
+        return {
+            "title": self.assembly.title,
+            "status": self.status.name.lower(),
+            "message": self.message or self.status.value,
+            "converged": self.is_converged,
+            "certified": self.is_certified,
+            "warnings": list(self.warnings),
+            "n_bodies": len(self.bodies),
+            "n_elements": self.n_elements,
+            "n_contact": self.contact.n_contact,
+            **{name: getattr(self, name) for name in ("linear_solves", "outer_steps", "force_normal")},
+            **{name: getattr(self, name) for name in ("force_tangential", "energy", "estimated_error")},
+            "contacts": [contact.as_dict() for contact in self.contacts],
+            "bodies": {name: body.summary() for name, body in self.bodies.items()},
+            "transitions": [transition.as_dict() for transition in self.transitions],
+            "certificate": self.certificate.as_dict(),
+            "timings": dict(self.timings),
+            "work": self.work.as_dict(),
+            "memory": dict(self.memory),
+        }

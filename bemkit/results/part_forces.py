@@ -1,0 +1,145 @@
+"""What people ask of a part or a contact: forces, moment, contact length, peak pressure, largest slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.solvers.active_sets import NodeStatus
+
+
+@dataclass(frozen=True)
+class PartForce:
+    """The resultant of the tractions on a part of the boundary.
+
+    Parameters
+    ----------
+    name : str
+    force_x, force_y : float [N/m]
+        On the body.
+    moment : float [N m/m]
+        About the origin, anticlockwise.
+    """
+
+    name: str
+    force_x: float
+    force_y: float
+    moment: float
+
+    def as_dict(self) -> dict[str, float | str]:
+        """Return the entries by name."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class ContactForce(PartForce):
+    """What a contact transmits; forces and moment are those on the body whose nodes carry the multipliers.
+
+    Parameters
+    ----------
+    force_normal : float [N/m]
+        Total pressing force, positive: minus the integral of sigma_n.
+    force_tangential : float [N/m]
+        Integral of sigma_t.
+    contact_length : float [m]
+        Length of boundary in contact, between the places where the status changes.
+    peak_pressure : float [Pa]
+    largest_slip : float [m]
+        Of nodes in contact.
+    """
+
+    force_normal: float
+    force_tangential: float
+    contact_length: float
+    peak_pressure: float
+    largest_slip: float
+
+
+def part_force(
+    name: str, mesh: BoundaryMesh, space: BoundarySpace, traction: FloatArray, elements: FloatArray
+) -> PartForce:
+    """Integrate tractions over some elements.
+
+    Parameters
+    ----------
+    name : str
+    mesh : BoundaryMesh
+        In physical units.
+    space : BoundarySpace
+        Of the tractions.
+    traction : (n_elements, n_local, 2) array [Pa]
+    elements : (m,) int array
+    """
+    xi, weights = gauss_legendre(space.degree + 4)
+    values = np.einsum("lq,elc->eqc", space.basis(xi), traction[elements])
+    measured = values * (mesh.jacobian(elements, xi) * weights)[:, :, None]
+    x, y = np.moveaxis(mesh.points(elements, xi), 2, 0)
+    force = measured.sum(axis=(0, 1))
+    moment = float(np.sum(x * measured[:, :, 1] - y * measured[:, :, 0]))
+    return PartForce(name, float(force[0]), float(force[1]), moment)
+
+
+def contact_forces(
+    table: ContactTable, frame: FloatArray, transitions: Sequence[Transition], slip: FloatArray | None = None
+) -> tuple[ContactForce, ...]:
+    """Sum up the nodes of each contact.
+
+    Parameters
+    ----------
+    table : ContactTable
+    frame : (n_contact, 2, 2) array
+        Directions of contact and tangents of the nodes.
+    transitions : sequence of Transition
+        Of the same table.
+    slip : (n_contact,) array [m], optional
+        ``u_t`` by default.
+    """
+    slip = table.u_t if slip is None else slip
+    nodal = table.weight[:, None] * np.stack([table.sigma_n, table.sigma_t], axis=1)
+    forces = np.einsum("nk,nkc->nc", nodal, frame)
+    moments = table.x * forces[:, 1] - table.y * forces[:, 0]
+    is_closed = table.status != NodeStatus.SEPARATED
+    found = []
+    for part in table.parts:
+        own = table.rows(part)
+        closed = own & is_closed
+        force_x, force_y = forces[own].sum(axis=0).tolist()
+        found.append(
+            ContactForce(
+                name=part,
+                force_x=force_x,
+                force_y=force_y,
+                moment=float(moments[own].sum()),
+                force_normal=-float(nodal[own, 0].sum()),
+                force_tangential=float(nodal[own, 1].sum()),
+                contact_length=_contact_length(table, part, transitions),
+                peak_pressure=float(np.max(-table.sigma_n[own], initial=0.0)),
+                largest_slip=float(np.abs(slip[closed]).max(initial=0.0)),
+            )
+        )
+    return tuple(found)
+
+
+def _contact_length(table: ContactTable, part: str, transitions: Sequence[Transition]) -> float:
+    """Return the length of the pieces of a part, between its ends and transitions, whose nodes are closed."""
+    own = table.rows(part)
+    s, half = table.s[own], 0.5 * table.weight[own]
+    is_closed = table.status[own] != NodeStatus.SEPARATED
+    begin = max(float(s[0] - half[0]), 0.0)
+    total, length = float(table.weight[own].sum()), 0.0
+    places = [each for each in transitions if each.part == part and "separated" in (each.from_status, each.to_status)]
+    inside, last = bool(is_closed[0]), begin
+    for place in places:
+        if inside:
+            length += place.s - last
+        inside, last = place.to_status != "separated", place.s
+    if inside:
+        length += begin + total - last
+    return min(length, total)

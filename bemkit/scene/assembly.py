@@ -1,0 +1,253 @@
+"""What the user states of several elastic bodies: their places, their contacts with each other, and how to solve."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.contact.laws import FrictionLaw, Frictionless
+from bemkit.errors import InputError
+from bemkit.formulas import closest
+from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
+from bemkit.scene.body import Body
+from bemkit.scene.conditions import Contact, Free, Part
+from bemkit.scene.discretisation import Discretisation, LinearGalerkin
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import Scene
+from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.ssn import SemismoothNewton
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """Two sides of bodies that may touch.
+
+    Parameters
+    ----------
+    sides : (str, str)
+        Each ``"body.part"``, or ``"body.side"`` by the name of a side of its shape. Two sides of one body may touch,
+        too, as in a split ring.
+    law : FrictionLaw, optional
+        That of the assembly if left out.
+    gap : float [m]
+        Added to the distance of the shapes; negative presses bodies together that are drawn touching.
+    interference : float [m]
+        Largest overlap of the shapes as they are drawn that is meant; more is an error.
+    multipliers_on : str, optional
+        The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`.
+
+    Raises
+    ------
+    InputError
+        If a name has no dot, a side shall touch itself, a length is not finite, or the multipliers are on neither side.
+    """
+
+    sides: tuple[str, str]
+    law: FrictionLaw | None = None
+    gap: float = 0.0
+    interference: float = 0.0
+    multipliers_on: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sides", tuple(self.sides))
+        if len(self.sides) != 2 or any(side.count(".") < 1 for side in self.sides):
+            raise InputError(f"contact sides are {self.sides}: give two, each as 'body.side'")
+        if self.sides[0] == self.sides[1]:
+            raise InputError(f"the contact of {self.sides[0]!r} is with itself: give two sides")
+        if not np.isfinite(self.gap):
+            raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
+        if not 0.0 <= self.interference < np.inf:
+            raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
+        if self.multipliers_on is not None and self.multipliers_on not in self.sides:
+            raise InputError(
+                f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides"
+            )
+
+    @property
+    def name(self) -> str:
+        """What the contact is called in results."""
+        return " / ".join(self.sides)
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Every two sides of different bodies that face each other are in contact, sides that are free as a whole.
+
+    Parameters
+    ----------
+    within : float [m]
+        Largest distance of sides that face each other.
+    law : FrictionLaw, optional
+        That of the assembly if left out.
+
+    Raises
+    ------
+    InputError
+        If the distance is negative or not finite.
+    """
+
+    within: float
+    law: FrictionLaw | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.within < np.inf:
+            raise InputError(f"touching.within is {self.within}: give a length, zero or positive")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assembly:
+    """Several elastic bodies with their contacts, supports and loads: everything that determines the solution.
+
+    Parameters
+    ----------
+    title : str
+    bodies : tuple of Body
+    contacts : tuple of ContactPair
+    touching : Touching, optional
+        Finds contacts where bodies face each other, besides those that are listed.
+    law : FrictionLaw
+        In all contacts that have no law of their own, with bodies and with rigid obstacles.
+    discretisation : Discretisation
+        Of all bodies that have none of their own.
+    linear_solver : LinearSolver or Automatic
+    mesh : MeshOptions
+        Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
+    solver : ContactSolver
+    description, reference : str
+        For the reader.
+
+    Raises
+    ------
+    InputError
+        If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
+        listed twice, or an accuracy is asked of collocation or goes with elements of a body.
+    """
+
+    title: str
+    bodies: tuple[Body, ...]
+    contacts: tuple[ContactPair, ...] = ()
+    touching: Touching | None = None
+    law: FrictionLaw = field(default_factory=Frictionless)
+    discretisation: Discretisation = field(default_factory=LinearGalerkin)
+    linear_solver: LinearSolverChoice = field(default_factory=Automatic)
+    mesh: MeshOptions = field(default_factory=MeshOptions)
+    solver: ContactSolver = field(default_factory=SemismoothNewton)
+    description: str = ""
+    reference: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.title or not self.title.isprintable():
+            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        if not self.bodies:
+            raise InputError("bodies is empty: give at least one body")
+        repeated = [name for name, count in Counter(body.name for body in self.placed_bodies).items() if count > 1]
+        if repeated:
+            raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
+        pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
+        for pair in self.contacts:
+            if pairs[frozenset(pair.sides)] > 1:
+                raise InputError(f"contact {pair.name!r} is listed twice: leave one out")
+            for side in pair.sides:
+                self._check_side(side)
+        if self.mesh.accuracy is not None:
+            self._check_accuracy(self.mesh.accuracy)
+        for body in self.placed_bodies:
+            _ = self.scene_of(body)  # parts and sides are checked
+
+    def _check_accuracy(self, accuracy: float) -> None:
+        for body in self.bodies:
+            discretisation = self.discretisation if body.discretisation is None else body.discretisation
+            if not discretisation.estimates_error:
+                raise InputError(
+                    f"mesh.accuracy is {accuracy}: {discretisation.method}, of body {body.name!r}, has no error "
+                    "estimate: choose the discretisation 'quadratic' or 'linear', or give elements"
+                )
+            if body.mesh is not None:
+                raise InputError(
+                    f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
+                )
+
+    def _check_side(self, side: str) -> None:
+        body, part = side.split(".", 1)
+        if body not in self._by_name:
+            names = list(self._by_name)
+            listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+            raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
+        _ = self._by_name[body].contact_part(part)
+
+    @cached_property
+    def placed_bodies(self) -> tuple[Body, ...]:
+        """The bodies, every copy a body of its own."""
+        return tuple(placed for body in self.bodies for placed in body.copied())
+
+    @cached_property
+    def _by_name(self) -> Mapping[str, Body]:
+        return {body.name: body for body in self.placed_bodies}
+
+    @cached_property
+    def _contact_parts(self) -> Mapping[str, tuple[str, ...]]:
+        """The parts in contact of each body that is listed as such."""
+        named: dict[str, list[str]] = {}
+        for pair in self.contacts:
+            for side in pair.sides:
+                body, part = side.split(".", 1)
+                named.setdefault(body, []).append(part)
+        return {body: tuple(dict.fromkeys(parts)) for body, parts in named.items()}
+
+    def contact_parts(self, body: Body) -> tuple[str, ...]:
+        """Return the names of the parts and sides of a placed body that may touch other bodies."""
+        listed = self._contact_parts.get(body.name, ())
+        if self.touching is None:
+            return listed
+        taken = {side for part in body.parts for side in part.sides}
+        whole = any(not part.sides for part in body.parts)
+        free = [part.name for part in body.parts if isinstance(part.condition, Free)]
+        sides = [] if whole else [side for side in body.shape.outline().side_names if side not in taken]
+        return tuple(dict.fromkeys([*listed, *free, *sides]))
+
+    @cached_property
+    def _scenes(self) -> dict[tuple[object, ...], Scene]:
+        """What is said of bodies; copies share it."""
+        return {}
+
+    def scene_of(self, body: Body) -> Scene:
+        """Return what is said of one placed body, in its own coordinates: sides in contact are free parts.
+
+        Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in common.
+        """
+        key = (id(body.shape), id(body.parts), body.material, id(body.mesh), id(body.discretisation))
+        key = (*key, self.contact_parts(body))
+        if key not in self._scenes:
+            self._scenes[key] = self._new_scene(body)
+        return self._scenes[key]
+
+    def _new_scene(self, body: Body) -> Scene:
+        named = {part.name for part in body.parts}
+        facing = [body.contact_part(name) for name in self.contact_parts(body)]
+        parts: tuple[Part, ...] = (*body.parts, *(part for part in facing if part.name not in named))
+        touches_obstacle = any(isinstance(part.condition, Contact) for part in parts)
+        try:
+            return Scene(
+                title=body.name,
+                shape=body.shape,
+                material=body.material,
+                parts=parts,
+                law=self.law if touches_obstacle else Frictionless(),
+                discretisation=self.discretisation if body.discretisation is None else body.discretisation,
+                linear_solver=self.linear_solver,
+                mesh=self.mesh if body.mesh is None else body.mesh,
+            )
+        except InputError as error:
+            raise type(error)(f"body {body.name!r}: {error}") from error
+
+    def law_of(self, pair: ContactPair | Touching) -> FrictionLaw:
+        """Return the friction law of a contact."""
+        return self.law if pair.law is None else pair.law
+
+    def with_contacts(self, contacts: tuple[ContactPair, ...]) -> Assembly:
+        """Return the assembly with all its contacts listed."""
+        return replace(self, contacts=contacts, touching=None)

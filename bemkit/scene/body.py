@@ -1,0 +1,101 @@
+"""One of several elastic bodies: what stands where, and what acts on it besides its contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from bemkit.errors import InputError
+from bemkit.formulas import closest
+from bemkit.geometry.placement import Placement
+from bemkit.geometry.shapes import Shape
+from bemkit.operators.material import Material
+from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
+from bemkit.scene.copies import Copies
+from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.mesh_options import MeshOptions
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """An elastic body of an `Assembly`.
+
+    Parameters
+    ----------
+    name : str
+        Without a dot: contacts name sides as ``"body.side"``.
+    shape : Shape
+        In coordinates of its own.
+    material : Material
+    parts : tuple of Part
+        Supports, loads and rigid obstacles. `Part.where` is in the coordinates of the shape; loads, given displacements
+        and obstacles are in those of the scene, where the body is placed.
+    placement : Placement
+        Where the body stands: turned, then shifted.
+    copies : Copies, optional
+        Makes many of it, each named ``"name-..."``; copies that no support holds share one factorisation.
+    discretisation : Discretisation, optional
+        That of the assembly if left out.
+    mesh : MeshOptions, optional
+        A number of elements for this body; those of the assembly if left out.
+
+    Raises
+    ------
+    InputError
+        If the name is empty or has a dot, two parts share a name, or the mesh options ask for an accuracy.
+    """
+
+    name: str
+    shape: Shape
+    material: Material
+    parts: tuple[Part, ...] = ()
+    placement: Placement = Placement()
+    copies: Copies | None = None
+    discretisation: Discretisation | None = None
+    mesh: MeshOptions | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name or not self.name.isprintable() or "." in self.name:
+            raise InputError(f"the body name {self.name!r} does not do: give printable text without a dot")
+        names = [part.name for part in self.parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"body {self.name!r}: {name!r} is the name of two parts: give each its own name")
+        if self.mesh is not None and self.mesh.accuracy is not None:
+            raise InputError(f"body {self.name!r}: an accuracy is that of all bodies: give it to the assembly")
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a support or a rigid obstacle belongs to the body, so that it is no copy of another."""
+        return any(
+            isinstance(part.condition, Clamped | Roller | PrescribedDisplacement | Contact) for part in self.parts
+        )
+
+    def copied(self) -> Iterator[Body]:
+        """Yield the body in each of its places."""
+        if self.copies is None:
+            yield self
+            return
+        for suffix, place in self.copies.placements().items():
+            yield replace(self, name=f"{self.name}-{suffix}", placement=place.after(self.placement), copies=None)
+
+    def contact_part(self, name: str) -> Part:
+        """Return the part or side that a contact names.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name, or something acts on it.
+        """
+        for part in self.parts:
+            if part.name == name:
+                if not isinstance(part.condition, Free):
+                    kind = type(part.condition).__name__
+                    raise InputError(f"part {self.name}.{name} is {kind}: a part in contact with a body must be free")
+                return part
+        sides = self.shape.outline().side_names
+        if name not in sides:
+            known = [*(part.name for part in self.parts), *sides]
+            listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
+            raise InputError(f"body {self.name!r} has no part or side {name!r}: there are {listed}{closest(name, known)}")
+        return Part(name, Free(), sides=(name,))
