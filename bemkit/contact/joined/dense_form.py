@@ -1,0 +1,84 @@
+"""Few members: the dense stiffness of their relative displacements, found once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
+from bemkit.operators.linear.dense import DenseLU
+
+if TYPE_CHECKING:
+    from bemkit.contact.joined.joined_bodies import JoinedBodies
+
+_TIED = "the bodies tied to each other at all contact nodes (a tie that others imply may have to be left out)"
+
+
+class RelativeStiffness:
+    """Forces at the contact nodes that go with relative displacements, whatever the loads.
+
+    Parameters
+    ----------
+    joined : JoinedBodies
+
+    Raises
+    ------
+    SingularMatrixError
+        If a tie repeats what others say.
+
+    Notes
+    -----
+    With the flexibility G of the members, their motions R and the coupling B the unknowns p (nodal forces) and a
+    (motions) solve ``B G B^T p + B R a = w - o - B G f`` and ``R^T B^T p = -R^T f``; the inverse of this matrix holds
+    the stiffness of w. Rows of eliminated tangents are left out: there p = 0, and w follows.
+    """
+
+    def __init__(self, joined: JoinedBodies) -> None:
+        is_kept = np.ones((joined.n_contact, 2), bool)
+        is_kept[joined.tangent_is_eliminated, 1] = False
+        self._is_kept = is_kept.ravel()
+        self._coupling = joined.relative[self._is_kept]
+        self._followers = joined.relative[~self._is_kept]
+        self._unit_deformation = joined.deformation(self._coupling.T.toarray())
+        n_kept, motions = self._coupling.shape[0], (self._coupling @ joined.motions).toarray()
+        n_motions = motions.shape[1]
+        matrix = np.zeros((n_kept + n_motions, n_kept + n_motions))
+        matrix[:n_kept, :n_kept] = joined.modulus * (self._coupling @ self._unit_deformation)
+        matrix[:n_kept, n_kept:] = motions
+        matrix[n_kept:, :n_kept] = motions.T
+        scale = np.append(np.full(n_kept, joined.modulus), np.ones(n_motions))  # of the unknowns: p / E', a
+        inverse = scale[:, None] * DenseLU(matrix, _TIED).solve(np.eye(n_kept + n_motions))
+        self._inverse = inverse  # from w - o - B G f and -R^T f / E' to p and a
+        self._stiffness = inverse[:n_kept, :n_kept]
+        if joined.is_symmetric:
+            self._stiffness = 0.5 * (self._stiffness + self._stiffness.T)
+
+    def body(self, joined: JoinedBodies) -> DenseBody:
+        """Return the body under the loads and offsets of `joined`."""
+        n_kept, load = self._coupling.shape[0], joined.load
+        loaded = joined.deformation(load)
+        right_side = np.append(
+            -(joined.offset[self._is_kept] + self._coupling @ loaded), -(joined.motions.T @ load) / joined.modulus
+        )
+        at_rest = self._inverse @ right_side  # p and a where no relative displacement is allowed
+        return DenseBody(
+            stiffness=self._stiffness,
+            load=-at_rest[:n_kept],
+            weights=joined.weights,
+            motions=(joined.relative @ joined.motions).T.toarray().reshape(-1, joined.n_contact, 2),
+            eliminated_tangents=self._eliminated(joined, loaded, at_rest),
+            modulus=joined.stiffness_scale * float(np.median(joined.weights)),
+        )
+
+    def _eliminated(self, joined: JoinedBodies, loaded: FloatArray, at_rest: FloatArray) -> EliminatedTangents | None:
+        if not joined.tangent_is_eliminated.any():
+            return None
+        n_kept = self._coupling.shape[0]
+        by_force = self._followers @ self._unit_deformation
+        by_motion = (self._followers @ joined.motions).toarray()
+        response = by_force @ self._stiffness + by_motion @ self._inverse[n_kept:, :n_kept]
+        rest = joined.offset[~self._is_kept] + self._followers @ loaded
+        rest = rest + by_force @ at_rest[:n_kept] + by_motion @ at_rest[n_kept:]
+        return EliminatedTangents(np.flatnonzero(joined.tangent_is_eliminated), response, rest)

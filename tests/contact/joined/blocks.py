@@ -1,0 +1,139 @@
+"""Scenes of many blocks in mutual contact: elastic shapes condensed once, and pairs of coincident nodes.
+
+After the measured prototype: weight by a particular stress, running bond whose head joints have no contact node where
+they meet a bed joint (the two bed contacts there imply it).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from bemkit.contact.joined.joined_bodies import JoinedBodies
+from bemkit.contact.joined.member import Member
+from bemkit.geometry import Polygon, discretise
+from bemkit.geometry.spaces import dof_points
+from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import rigid_motions
+from bemkit.operators.steklov_poincare.maps import GalerkinMap
+from bemkit.operators.steklov_poincare.nodal_conditions import supported
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A polygon, all of whose boundary displacements are retained."""
+
+    vertices: tuple
+    n_elements: int
+    poisson_ratio: float = 0.2
+    youngs_modulus: float = 1.0
+
+    @cached_property
+    def elastic(self):
+        mesh = discretise(Polygon(self.vertices).outline(), n_elements=self.n_elements)
+        return GalerkinMap(mesh, Material(self.youngs_modulus, self.poisson_ratio))
+
+    @cached_property
+    def points(self):
+        return dof_points(self.elastic.displacement_space)
+
+    @cached_property
+    def stiffness(self):
+        return np.array(self.elastic.matrix())
+
+    @cached_property
+    def motions(self):
+        return np.ascontiguousarray(rigid_motions(self.points, self.points.mean(axis=0), 1.0).reshape(-1, 3).T)
+
+    @cached_property
+    def weights(self):
+        """(2, 2 n): loads of a unit body force along x, along y; the stress sigma_kk = -x_k is a particular one."""
+        modulus = self.youngs_modulus / (1.0 - self.poisson_ratio**2)
+        ratio = self.poisson_ratio / (1.0 - self.poisson_ratio)
+        loads = []
+        for k in (0, 1):
+            along, across = self.points[:, k], self.points[:, 1 - k]
+            particular = np.zeros_like(self.points)
+            particular[:, k] = -(along**2 + ratio * across**2) / (2 * modulus)
+            particular[:, 1 - k] = ratio * along * across / modulus
+            everywhere = np.arange(self.elastic.displacement_space.mesh.n_elements)
+            forces = self.elastic.nodal_forces(
+                everywhere, lambda p, m, k=k: np.where(np.arange(2) == k, -p[..., [k]] * m[..., [k]], 0.0)
+            )
+            loads.append(self.stiffness @ particular.ravel() - forces.ravel())
+        return np.array(loads)
+
+    @property
+    def modulus(self):
+        return self.youngs_modulus / (1.0 - self.poisson_ratio**2)
+
+    def member(self, gravity=(0.0, 0.0), *, angle=0.0, name="", load=None, held=()):
+        """One copy, turned by an angle [rad]; held: displacement components that are zero."""
+        c, s = np.cos(angle), np.sin(angle)
+        in_own_axes = np.array([c * gravity[0] + s * gravity[1], -s * gravity[0] + c * gravity[1]])
+        total = in_own_axes @ self.weights + (0.0 if load is None else load)
+        return Member(self.stiffness, total, self.motions, self.modulus, name)
+
+    def node(self, x, y):
+        distance = np.hypot(*(self.points - [x, y]).T)
+        assert distance.min() < 1e-9, (x, y)
+        return int(np.argmin(distance))
+
+
+def rectangle(width, height, per_unit, **material):
+    corners = ((0.0, 0.0), (width, 0.0), (width, height), (0.0, height))
+    return Block(corners, int(round(2 * per_unit * (width + height))), **material)
+
+
+def joined(members, angles, pairs, *, is_frictionless=None, offset=None, **options):
+    """Join members by pairs of nodes: rows (a, node, b, node, n_x, n_y, weight), b = -1 for a rigid foundation."""
+    pairs = np.asarray(pairs, float)
+    a, i, b, j = pairs[:, :4].astype(int).T
+    first = np.cumsum([0, *(member.n_components for member in members)])
+    frame = np.stack([pairs[:, 4:6], np.stack([-pairs[:, 5], pairs[:, 4]], axis=1)], axis=1)
+    rows, columns, values = [], [], []
+    for sign, body, node in ((1.0, a, i), (-1.0, b, j)):
+        there = np.flatnonzero(body >= 0)
+        c, s = np.cos(angles)[body[there]], np.sin(angles)[body[there]]
+        turn = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)  # own axes to x, y
+        values.append(sign * frame[there] @ turn)
+        rows.append(np.broadcast_to(2 * there[:, None, None] + np.array([[0], [1]]), (there.size, 2, 2)))
+        at = (first[body[there]] + 2 * node[there])[:, None, None] + np.array([[0, 1]])
+        columns.append(np.broadcast_to(at, (there.size, 2, 2)))
+    entries = [np.concatenate([part.ravel() for part in parts]) for parts in (values, rows, columns)]
+    relative = sparse.csr_array((entries[0], (entries[1], entries[2])), (2 * len(pairs), first[-1]))
+    relative.eliminate_zeros()
+    none = np.zeros(len(pairs), bool)
+    return JoinedBodies(
+        tuple(members),
+        relative,
+        np.zeros(2 * len(pairs)) if offset is None else offset,
+        pairs[:, 6],
+        none if is_frictionless is None else none | is_frictionless,
+        **options,
+    )
+
+
+def row_of_blocks(moduli=(1.0, 1.0), *, m=4, width=1.0, press=0.3, lift=0.05, **options):
+    """Blocks side by side between rigid walls, pressed together: each carries a load of its own; x grows to the right.
+
+    The first stands against a rigid wall on its left, the last against one on its right.
+    """
+    blocks = [rectangle(width, 1.0, m, youngs_modulus=modulus) for modulus in moduli]
+    members = []
+    for k, block in enumerate(blocks):
+        mesh = block.elastic.displacement_space.mesh
+        tops = np.flatnonzero(mesh.points(np.arange(mesh.n_elements), np.zeros(1))[:, 0, 1] > 1.0 - 1e-9)
+        load = block.elastic.nodal_forces(
+            tops, lambda x, _, k=k: np.stack([press * (x[..., 0] - 0.3 * k), -lift * (1.0 + x[..., 0])], axis=-1)
+        )
+        members.append(block.member(load=load.ravel(), name=f"block {k + 1}"))
+    pairs = []
+    for r in range(m + 1):
+        y, weight = r / m, (0.5 if r in (0, m) else 1.0) / m
+        pairs.append((0, blocks[0].node(0.0, y), -1, -1, -1, 0, weight))
+        for k in range(1, len(blocks)):
+            pairs.append((k, blocks[k].node(0.0, y), k - 1, blocks[k - 1].node(width, y), -1, 0, weight))
+        pairs.append((len(blocks) - 1, blocks[-1].node(width, y), -1, -1, 1, 0, weight))
+    return joined(members, np.zeros(len(blocks)), pairs, **options)
