@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace
@@ -63,7 +63,7 @@ class ContactForce(PartForce):
 
 
 def part_force(
-    name: str, mesh: BoundaryMesh, space: BoundarySpace, traction: FloatArray, elements: FloatArray
+    name: str, mesh: BoundaryMesh, space: BoundarySpace, traction: FloatArray, elements: IntArray
 ) -> PartForce:
     """Integrate tractions over some elements.
 

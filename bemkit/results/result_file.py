@@ -37,7 +37,7 @@ from bemkit.results.solution import BoundaryFields, ContactTable, Solution, Tran
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure, unstructure
-from bemkit.scene.toml import MAX_BYTES, SceneError, single_body_from_toml, scene_to_toml
+from bemkit.scene.toml import MAX_BYTES, SceneError, scene_to_toml, single_body_from_toml
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:

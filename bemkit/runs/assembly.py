@@ -132,7 +132,11 @@ def _solution(model: AssembledModel, result: ContactSolution, clock: StageClock)
     ):
         space = body.scene.discretisation.traction_space(body.mesh)
         fields = BoundaryFields(
-            dof_points(body.space), displacement, body.mesh.centres.copy(), mean_tractions(space, traction), traction.reshape(-1, 2)
+            dof_points(body.space),
+            displacement,
+            body.mesh.centres.copy(),
+            mean_tractions(space, traction),
+            traction.reshape(-1, 2),
         )
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
     clock = clock.closed(Stage.RECOVER)

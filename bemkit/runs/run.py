@@ -54,11 +54,12 @@ def run(
     ----------
     scene : Scene or Assembly
     mesh : BoundaryMesh, optional
-        Of a single body: a mesh of one's own with the parts of the scene; by default the one the scene describes, or as many as its
-        accuracy needs.
+        Of a single body: a mesh of one's own with the parts of the scene; by default the one the scene describes, or as
+        many as its accuracy needs.
     start : Solution, optional
-        Of a single body: where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node sticks. Where a scene
-        has several solutions the start chooses among them. Refused without contact, where there is only one.
+        Of a single body: where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node
+        sticks. Where a scene has several solutions the start chooses among them. Refused without contact, where there
+        is only one.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 

@@ -219,8 +219,8 @@ class Assembly:
 
         Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in common.
         """
-        key = (id(body.shape), id(body.parts), body.material, id(body.mesh), id(body.discretisation))
-        key = (*key, self.contact_parts(body))
+        identities = (id(each) for each in (body.shape, body.parts, body.mesh, body.discretisation))
+        key = (*identities, body.material, self.contact_parts(body))
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
         return self._scenes[key]

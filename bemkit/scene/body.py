@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
@@ -49,7 +49,7 @@ class Body:
     shape: Shape
     material: Material
     parts: tuple[Part, ...] = ()
-    placement: Placement = Placement()
+    placement: Placement = field(default_factory=Placement)
     copies: Copies | None = None
     discretisation: Discretisation | None = None
     mesh: MeshOptions | None = None
@@ -97,5 +97,7 @@ class Body:
         if name not in sides:
             known = [*(part.name for part in self.parts), *sides]
             listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
-            raise InputError(f"body {self.name!r} has no part or side {name!r}: there are {listed}{closest(name, known)}")
+            raise InputError(
+                f"body {self.name!r} has no part or side {name!r}: there are {listed}{closest(name, known)}"
+            )
         return Part(name, Free(), sides=(name,))

@@ -49,9 +49,7 @@ class GridCopies:
     def placements(self) -> dict[str, Placement]:
         """Return the places as ``column-row``, both from 1."""
         x, y = self.step
-        return {
-            f"{i + 1}-{k + 1}": Placement((i * x, k * y)) for k in range(self.rows) for i in range(self.columns)
-        }
+        return {f"{i + 1}-{k + 1}": Placement((i * x, k * y)) for k in range(self.rows) for i in range(self.columns)}
 
 
 @dataclass(frozen=True)

@@ -75,8 +75,8 @@ _MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
         "parts": "add tables [parts.NAME] with sides and condition",
         "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
         "bodies": "add tables [bodies.NAME], each with a shape and a material",
-    "sides": "add sides = ['one.top', 'two.bottom'], each a body and one of its sides",
-    "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
+        "sides": "add sides = ['one.top', 'two.bottom'], each a body and one of its sides",
+        "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
     }
 )
 

@@ -11,7 +11,9 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import nodes_on
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.mortar import ContactSide, MortarCoupling, couple, find_facing, is_better_non_mortar
+from bemkit.contact.mortar.coupling import MortarCoupling, couple
+from bemkit.contact.mortar.facing import find_facing, is_non_mortar
+from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody
@@ -151,7 +153,7 @@ def body_rows(
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
     found: dict[int, ContactRows] = {}
     for k in sorted(range(len(pairs)), key=lambda k: -lengths[k]):
-        (first, part, side), (second, other_part, other_side) = ordered[k]
+        (first, part, side), (second, _, other_side) = ordered[k]
         own_nodes, normals = nodes_on(side.space, side.elements)
         held = ~_approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
@@ -175,9 +177,9 @@ def body_rows(
             coupling.frame,
             coupling.weights,
             coupling.gap + pairs[k].gap,
-            coupling.on_non_mortar,
-            coupling.on_mortar,
-            conditions[first].is_fixed[coupling.nodes].any(axis=1),
+            sparse.csr_array(coupling.on_non_mortar),
+            sparse.csr_array(coupling.on_mortar),
+            np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)),
         )
     yield from (found[k] for k in range(len(pairs)))
 
@@ -185,9 +187,7 @@ def body_rows(
 _NamedSide = tuple[int, str, ContactSide]
 
 
-def _ordered(
-    pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str, int]
-) -> tuple[_NamedSide, _NamedSide]:
+def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str, int]) -> tuple[_NamedSide, _NamedSide]:
     """Return the sides of a contact, the one with the multipliers first."""
     sides = []
     for name in pair.sides:
@@ -195,9 +195,7 @@ def _ordered(
         number = numbers[body]
         sides.append((number, part, ContactSide(bodies[number].space, bodies[number].part_elements(part))))
     one, two = sides
-    is_first = (
-        is_better_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
-    )
+    is_first = is_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
     return (one, two) if is_first else (two, one)
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
-from bemkit.contact.joined import JoinedBodies, Member
+from bemkit.contact.joined.joined_bodies import JoinedBodies
+from bemkit.contact.joined.member import Member
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contacts import ContactRows
@@ -61,8 +62,10 @@ class AssembledModel:
             each.under(force, conditions.displacement)
             for each, force, conditions in zip(self.condensed, prepared.forces, prepared.conditions, strict=True)
         )
-        offset = _offset(prepared)
-        body = self.body.under([each.load for each in condensed], offset, prepared.tangent_is_eliminated)
+        offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
+        body = self.body.under([each.load for each in condensed], offset)
+        if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
+            body = replace(body, tangent_is_eliminated=is_eliminated)
         return AssembledModel(prepared, self.elastic, condensed, body, _problem(prepared, body), self.work)
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
@@ -80,7 +83,9 @@ class AssembledModel:
             self.prepared.bodies, self.elastic, self.condensed, unknowns, strict=True
         ):
             displacement, force = condensed.recover(own)
-            traction = elastic.element_tractions(displacement, force) * (self.prepared.force_unit / body.own_mesh.diameter)
+            traction = elastic.element_tractions(displacement, force) * (
+                self.prepared.force_unit / body.own_mesh.diameter
+            )
             traction = np.array(body.to_place(traction))
             traction_space = body.scene.discretisation.traction_space(body.mesh)
             insert_loads(traction, body.scene, body.mesh, traction_space)
@@ -105,7 +110,9 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     for group in groups(bodies):
         first = bodies[group[0]]
         material = first.material.scaled(prepared.units.modulus)
-        map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, _linear_solver(prepared, int(group[0])))
+        map_ = first.scene.discretisation.elastic_map(
+            first.own_mesh.unit, material, _linear_solver(prepared, int(group[0]))
+        )
         base = map_.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         work += base.work
         for number in group.tolist():
@@ -115,15 +122,16 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
                 base if same else base.under(prepared.forces[number], prepared.conditions[number].displacement)
             )
     maps = tuple(each for each in condensed if each is not None)
+    motions = [_motions(*pair) for pair in zip(bodies, prepared.conditions, strict=True)]
     members = tuple(
         Member(
-            stiffness=maps[groups_first].stiffness,
+            stiffness=maps[first].stiffness,
             load=each.load,
-            motions=_motions(body, conditions),
+            motions=motions[first],
             modulus=body.material.plane_modulus / prepared.units.modulus,
             name=body.name,
         )
-        for each, body, conditions, groups_first in zip(maps, bodies, prepared.conditions, _firsts(bodies), strict=True)
+        for each, body, first in zip(maps, bodies, _firsts(bodies), strict=True)
     )
     joined = JoinedBodies(
         members=members,

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
@@ -96,11 +96,9 @@ class PreparedAssembly:
         return PiecewiseLaw(*zip(*pairs, strict=True)) if pairs else Frictionless()
 
     @property
-    def tangent_is_eliminated(self) -> FloatArray:
+    def tangent_is_eliminated(self) -> BoolArray:
         """(n_contact,) bool array: nodes without friction, or held by a support."""
-        return np.concatenate(
-            [np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)]
-        )
+        return np.concatenate([np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)])
 
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
@@ -151,7 +149,9 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))
     sizes = [largest_sizes(body.scene, body.mesh, length) for body in bodies]
     overlap = max((max(-pair.gap, pair.interference) for pair in assembly.contacts), default=0.0)
-    stress = max(*(load for load, _, _ in sizes), max([overlap, *(motion for _, motion, _ in sizes)]) / length * modulus)
+    stress = max(
+        *(load for load, _, _ in sizes), max([overlap, *(motion for _, motion, _ in sizes)]) / length * modulus
+    )
     stress = stress or max(gap for _, _, gap in sizes) / length * modulus or modulus
     units = Units(np.mean([body.mesh.centre for body in bodies], axis=0), length, modulus, stress)
     units.check_range()
@@ -166,8 +166,10 @@ def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) 
         supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
         conditions.append(supported(body.own_space, supports))
         in_place = body.units(units.modulus, force_unit, body.mesh)
-        space = body.own_space if body.own_mesh is body.mesh else body.scene.discretisation.displacement_space(
-            body.mesh.unit
+        space = (
+            body.own_space
+            if body.own_mesh is body.mesh
+            else body.scene.discretisation.displacement_space(body.mesh.unit)
         )
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, space, in_place)))
     rows = (
