@@ -257,8 +257,8 @@ class BoundaryMesh:
         ----------
         elements : (m,) int array
             Element numbers.
-        xi : (q,) array
-            Local coordinates in [-1, 1], from start to end.
+        xi : (q,) or (m, q) array
+            Local coordinates in [-1, 1], from start to end; the same on all elements, or those of each.
 
         Returns
         -------
@@ -266,13 +266,13 @@ class BoundaryMesh:
             Points.
         """
         before, after = 0.5 - 0.5 * xi, 0.5 + 0.5 * xi
-        straight = before[:, None] * self.start[elements][:, None] + after[:, None] * self.end[elements][:, None]
+        straight = before[..., None] * self.start[elements][:, None] + after[..., None] * self.end[elements][:, None]
         return self._on_curves(elements, xi, point_on, straight)
 
     def derivatives(self, elements: IntArray, xi: FloatArray) -> FloatArray:
-        """Differentiate elements: dx/dxi [m], (m, q, 2), for (m,) elements at (q,) local coordinates."""
+        """Differentiate elements: dx/dxi [m], (m, q, 2), for (m,) elements at (q,) or (m, q) local coordinates."""
         half_chord = 0.5 * (self.end[elements] - self.start[elements])
-        straight = np.repeat(half_chord[:, None], len(xi), axis=1)
+        straight = np.repeat(half_chord[:, None], xi.shape[-1], axis=1)
         derivative = self._on_curves(elements, xi, derivative_on, straight)
         # the chain rule: half the span of the parameter for xi from -1 to 1
         is_curved = ~self.is_straight[elements]
@@ -281,11 +281,11 @@ class BoundaryMesh:
         return derivative
 
     def jacobian(self, elements: IntArray, xi: FloatArray) -> FloatArray:
-        """Return |dx/dxi| [m], (m, q), for (m,) elements at (q,) local coordinates."""
+        """Return |dx/dxi| [m], (m, q), for (m,) elements at (q,) or (m, q) local coordinates."""
         return norms(self.derivatives(elements, xi))
 
     def normals_at(self, elements: IntArray, xi: FloatArray) -> FloatArray:
-        """Return unit normals out of the body, (m, q, 2), for (m,) elements at (q,) local coordinates."""
+        """Return unit normals out of the body, (m, q, 2), for (m,) elements at (q,) or (m, q) local coordinates."""
         derivative = self.derivatives(elements, xi)
         return turned_right(derivative / norms(derivative)[..., None])
 

@@ -1,0 +1,184 @@
+"""Coupling of two sides whose meshes do not match: means of the relative displacement, one for each multiplier."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.mortar.multipliers import modified_rows, multiplier_functions
+from bemkit.contact.mortar.projection import mean_directions
+from bemkit.contact.mortar.segments import Segments, common_refinement, quadrature_on
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.quadrature import gauss_legendre
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+_LEAST_SHARE = 0.01
+"""Of the integral of its basis function: a node whose weight is less is handed over to its neighbours."""
+
+
+class NotFacingError(GeometryError):
+    """Two sides that do not face each other anywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class MortarCoupling:
+    """Relative displacement of two sides, and where their multipliers act.
+
+    At the multiplier node i it is ``frame[i] @ (on_non_mortar[i] @ u1 - on_mortar[i] @ u2)``, with the displacements
+    (n_scalar, 2) of both bodies in x and y. A traction t_i there, in the frame, presses the nodal forces
+    ``weights[i] * outer(on_non_mortar[i], t_i @ frame[i])`` onto the non-mortar body, and those with ``on_mortar``,
+    reversed, onto the mortar body.
+
+    Parameters
+    ----------
+    nodes : (n,) int array
+        Scalar dofs of the non-mortar space that carry a multiplier, in order along the side.
+    points : (n, 2) array [m]
+        Where they are.
+    arc_length : (n,) array [m]
+        From the start of the side.
+    frame : (n, 2, 2) array
+        Rows are the direction d of contact, the mean of both normals, out of the non-mortar body and into the mortar
+        body, and the tangent ``(-d_y, d_x)``.
+    weights : (n,) array [m]
+        Positive: ``int psi_i`` over the covered part of the non-mortar side.
+    gap : (n,) array [m]
+        Mean of the distance along d, weighted by psi_i.
+    facing : (n,) array
+        Cosine of the angle between d and the normal of the non-mortar body.
+    on_non_mortar : (n, n_scalar) csr_matrix
+        ``int psi_i phi_j / weights_i`` with the basis of the non-mortar space; rows sum to one.
+    on_mortar : (n, n_scalar) csr_matrix
+        The same with the basis of the mortar space, at the projected points; rows sum to one.
+    """
+
+    nodes: IntArray
+    points: FloatArray
+    arc_length: FloatArray
+    frame: FloatArray
+    weights: FloatArray
+    gap: FloatArray
+    facing: FloatArray
+    on_non_mortar: csr_matrix
+    on_mortar: csr_matrix
+
+
+def couple(
+    non_mortar: ContactSide, mortar: ContactSide, *, without: IntArray | None = None, reach: float = np.inf
+) -> MortarCoupling:
+    """Couple two sides by mortar integrals with dual multipliers.
+
+    Parameters
+    ----------
+    non_mortar : ContactSide
+        The side that carries the multipliers; see `bemkit.contact.mortar.facing.is_non_mortar`.
+    mortar : ContactSide
+    without : (k,) int array, optional
+        Scalar dofs of the non-mortar space that carry no multiplier, because a support holds them or several bodies
+        meet there. Their share is handed to the other nodes of their elements.
+    reach : float [m]
+        Largest distance along the direction of contact at which the sides face each other.
+
+    Returns
+    -------
+    MortarCoupling
+        Only of nodes whose elements the mortar side covers at least in part.
+
+    Raises
+    ------
+    NotFacingError
+        If the sides face each other nowhere, or only where no node may carry a multiplier.
+
+    Notes
+    -----
+    The projection follows the mean of both normals, interpolated along the non-mortar side [PusoLaursen2004],
+    [PoppEtAl2010]. A node whose weight would be less than a hundredth of the integral of its basis function, because
+    only a sliver beside it is covered, hands it over like those `without` a multiplier; slivers that have no other node
+    are left uncovered.
+    """
+    directions = mean_directions(non_mortar, mortar, reach)
+    segments = common_refinement(non_mortar, mortar, directions, reach)
+    if not segments.is_covered.any():
+        raise NotFacingError(
+            f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other "
+            f"nowhere within the distance {reach:g}: choose sides whose outward normals point at each other"
+        )
+    may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
+    while may_carry.any():
+        coupling, slivers = _integrate(non_mortar, mortar, directions, segments, may_carry)
+        if coupling.nodes.size and not slivers.size:
+            return coupling
+        if not slivers.size:
+            break
+        may_carry &= ~np.isin(non_mortar.dofs, slivers)
+    raise NotFacingError(
+        f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other only "
+        "where no node can carry a multiplier: use more elements, or leave more nodes free"
+    )
+
+
+def _integrate(
+    side: ContactSide, mortar: ContactSide, directions: FloatArray, segments: Segments, may_carry: BoolArray
+) -> tuple[MortarCoupling, IntArray]:
+    """Return the coupling with multipliers at some nodes (m, n_local), and dofs (k,) whose share is a sliver."""
+    from scipy.sparse import csr_matrix
+
+    segments = segments.cut(modified_rows(segments, may_carry), side.space.local_nodes)
+    quadrature = quadrature_on(segments, side, mortar, directions)
+    psi, rows, integrals = multiplier_functions(side, segments, quadrature, may_carry)
+    dofs, first, number = np.unique(side.dofs, return_index=True, return_inverse=True)
+    number = number.reshape(side.dofs.shape)
+    full = np.bincount(number.ravel(), _basis_integrals(side).ravel())
+    weights = np.zeros(dofs.size)
+    np.add.at(weights, number[rows], integrals.sum(axis=2))
+    has_weight = weights > 0.0
+    slivers = dofs[has_weight & (weights < _LEAST_SHARE * full)]
+
+    arc_length = side.arc_length.ravel()[first]
+    order = np.argsort(np.where(has_weight, arc_length, np.inf), kind="stable")[: np.count_nonzero(has_weight)]
+    position = np.full(dofs.size, -1)
+    position[order] = np.arange(order.size)
+    nodal_weights = weights[order]
+
+    def rows_of(row: IntArray, columns: IntArray, values: FloatArray, n_columns: int) -> csr_matrix:
+        """Sum values (k, n_local, j) into the rows of the nodes of elements `row`, at columns (k, j)."""
+        row, column = np.broadcast_arrays(position[number[row]][:, :, None], columns[:, None])
+        is_kept = (row >= 0) & (values != 0.0)
+        row, column = row[is_kept], column[is_kept]
+        return csr_matrix((values[is_kept] / nodal_weights[row], (row, column)), shape=(order.size, n_columns))
+
+    weighted = psi * quadrature.weights[:, None]
+    on_mortar = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
+    gap = np.zeros((dofs.size, 2))
+    np.add.at(gap, number[quadrature.row], np.matmul(weighted, quadrature.gap))
+    element, local = np.divmod(first[order], side.space.local_nodes.size)
+    xi = side.space.local_nodes[local][:, None]
+    direction = side.directions(directions, element, xi)[:, 0]
+    distance = np.einsum("nc,nc->n", direction, gap[order]) / nodal_weights
+    distance[np.abs(distance) <= max(side.resolution, mortar.resolution)] = 0.0
+    coupling = MortarCoupling(
+        nodes=dofs[order],
+        points=side.points(element, xi)[:, 0],
+        arc_length=arc_length[order],
+        frame=np.stack([direction, np.stack([-direction[:, 1], direction[:, 0]], axis=1)], axis=1),
+        weights=nodal_weights,
+        gap=distance,
+        facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, element, xi)[:, 0]),
+        on_non_mortar=rows_of(rows, side.dofs[rows], integrals, side.space.n_dofs // 2),
+        on_mortar=rows_of(
+            quadrature.row, mortar.dofs[quadrature.partner], np.matmul(weighted, on_mortar), mortar.space.n_dofs // 2
+        ),
+    )
+    return coupling, slivers
+
+
+def _basis_integrals(side: ContactSide) -> FloatArray:
+    """Return the integrals (m, n_local) [m] of the basis functions over the elements of a side."""
+    xi, weights = gauss_legendre(side.space.degree + 1)
+    return 0.5 * side.lengths[:, None] * (side.space.basis(xi) @ weights)

@@ -1,0 +1,130 @@
+"""Projection from one side onto the other along given directions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.geometry.vectors import angles_between, cross
+
+_MOST_STEPS = 100
+_N_PASSES = 2
+"""The second pass follows the mean direction instead of the normal of the one side."""
+
+
+def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, tolerance: float) -> FloatArray:
+    """Return where functions of [-1, 1] vanish, by the Illinois variant of regula falsi.
+
+    Parameters
+    ----------
+    function : callable
+        (n_roots,) arguments, one of each function -> (n_roots,) values.
+    n_roots : int
+    tolerance : float
+        Values of this size are zero.
+
+    Returns
+    -------
+    (n_roots,) array
+        In [-1, 1]; the nearest end where a function does not change sign.
+    """
+    a, b = np.full(n_roots, -1.0), np.full(n_roots, 1.0)
+    f_a, f_b = function(a), function(b)
+    for _ in range(_MOST_STEPS):
+        slope = f_b - f_a
+        c = np.clip(b - f_b * (b - a) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
+        f_c = function(c)
+        changes = f_c * f_b < 0.0
+        a, f_a = np.where(changes, b, a), np.where(changes, f_b, 0.5 * f_a)
+        b, f_b = c, f_c
+        if np.all((np.abs(f_c) <= tolerance) | (np.abs(b - a) <= np.finfo(float).eps)):
+            break
+    return b
+
+
+def project(
+    points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: float
+) -> tuple[IntArray, FloatArray]:
+    """Find the points of a side that lie ahead of, or behind, other points.
+
+    Parameters
+    ----------
+    points, directions : (n, 2) arrays [m], [-]
+        Directions are unit vectors out of the body of the points; the side has to run against them.
+    side : ContactSide
+    reach : float [m]
+        Largest distance along the direction.
+    slack : float [m]
+        How far a point may lie beside the end of the side.
+
+    Returns
+    -------
+    rows : (n,) int array
+        Position in the side of the nearest element that is met, -1 if there is none.
+    xi : (n,) array
+        Where it is met.
+    """
+    to_start, to_end = side.start - points[:, None], side.end - points[:, None]
+    # along the tangent, against which a side that faces the direction runs
+    start, end = cross(directions[:, None], to_start), cross(directions[:, None], to_end)
+    is_met = (start >= -slack) & (end <= slack) & (end < start)
+    share = start / np.where(is_met, start - end, 1.0)
+    ahead, ahead_at_end = ((directions[:, None] * to).sum(axis=-1) for to in (to_start, to_end))
+    distance = np.where(is_met, np.abs((1.0 - share) * ahead + share * ahead_at_end), np.inf)
+    rows = np.argmin(distance, axis=1)
+    each = np.arange(len(points))
+    rows[~(distance[each, rows] <= min(reach, np.finfo(float).max))] = -1
+    found = np.flatnonzero(rows >= 0)
+    xi = np.zeros(len(points))
+    xi[found] = meeting_points(points[found], directions[found], side, rows[found])
+    return rows, xi
+
+
+def meeting_points(points: FloatArray, directions: FloatArray, side: ContactSide, rows: IntArray) -> FloatArray:
+    """Return where (n,) the lines through points (n, 2) along directions (n, 2) meet elements `rows` (n,) of a side."""
+    if side.is_straight:
+        start = cross(directions, side.start[rows] - points)
+        end = cross(directions, side.end[rows] - points)
+        return np.clip((start + end) / (start - end), -1.0, 1.0)
+    elements = side.elements[rows]
+
+    def beside(xi: FloatArray) -> FloatArray:
+        return cross(directions, side.mesh.points(elements, xi[:, None])[:, 0] - points)
+
+    return bracketed_roots(beside, rows.size, 0.1 * side.resolution)
+
+
+def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) -> FloatArray:
+    """Return the mean of the normals of both sides at the knots of the first, towards the second one.
+
+    Returns
+    -------
+    (n_knots, 2) array
+        The normal of the non-mortar side, turned by half of the angle to the reversed normal of the mortar side where
+        it is met. Knots that meet nothing turn like the nearest ones that do.
+
+    Notes
+    -----
+    With the normals of one side alone, two equal cylinders that are pressed together seem to slide by as much as the
+    cube of the distance from their common point, which friction resists; the mean is the same from both sides.
+    """
+    rows, local = non_mortar.first_knots
+    points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
+    normals = directions = non_mortar.normals
+    slack = max(non_mortar.resolution, mortar.resolution)
+    each = np.arange(rows.size)
+    for _ in range(_N_PASSES):
+        partner, eta = project(points, directions, mortar, reach, slack)
+        met = np.flatnonzero(partner >= 0)
+        if not met.size:
+            break
+        opposite = -mortar.directions(mortar.normals, partner[met], eta[met, None])[:, 0]
+        half = np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
+        if not half.any():
+            return normals
+        cosine, sine = np.cos(half)[:, None], np.sin(half)[:, None]
+        directions = cosine * normals + sine * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    return directions

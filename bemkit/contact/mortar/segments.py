@@ -1,0 +1,153 @@
+"""Common refinement of two sides: pieces on which the functions of both are smooth, and quadrature on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.mortar.projection import bracketed_roots, meeting_points, project
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import cross
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Pieces of the elements of the non-mortar side, in order.
+
+    Parameters
+    ----------
+    row : (s,) int array
+        Position of the element in the non-mortar side.
+    low, high : (s,) arrays
+        Its part, within [-1, 1].
+    partner : (s,) int array
+        Position in the mortar side of the one element that faces it, -1 for none.
+    """
+
+    row: IntArray
+    low: FloatArray
+    high: FloatArray
+    partner: IntArray
+
+    @property
+    def is_covered(self) -> BoolArray:
+        """(s,) bool array: whether the mortar side faces the piece."""
+        return self.partner >= 0
+
+    def cut(self, is_cut: BoolArray, at: FloatArray) -> Segments:
+        """Return the pieces, those of the elements (m,) marked in `is_cut` cut at the places `at` (k,) as well."""
+        chosen = np.flatnonzero(is_cut[self.row])
+        inside = (at > self.low[chosen, None]) & (at < self.high[chosen, None])
+        piece, place = np.nonzero(inside)
+        piece = chosen[piece]
+        low = np.concatenate([self.low, at[place]])
+        row = np.concatenate([self.row, self.row[piece]])
+        order = np.lexsort((low, row))
+        partner = np.concatenate([self.partner, self.partner[piece]])
+        return Segments(row[order], low[order], _ends(row[order], low[order]), partner[order])
+
+
+@dataclass(frozen=True, eq=False)
+class MortarQuadrature:
+    """Gauss points on covered pieces, and the points of the mortar side that they face.
+
+    Parameters
+    ----------
+    row, partner : (s,) int arrays
+        Positions of the elements in the non-mortar and in the mortar side, the first ascending.
+    xi, eta : (s, q) arrays
+        Where on these elements.
+    weights : (s, q) array [m]
+        Lengths of the non-mortar side.
+    gap : (s, q, 2) array [m]
+        From the non-mortar to the mortar side.
+    """
+
+    row: IntArray
+    partner: IntArray
+    xi: FloatArray
+    eta: FloatArray
+    weights: FloatArray
+    gap: FloatArray
+
+
+def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: FloatArray, reach: float) -> Segments:
+    """Cut the elements of the non-mortar side where the ends of elements of the mortar side face them.
+
+    Parameters
+    ----------
+    non_mortar, mortar : ContactSide
+    directions : (n_knots, 2) array
+        Of the projection, at the knots of the non-mortar side.
+    reach : float [m]
+        A piece is covered if the mortar side lies within this distance of its middle.
+    """
+    n_rows, all_rows = non_mortar.elements.size, np.arange(non_mortar.elements.size)
+    resolution = max(non_mortar.resolution, mortar.resolution)
+    ends = mortar.mesh.nodes[np.unique(mortar.mesh.elements[mortar.elements])]
+    at_ends = non_mortar.directions(directions, all_rows, np.tile([-1.0, 1.0], (n_rows, 1)))
+    start = cross(at_ends[:, 0], ends[:, None] - non_mortar.start)
+    end = cross(at_ends[:, 1], ends[:, None] - non_mortar.end)
+    # what the tangent sees ahead of the start and behind the end of an element faces its inside
+    point, row = np.nonzero((start > 0.0) & (end < 0.0))
+    elements = non_mortar.elements[row]
+
+    def beside(xi: FloatArray) -> FloatArray:
+        along = non_mortar.directions(directions, row, xi[:, None])[:, 0]
+        return cross(along, ends[point] - non_mortar.mesh.points(elements, xi[:, None])[:, 0])
+
+    cuts = bracketed_roots(beside, row.size, 0.1 * resolution) if row.size else np.zeros(0)
+    tolerance = 2.0 * resolution / non_mortar.lengths
+    is_inside = 1.0 - np.abs(cuts) > tolerance[row]
+    row = np.concatenate([all_rows, row[is_inside]])
+    low = np.concatenate([np.full(n_rows, -1.0), cuts[is_inside]])
+    order = np.lexsort((low, row))
+    row, low = row[order], low[order]
+    is_new = np.concatenate([[True], (np.diff(row) > 0) | (np.diff(low) > tolerance[row[1:]])])
+    row, low = row[is_new], low[is_new]
+    high = _ends(row, low)
+    middle = (0.5 * (low + high))[:, None]
+    along = non_mortar.directions(directions, row, middle)[:, 0]
+    partner, _ = project(non_mortar.points(row, middle)[:, 0], along, mortar, reach, 0.0)
+    return Segments(row, low, high, partner)
+
+
+def quadrature_on(
+    segments: Segments, non_mortar: ContactSide, mortar: ContactSide, directions: FloatArray
+) -> MortarQuadrature:
+    """Return Gauss points on the covered pieces.
+
+    Notes
+    -----
+    On straight elements with one direction the products of two functions, one of each side, are integrated exactly;
+    otherwise four more points see what curves and directions add to them.
+    """
+    is_plane = non_mortar.is_straight and mortar.is_straight and bool(np.all(directions == directions[0]))
+    reference, reference_weights = gauss_legendre(
+        max(non_mortar.space.degree, mortar.space.degree) + (2 if is_plane else 6)
+    )
+    chosen = np.flatnonzero(segments.is_covered)
+    row, partner, low, high = (
+        segments.row[chosen],
+        segments.partner[chosen],
+        segments.low[chosen],
+        segments.high[chosen],
+    )
+    half = 0.5 * (high - low)[:, None]
+    xi = 0.5 * (low + high)[:, None] + half * reference
+    weights = half * reference_weights * non_mortar.mesh.jacobian(non_mortar.elements[row], xi)
+    points, along = non_mortar.points(row, xi), non_mortar.directions(directions, row, xi)
+    rows = np.repeat(partner, reference.size)
+    eta = meeting_points(points.reshape(-1, 2), along.reshape(-1, 2), mortar, rows).reshape(xi.shape)
+    return MortarQuadrature(row, partner, xi, eta, weights, mortar.points(partner, eta) - points)
+
+
+def _ends(row: IntArray, low: FloatArray) -> FloatArray:
+    """Return where pieces end that begin at `low`: where the next one of the same element begins, or at 1."""
+    high = np.ones(low.size)
+    follows = row[1:] == row[:-1]
+    high[:-1][follows] = low[1:][follows]
+    return high

@@ -1,0 +1,155 @@
+"""One side of a contact: elements of one body in order, and directions that turn continuously along them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.vectors import norms
+
+_RESOLUTION = 32.0 * np.finfo(float).eps
+"""Positions that differ by less than this share of the largest coordinate are the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSide:
+    """Elements of a body that face another one.
+
+    Parameters
+    ----------
+    space : BoundarySpace
+        Space of the displacements, on the mesh of the body in place, in physical units.
+    elements : (m,) int array
+        Elements of the side; kept in order along the boundary.
+
+    Raises
+    ------
+    GeometryError
+        If there are no elements, or one is named twice or does not exist.
+    """
+
+    space: BoundarySpace
+    elements: IntArray
+
+    def __post_init__(self) -> None:
+        elements, n_elements = np.asarray(self.elements), self.space.mesh.n_elements
+        if not elements.size:
+            raise GeometryError("ContactSide: elements is empty: name at least one element of the body")
+        if elements.min() < 0 or elements.max() >= n_elements or np.unique(elements).size < elements.size:
+            raise GeometryError(
+                f"ContactSide: elements {elements.tolist()[:8]} of a mesh of {n_elements}: "
+                f"name different numbers from 0 to {n_elements - 1}"
+            )
+        object.__setattr__(self, "elements", along_boundary(self.space.mesh, elements))
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """The mesh of the body."""
+        return self.space.mesh
+
+    @cached_property
+    def dofs(self) -> IntArray:
+        """(m, n_local) array: scalar dofs of the elements."""
+        return self.space.element_dofs[self.elements]
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(m, 2) array [m]: start points of the elements."""
+        return self.mesh.start[self.elements]
+
+    @cached_property
+    def end(self) -> FloatArray:
+        """(m, 2) array [m]: end points of the elements."""
+        return self.mesh.end[self.elements]
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """(m,) array [m]: lengths of the elements."""
+        return self.mesh.lengths[self.elements]
+
+    @cached_property
+    def is_straight(self) -> bool:
+        """Whether all elements are straight."""
+        return bool(self.mesh.is_straight[self.elements].all())
+
+    @cached_property
+    def resolution(self) -> float:
+        """Distance [m] that the coordinates of the side cannot resolve."""
+        return _RESOLUTION * float(max(np.abs(self.start).max(), np.abs(self.end).max()))
+
+    @cached_property
+    def arc_length(self) -> FloatArray:
+        """(m, n_local) array [m]: distance of the nodes from the start of the side, along its elements."""
+        before = np.cumsum(self.lengths) - self.lengths
+        return before[:, None] + 0.5 * self.lengths[:, None] * (1.0 + self.space.local_nodes)
+
+    @cached_property
+    def knots(self) -> FloatArray:
+        """(k,) array: where in [-1, 1] directions are given on each element: at nodes of the space, or at both ends."""
+        return self.space.local_nodes if self.space.degree else np.array([-1.0, 1.0])
+
+    @cached_property
+    def knot_numbers(self) -> IntArray:
+        """(m, k) array: numbers of the knots, which neighbours share, in order along the side."""
+        if not self.space.degree:
+            keys = self.mesh.elements[self.elements]
+        else:
+            keys = self.dofs
+        _, first, number = np.unique(keys.ravel(), return_index=True, return_inverse=True)
+        position = np.empty(first.size, np.intp)
+        position[np.argsort(first)] = np.arange(first.size)
+        return position[number].reshape(keys.shape)
+
+    @cached_property
+    def first_knots(self) -> tuple[IntArray, IntArray]:
+        """Two (n_knots,) arrays: an element of the side, by its position, that has the knot, and which one there."""
+        _, first = np.unique(self.knot_numbers.ravel(), return_index=True)
+        element, local = np.divmod(first, self.knots.size)
+        return element, local
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """(n_knots, 2) array: outward unit normals, the mean of both elements where two meet."""
+        at_knots = self.mesh.normals_at(self.elements, self.knots)
+        total = np.zeros((int(self.knot_numbers.max()) + 1, 2))
+        np.add.at(total, self.knot_numbers, at_knots)
+        size = norms(total)
+        # elements that fold back onto each other leave no mean
+        return (
+            np.where(size[:, None] > 0.0, total, at_knots[self.first_knots]) / np.where(size > 0.0, size, 1.0)[:, None]
+        )
+
+    def points(self, rows: IntArray, xi: FloatArray) -> FloatArray:
+        """Return points (r, q, 2) [m] at xi, (q,) or (r, q), of the elements at the positions `rows` (r,)."""
+        return self.mesh.points(self.elements[rows], xi)
+
+    def directions(self, at_knots: FloatArray, rows: IntArray, xi: FloatArray) -> FloatArray:
+        """Interpolate directions.
+
+        Parameters
+        ----------
+        at_knots : (n_knots, 2) array
+            Unit vectors.
+        rows : (r,) int array
+            Positions of elements in the side.
+        xi : (r, q) array
+
+        Returns
+        -------
+        (r, q, 2) array
+            Unit vectors.
+        """
+        if self.space.degree:
+            basis = self.space.basis(xi.ravel())
+        else:
+            basis = 0.5 * np.stack([1.0 - xi.ravel(), 1.0 + xi.ravel()])
+        values = at_knots[self.knot_numbers[rows]]
+        vectors = np.matmul(basis.reshape(-1, *xi.shape).transpose(1, 2, 0), values)
+        return np.asarray(vectors / norms(vectors)[..., None])
