@@ -13,24 +13,26 @@ from rich.text import Text
 from bemkit.contact.certificate import Certificate
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.solvers.base import StepRecord
 
-_MANY_TRANSITIONS = 12
+_MANY_TRANSITIONS, _MANY_CONTACTS = 12, 8
 
 
-def print_summary(solution: Solution, console: Console | None = None) -> None:
+def print_summary(solution: Solution | AssemblySolution, console: Console | None = None) -> None:
     """Print a solution as a compact table, to standard output by default."""
     console = stdout_console(console)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    for name, value in _summary_rows(solution):
+    rows = _assembly_rows(solution) if isinstance(solution, AssemblySolution) else _summary_rows(solution)
+    for name, value in rows:
         table.add_row(name, Text(value) if isinstance(value, str) else value)
-    console.print(Text(solution.scene.title, style="bold"))
+    console.print(Text(solution.title, style="bold"))
     console.print(table)
     _print_warnings(solution.warnings, console)
 
@@ -75,7 +77,7 @@ class ConvergenceTable:
         self._console.print(Text(f"{line}  {record.message}".rstrip()))
 
 
-def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: bool = False) -> None:
+def print_explanation(solution: Solution | AssemblySolution, output_seconds: float, *, to_stderr: bool = False) -> None:
     """Print planned against measured time and memory, the counts, and what was left out.
 
     Memory was traced in the run, which makes small scenes about twice as slow. Standard output may be taken by data.
@@ -85,7 +87,7 @@ def print_explanation(solution: Solution, output_seconds: float, *, to_stderr: b
     console.print(_left_out(solution))
 
 
-def _stages(solution: Solution, output_seconds: float) -> Table:
+def _stages(solution: Solution | AssemblySolution, output_seconds: float) -> Table:
     table = plain_table(("stage",), ("time", "memory"), gap=2)
     for name, seconds in solution.timings.items():
         if name != "total":
@@ -119,7 +121,7 @@ def _lines(work: OperationCounts) -> Iterator[tuple[str, str]]:
     yield "unknowns of the contact system", f"{work.contact_unknowns:,}"
 
 
-def _left_out(solution: Solution) -> Table:
+def _left_out(solution: Solution | AssemblySolution) -> Table:
     table = plain_table(("left out", "why"), gap=2)
     for item in solution.plan.items:
         if not item.is_needed:
@@ -143,12 +145,8 @@ def format_seconds(seconds: float) -> str:
 
 
 def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
-    mesh, contact, timings = solution.mesh, solution.contact, solution.timings
-    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
-    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
-    if not solution.is_converged:
-        status.append(f": {solution.message or solution.status.value}", style="not bold")
-    yield "status", status
+    mesh, contact = solution.mesh, solution.contact
+    yield "status", _status(solution)
     discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
     if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
@@ -157,9 +155,7 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
         values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
         yield "symmetry", f"about {mesh.symmetry}: {values}"
     if contact.n_contact:
-        counts = Counter(contact.status_words())
-        nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
-        yield "contact nodes", f"{contact.n_contact}: {nodes}"
+        yield "contact nodes", _node_counts(solution)
         yield "normal force", f"{solution.force_normal:.8g}  pressing, per unit thickness"
         yield "friction force", f"{solution.force_tangential:.8g}  on the body, along the boundary"
     else:
@@ -177,8 +173,51 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
     yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
     if (between := solution.between_nodes) is not None:
         yield "between nodes", f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
+    yield "time", _time(solution)
+
+
+def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str]]:
+    yield "status", _status(solution)
+    yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
+    yield "contact nodes", _node_counts(solution)
+    for contact in solution.contacts[:_MANY_CONTACTS]:
+        yield (
+            contact.name,
+            f"normal force {contact.force_normal:.8g}, friction {contact.force_tangential:.8g}, "
+            f"length {contact.contact_length:.6g}, peak pressure {contact.peak_pressure:.6g}, "
+            f"slip up to {contact.largest_slip:.3g}",
+        )
+    if len(solution.contacts) > _MANY_CONTACTS:
+        yield "", f"and {len(solution.contacts) - _MANY_CONTACTS} contacts more (--json -)"
+    yield "elastic energy", f"{solution.energy:.8g}  per unit thickness"
+    if solution.estimated_error is not None:
+        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"
+    yield "transitions", "\n".join(_transition_lines(solution))
+    solver = SOLVERS.word_of(solution.assembly.solver)
+    yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
+    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
+    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
+    yield "time", _time(solution)
+
+
+def _status(solution: Solution | AssemblySolution) -> Text:
+    colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
+    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
+    if not solution.is_converged:
+        status.append(f": {solution.message or solution.status.value}", style="not bold")
+    return status
+
+
+def _node_counts(solution: Solution | AssemblySolution) -> str:
+    counts = Counter(solution.contact.status_words())
+    nodes = f"{counts['separated']} separated, {counts['slip']} slip, {counts['stick']} stick"
+    return f"{solution.contact.n_contact}: {nodes}"
+
+
+def _time(solution: Solution | AssemblySolution) -> str:
+    timings = solution.timings
     stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
-    yield "time", f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
+    return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
 
 
 def _worst_entry(measured: Certificate | BetweenNodes) -> str:
@@ -188,7 +227,7 @@ def _worst_entry(measured: Certificate | BetweenNodes) -> str:
     return f"worst entry {measured.worst:.1e}{name}"
 
 
-def _transition_lines(solution: Solution) -> list[str]:
+def _transition_lines(solution: Solution | AssemblySolution) -> list[str]:
     lines = [
         f"{item.part}: {item.from_status} to {item.to_status} at ({item.x:.6g}, {item.y:.6g}), s = {item.s:.6g}"
         for item in solution.transitions[:_MANY_TRANSITIONS]

@@ -22,7 +22,10 @@ from bemkit.version import __version__
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from bemkit.plan import Plan
+    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
+    from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
@@ -195,7 +198,7 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
     solution = read_result(result)
     outputs.write(solution)
     if shows_scene:
-        print_data(scene_to_toml(solution.scene))
+        print_data(scene_to_toml(solution.stated))
     elif not (table or json_file or folder):
         from bemkit.cli.console import print_summary
 
@@ -229,17 +232,13 @@ def plan(
     is_json: bool,
 ) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.plan import check_elements, make_plan
-    from bemkit.scene.symmetry import find_symmetry
     from bemkit.scene.toml import load_scene, with_overrides
 
     chosen = with_overrides(
         load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
     )
     with concerning(scene):
-        check_elements(chosen)
-        proposal = find_symmetry(chosen) if chosen.symmetry is None else None
-        made = make_plan(chosen, chosen.build_mesh(), proposal=proposal)
+        made = _planned(chosen)
     if is_json:
         import json
 
@@ -250,21 +249,43 @@ def plan(
         print_plan(chosen.title, made)
 
 
+def _planned(scene: Scene | Assembly) -> Plan:
+    """Return the plan of a scene, with a symmetry that it could use."""
+    from bemkit.scene.assembly import Assembly
+
+    if isinstance(scene, Assembly):
+        from bemkit.plan.assembly_plan import make_assembly_plan
+
+        return make_assembly_plan(scene)
+    from bemkit.plan import check_elements, make_plan
+    from bemkit.scene.symmetry import find_symmetry
+
+    check_elements(scene)
+    proposal = find_symmetry(scene) if scene.symmetry is None else None
+    return make_plan(scene, scene.build_mesh(), proposal=proposal)
+
+
 def _outputs(
     json_file: str | None, csv_file: str | None, folder: str | None, table: str = "contact"
-) -> Outputs[Solution]:
+) -> Outputs[Solution | AssemblySolution]:
     """Return where the command line sends a solution, besides a result file."""
     if json_file is csv_file is folder is None:
         return Outputs()
     from bemkit.results.tables import CSV_STARTS, to_csv, to_json
 
-    def as_json(solution: Solution) -> str:
+    def as_json(solution: Solution | AssemblySolution) -> str:
         return to_json(solution) + "\n"
 
-    def as_csv(solution: Solution) -> str:
+    def as_csv(solution: Solution | AssemblySolution) -> str:
         return to_csv(solution, table)
 
-    def figures(solution: Solution) -> Mapping[str, Figure]:
+    def figures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
+        from bemkit.results.assembly_solution import AssemblySolution
+
+        if isinstance(solution, AssemblySolution):
+            from bemkit.results.assembly_figures import all_assembly_figures
+
+            return all_assembly_figures(solution)
         from bemkit.results.figures import all_figures
 
         return all_figures(solution)
@@ -284,7 +305,7 @@ def _result_target(output: str | None) -> list[Path]:
     return [check_result_target(output)]
 
 
-def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
+def _solve(scene: Scene | Assembly, *, cascade: bool, is_live: bool) -> Solution | AssemblySolution:
     from bemkit.runs.run import run as solve_scene
 
     callback = None
@@ -294,8 +315,9 @@ def _solve(scene: Scene, *, cascade: bool, is_live: bool) -> Solution:
         callback = ConvergenceTable()
     if cascade:
         from bemkit.runs.nested import run_cascade
+        from bemkit.scene.toml import single_body
 
-        return run_cascade(scene, callback=callback)[-1]
+        return run_cascade(single_body(scene, scene.title), callback=callback)[-1]
     return solve_scene(scene, callback=callback)
 
 

@@ -54,7 +54,7 @@ class Placement:
 
     def forward(self, points: FloatArray) -> FloatArray:
         """Move points (..., 2) [m]."""
-        return self.turned(points) + np.array(self.shift)
+        return np.asarray(self.turned(points) + np.array(self.shift))
 
     def turned(self, vectors: FloatArray) -> FloatArray:
         """Turn vectors (..., 2)."""

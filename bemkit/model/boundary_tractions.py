@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from bemkit.arrays import FloatArray
@@ -16,7 +18,9 @@ _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 
 
-def insert_loads(traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> None:
+def insert_loads(
+    traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
+) -> None:
     """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero.
 
     Parameters
@@ -28,12 +32,14 @@ def insert_loads(traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: 
         In physical units.
     space : BoundarySpace
         Of the tractions.
+    touching : collection of str
+        Free parts that other bodies touch: they are left as they are.
     """
     xi, weights = gauss_legendre(space.degree + 1 + _MORE_POINTS)
     projection = projector(space, xi, weights)
     is_free = np.ones(mesh.n_elements, bool)
     for part, elements, _ in parts_on(scene, mesh):
-        is_free[elements] = isinstance(part.condition, Free)
+        is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
         if isinstance(part.condition, Traction | Pressure):
             points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
             values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)

@@ -13,6 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
+from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.part_forces import ContactForce, PartForce, part_force
 from bemkit.results.solution import BoundaryFields
@@ -99,13 +100,19 @@ class AssemblySolution:
     contact : ContactTable
         One row for each multiplier node; `part` is the name of the contact, displacements are relative ones: those of
         the body with the node less those of its partner.
+    contact_directions : (n_contact, 2) array
+        Unit vectors of u_n and sigma_n, out of the body with the node.
+    friction_bound : (n_contact,) array or None [Pa]
+        The largest friction at each contact node; None if there is none anywhere.
     contacts : tuple of ContactForce
         What each contact transmits.
     history : tuple of StepRecord
     linear_solves, outer_steps : int
     transitions : tuple of Transition
     timings : mapping of str to float [s]
+    plan : Plan
     work : OperationCounts
+        What was computed; equal to ``plan.work``.
     message : str
     memory : mapping of str to int [bytes]
     warnings : tuple of str
@@ -116,12 +123,15 @@ class AssemblySolution:
     status: Status
     certificate: Certificate
     contact: ContactTable
+    contact_directions: FloatArray
+    friction_bound: FloatArray | None
     contacts: tuple[ContactForce, ...]
     history: tuple[StepRecord, ...]
     linear_solves: int
     outer_steps: int
     transitions: tuple[Transition, ...]
     timings: Mapping[str, float]
+    plan: Plan
     work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
@@ -132,6 +142,21 @@ class AssemblySolution:
         status = self.status.name.lower().replace("_", " ")
         sizes = f"{len(self.bodies)} bodies, {self.n_elements} elements, {self.contact.n_contact} contact nodes"
         return f"AssemblySolution({self.assembly.title!r}: {status}, {sizes})"
+
+    @property
+    def stated(self) -> Assembly:
+        """What was asked: the assembly."""
+        return self.assembly
+
+    @property
+    def title(self) -> str:
+        """The title of the assembly."""
+        return self.assembly.title
+
+    def part_length(self, contact: str) -> float:
+        """Return the length of boundary that can touch in a contact [m]."""
+        own = self.contact.rows(contact)
+        return float(self.contact.weight[own].sum()) + max(float(self.contact.s[own][0]), 0.0)
 
     @property
     def is_converged(self) -> bool:
@@ -197,6 +222,7 @@ class AssemblySolution:
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "timings": dict(self.timings),
+            "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),
             "memory": dict(self.memory),
         }

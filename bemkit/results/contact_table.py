@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -105,6 +106,14 @@ class ContactTable:
     def status_words(self) -> list[str]:
         """Return ``"separated"``, ``"slip"`` or ``"stick"`` for each node."""
         return [STATUS_WORDS[NodeStatus(value)] for value in self.status.tolist()]
+
+
+def bound_at(table: ContactTable, law: FrictionLaw) -> FloatArray | None:
+    """Return the friction bound (n_contact,) [Pa] of a law at the tractions of a table; None without friction."""
+    if law.is_frictionless:
+        return None
+    is_closed = table.status != NodeStatus.SEPARATED
+    return np.where(is_closed | np.asarray(law.acts_across_gap), law.bound(np.minimum(table.sigma_n, 0.0)), 0.0)
 
 
 @dataclass(frozen=True)

@@ -5,24 +5,25 @@ Without contact, the tractions along the whole boundary instead.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from math import floor, log10
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.geometry.reflection import reflected_to_whole
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, new_figure, panel_above_strip
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
-from bemkit.solvers.active_sets import NodeStatus
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +40,29 @@ _LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":"
 FREE, PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
 _READABLE = 0.06
 """Share of the boundary from which on a piece is long enough for its name."""
+
+
+class SolvedContact(Protocol):
+    """What is drawn of contacts: `Solution` and `AssemblySolution` have it."""
+
+    @property
+    def title(self) -> str:
+        """The title."""
+
+    @property
+    def contact(self) -> ContactTable:
+        """One row for each contact node."""
+
+    @property
+    def transitions(self) -> Sequence[Transition]:
+        """Where the status changes."""
+
+    @property
+    def friction_bound(self) -> FloatArray | None:
+        """(n_contact,) array [Pa], None without friction."""
+
+    def part_length(self, part: str, /) -> float:
+        """Return the length of a contact part [m]."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +98,14 @@ def all_figures(solution: Solution, *, units: Units = SI) -> dict[str, Figure]:
         ``boundary-traction``.
     """
     figures = {"deformation": draw_deformation(solution, units=units)}
-    parts = solution.contact.parts
-    if not parts:
+    if not solution.contact.parts:
         figures["boundary-traction"] = draw_boundary_traction(solution, units=units)
+    return figures | contact_figures(solution, units=units)
+
+
+def contact_figures(solution: SolvedContact, *, units: Units = SI) -> dict[str, Figure]:
+    """Draw displacements, tractions and status of each contact; see `all_figures`."""
+    figures, parts = {}, solution.contact.parts
     for number, part in enumerate(parts, start=1):
         suffix = f"-{number}" if len(parts) > 1 else ""
         figures[f"contact-displacement{suffix}"] = draw_contact_displacement(solution, part, units=units)
@@ -99,11 +128,11 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
         axes.plot(*mesh.nodes[order].T, color=GREY, linestyle="--", linewidth=1.2, label=initial)
         axes.plot(*deformed[order].T, color=BLUE, linewidth=1.8, label=enlarged)
     if not mesh.is_exterior:
-        _fill(axes, [deformed[mesh.elements[loop, 0]] for loop in mesh.loops])
+        fill(axes, [deformed[mesh.elements[loop, 0]] for loop in mesh.loops])
     _draw_symmetry_lines(axes, solution.mesh.symmetry)
     axes.set_aspect("equal")
     axes.margins(0.08)
-    _draw_obstacles(axes, solution)
+    draw_obstacles(axes, [getattr(part.condition, "obstacle", None) for part in solution.scene.contact_parts])
     axes.set_xlabel(f"$x$ [{units.length}]")
     axes.set_ylabel(f"$y$ [{units.length}]")
     axes.set_title(solution.scene.title, parse_math=False, fontsize=11)
@@ -111,7 +140,7 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
     return figure
 
 
-def draw_contact_displacement(solution: Solution, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_displacement(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
     """Draw normal and tangential displacement and the gap along one contact part, above its status."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
@@ -124,25 +153,21 @@ def draw_contact_displacement(solution: Solution, part: str, *, units: Units = S
     return figure
 
 
-def draw_contact_traction(solution: Solution, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_traction(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
     axes.plot(s, contact.sigma_n[chosen], label=r"normal $\sigma_n$", **_FIRST)
     axes.plot(s, contact.sigma_t[chosen], label=r"tangential $\sigma_t$", **_SECOND)
-    law = solution.scene.law_at(contact.part, np.stack([contact.x, contact.y], axis=1))
-    if not law.is_frictionless:
-        bound = law.bound(np.minimum(contact.sigma_n, 0.0))
-        is_closed = contact.status != NodeStatus.SEPARATED
-        bound = np.where(is_closed | np.asarray(law.acts_across_gap), bound, 0.0)[chosen]
-        axes.plot(s, bound, label="friction bound", **_LIMIT)
-        axes.plot(s, -bound, **_LIMIT)
+    if solution.friction_bound is not None:
+        axes.plot(s, solution.friction_bound[chosen], label="friction bound", **_LIMIT)
+        axes.plot(s, -solution.friction_bound[chosen], **_LIMIT)
     label_values(axes, f"traction [{units.stress}]")
     return figure
 
 
-def draw_contact_status(solution: Solution, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_status(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
     """Draw contact pressure and clearance; see `draw_contact_displacement`."""
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
@@ -183,26 +208,31 @@ def node_displacement(solution: Solution) -> FloatArray:
 
     It is interpolated between the two elements that meet where they differ.
     """
-    mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
-    space = make_space(mesh)
-    displacement = reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement)
+    make_space = solution.scene.discretisation.displacement_space
+    space = make_space(solution.mesh.whole)
+    return at_mesh_nodes(space, reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement))
+
+
+def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:
+    """Return displacements (n_scalar, 2) at the nodes of the mesh, between the two elements where they differ."""
+    mesh = space.mesh
     at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
     before, after = mesh.node_elements.T
     share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
     return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])
 
 
-def _near(distance: FloatArray, solution: Solution, chosen: BoolArray) -> FloatArray:
+def _near(distance: FloatArray, solution: SolvedContact, chosen: BoolArray) -> FloatArray:
     """Blank out distances to the obstacle that would dwarf the displacements."""
     contact = solution.contact
     largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
     return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
 
 
-def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
+def _contact_axes(solution: SolvedContact, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
     """Return a figure with a large panel above a strip that shows the status along the part."""
     abscissa = f"arc length $s$ along '{part}' [{units.length}]"
-    figure, axes, strip = panel_above_strip(f"{subject}\n{solution.scene.title}", abscissa, parse_math="$" not in part)
+    figure, axes, strip = panel_above_strip(f"{subject}\n{solution.title}", abscissa, parse_math="$" not in part)
     _draw_status(strip, solution, part)
     for transition in solution.transitions:
         if transition.part == part:
@@ -210,12 +240,12 @@ def _contact_axes(solution: Solution, part: str, units: Units, subject: str) -> 
     return figure, axes
 
 
-def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
+def _draw_status(strip: Axes, solution: SolvedContact, part: str) -> None:
     """Paint the status along a part; name it where there is room, and in a legend where there is none."""
     from matplotlib.patches import Patch
 
     chosen = solution.contact.rows(part)
-    length = float(solution.mesh.lengths[solution.mesh.part(part)].sum())
+    length = solution.part_length(part)
     transitions = [transition for transition in solution.transitions if transition.part == part]
     first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]
     words = [first, *(transition.to_status for transition in transitions)]
@@ -233,7 +263,7 @@ def _draw_status(strip: Axes, solution: Solution, part: str) -> None:
     strip.set_xlim(0.0, length)
 
 
-def _fill(axes: Axes, loops: list[FloatArray]) -> None:
+def fill(axes: Axes, loops: list[FloatArray]) -> None:
     """Fill the inside of closed loops; holes run the other way round and stay open."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
@@ -250,7 +280,7 @@ def _draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
         axes.axhline(symmetry.y, **style)
 
 
-def _draw_obstacles(axes: Axes, solution: Solution) -> None:
+def draw_obstacles(axes: Axes, obstacles: Sequence[object]) -> None:
     """Draw the rigid obstacles whose shape is known, within the frame that the body has set."""
     from matplotlib.patches import Circle as Disc
     from matplotlib.patches import Polygon
@@ -260,9 +290,9 @@ def _draw_obstacles(axes: Axes, solution: Solution) -> None:
     edge: dict[str, Any] = {"edgecolor": "#555555", "linewidth": 1.0}
     style = {**edge, "facecolor": "#EDEDED", "hatch": "////", "zorder": 0}
     is_labelled = False
-    for part in solution.scene.contact_parts:
+    for obstacle in obstacles:
         label = None if is_labelled else "obstacle"
-        match getattr(part.condition, "obstacle", None):
+        match obstacle:
             case HalfPlane(point=point, normal=normal):
                 inward = -np.array(normal) / np.hypot(*normal)
                 along = np.array([-inward[1], inward[0]])

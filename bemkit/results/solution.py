@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -23,10 +23,12 @@ from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
+from bemkit.results.contact_table import bound_at
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.coefficient_decay import CoefficientErrors
 
 
@@ -205,6 +207,26 @@ class Solution:
         return float(np.sqrt(squared)) / self.contact_traction_size
 
     @property
+    def stated(self) -> Scene:
+        """What was asked: the scene."""
+        return self.scene
+
+    @property
+    def title(self) -> str:
+        """The title of the scene."""
+        return self.scene.title
+
+    def part_length(self, part: str) -> float:
+        """Return the length of boundary of a part [m]."""
+        return float(self.mesh.lengths[self.mesh.part(part)].sum())
+
+    @cached_property
+    def friction_bound(self) -> FloatArray | None:
+        """(n_contact,) array [Pa]: the largest friction at each contact node; None if there is none anywhere."""
+        table = self.contact
+        return bound_at(table, self.scene.law_at(table.part, np.stack([table.x, table.y], axis=1)))
+
+    @property
     def contact_elements(self) -> IntArray:
         """The elements of all contact parts."""
         return np.concatenate([np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)])
@@ -267,7 +289,10 @@ class Solution:
         }
 
 
-def with_totals(result: Solution, solutions: Sequence[Solution], names: Sequence[str]) -> Solution:
+AnySolution = TypeVar("AnySolution", bound="Solution | AssemblySolution")
+
+
+def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Sequence[str]) -> AnySolution:
     """Return a solution with the steps, linear solves, times and memory of all that led to it, in their order.
 
     The names say what each of them is, for the remarks of its steps: "load step 1 of 3".

@@ -14,6 +14,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.outputs import csv_text
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
@@ -29,12 +30,12 @@ RECORD_COUNTS = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n
 _CONTACT = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 
 
-def to_csv(solution: Solution, table: str) -> str:
+def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
     """Return one table of a solution as comma-separated values with a header line.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or AssemblySolution
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
         ``"history"``: one row per step of the solver.
@@ -62,25 +63,27 @@ def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
     return columns
 
 
-def to_json(solution: Solution) -> str:
+def to_json(solution: Solution | AssemblySolution) -> str:
     """Return the summary as one JSON object; numbers that are not finite become null."""
     return json.dumps(finite_only(solution.summary()), indent=2, allow_nan=False)
 
 
-def element_displacement(solution: Solution) -> FloatArray:
+def element_displacement(solution: Solution | BodyResult) -> FloatArray:
     """Return the displacement at the element centres, (n_elements, 2) array [m], interpolated if need be."""
     space = solution.scene.discretisation.displacement_space(solution.mesh)
     at_centre = space.basis(np.zeros(1))[:, 0]
     return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))
 
 
-def _columns(solution: Solution, table: str) -> dict[str, Any]:
+def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any]:
     match table:
         case "contact":
             contact = solution.contact
             columns = {name: getattr(contact, name) for name in _CONTACT}
             return columns | {"status": contact.status_words(), "part": list(contact.part)}
         case "boundary":
+            if isinstance(solution, AssemblySolution):
+                return _columns_of_bodies(solution)
             return _boundary_columns(solution)
         case _:
             columns = dict(history_columns(solution.history))
@@ -88,7 +91,7 @@ def _columns(solution: Solution, table: str) -> dict[str, Any]:
             return columns
 
 
-def _boundary_columns(solution: Solution) -> dict[str, Any]:
+def _boundary_columns(solution: Solution | BodyResult) -> dict[str, Any]:
     names = [""] * solution.mesh.n_elements
     for name, elements in solution.mesh.parts.items():
         for element in elements.tolist():
@@ -105,6 +108,14 @@ def _boundary_columns(solution: Solution) -> dict[str, Any]:
         "t_x": traction[:, 0],
         "t_y": traction[:, 1],
     }
+
+
+def _columns_of_bodies(solution: AssemblySolution) -> dict[str, Any]:
+    """Return the columns of one body after the other, with the name of the body in front."""
+    tables = {name: _boundary_columns(body) for name, body in solution.bodies.items()}
+    names = [name for name, table in tables.items() for _ in table["part"]]
+    first = next(iter(tables.values()))
+    return {"body": names} | {column: np.concatenate([table[column] for table in tables.values()]) for column in first}
 
 
 def finite_only(value: Any) -> Any:

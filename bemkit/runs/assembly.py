@@ -18,8 +18,10 @@ from bemkit.model.assembled.prepared import prepare_assembly
 from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
+from bemkit.plan import Plan, check_memory
+from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.contact_table import ContactTable, find_transitions
+from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces
 from bemkit.results.solution import BoundaryFields
 from bemkit.runs.history import UnsolvableSceneError
@@ -81,6 +83,8 @@ def run_assembly_history(
     clock = StageClock.start()
     prepared = prepare_assembly(assemblies[0], meshes)
     steps = [prepared, *(prepared.under(_like(each, prepared.assembly)) for each in assemblies[1:])]
+    plan = plan_assembly(steps)
+    check_memory(plan)
     clock = clock.closed(Stage.MESH)
     solutions: list[AssemblySolution] = []
     with blas_threads_for(max(body.space.n_dofs for body in prepared.bodies)):
@@ -95,7 +99,7 @@ def run_assembly_history(
                 clock = clock.closed(Stage.CONDENSE)
             result = _solved(model, state, callback)
             clock = clock.closed(Stage.SOLVE)
-            solutions.append(_solution(model, result, clock))
+            solutions.append(_solution(model, result, plan, clock))
             clock = StageClock.start()
             state = result.state
             if not result.is_converged:
@@ -121,7 +125,7 @@ def _solved(
     return result
 
 
-def _solution(model: AssembledModel, result: ContactSolution, clock: StageClock) -> AssemblySolution:
+def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock: StageClock) -> AssemblySolution:
     prepared = model.prepared
     table = _contact_table(model, result.state, result.node_status)
     slip = table.u_t - model.problem.slip_origin * prepared.units.displacement
@@ -149,6 +153,8 @@ def _solution(model: AssembledModel, result: ContactSolution, clock: StageClock)
         status=result.status,
         certificate=result.certificate,
         contact=table,
+        contact_directions=prepared.frame[:, 0].copy(),
+        friction_bound=bound_at(table, prepared.law),
         contacts=contact_forces(table, prepared.frame, transitions, slip),
         history=result.history,
         linear_solves=result.linear_solves,
@@ -156,6 +162,7 @@ def _solution(model: AssembledModel, result: ContactSolution, clock: StageClock)
         transitions=transitions,
         timings=clock.timings,
         memory=clock.memory,
+        plan=plan,
         work=model.work,
         message=result.message,
     )

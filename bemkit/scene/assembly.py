@@ -161,6 +161,11 @@ class Assembly:
     def _check_accuracy(self, accuracy: float) -> None:
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
+            if discretisation.needs_accuracy:
+                raise InputError(
+                    f"discretisation is 'hp', of body {body.name!r}: degrees rise in scenes of one body alone: choose "
+                    "'quadratic', or another fixed degree"
+                )
             if not discretisation.estimates_error:
                 raise InputError(
                     f"mesh.accuracy is {accuracy}: {discretisation.method}, of body {body.name!r}, has no error "

@@ -350,7 +350,7 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
 
 
 def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
-    found = []
+    found: list[Any] = []
     word = wanted.__name__.lower()
     for name, options in _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]").items():
         with _at(name):

@@ -102,15 +102,16 @@ def load_single_body(source: str | Path) -> Scene:
     SceneError
         As `load_scene`, also if there are several bodies.
     """
-    return _single(load_scene(source), str(source))
+    return single_body(load_scene(source), str(source))
 
 
 def single_body_from_toml(text: str, *, name: str = "scene") -> Scene:
     """Turn TOML text into a scene of one body; see `scene_from_toml` and `load_single_body`."""
-    return _single(scene_from_toml(text, name=name), name)
+    return single_body(scene_from_toml(text, name=name), name)
 
 
-def _single(scene: Scene | Assembly, name: str) -> Scene:
+def single_body(scene: Scene | Assembly, name: str) -> Scene:
+    """Return a scene, and refuse an assembly; the name is for the message."""
     if isinstance(scene, Assembly):
         raise SceneError(f"{name}: there are {len(scene.placed_bodies)} bodies: only scenes of one body can do this")
     return scene
@@ -172,7 +173,7 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
 
-AnyScene = TypeVar("AnyScene", Scene, Assembly)
+AnyScene = TypeVar("AnyScene", bound=Scene | Assembly)
 
 
 def with_overrides(

@@ -20,7 +20,7 @@ from bemkit.contact.rigid_motions import RigidMotions, null_space
 from bemkit.errors import InputError
 from bemkit.operators.equilibrium import Imbalance
 
-_MOST_DENSE = 2500
+MOST_DENSE = 2500
 """Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
 
 _LOAD_FREE = ("shapes", "motions", "is_symmetric", "_relative_stiffness", "_motion_fit", "_owners", "modulus")
@@ -106,7 +106,7 @@ class JoinedBodies(LinearBody):
     @cached_property
     def is_costly(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
         """Whether a response takes a sparse factorisation."""
-        few = 2 * self.n_contact + self.motions.shape[1] <= _MOST_DENSE
+        few = 2 * self.n_contact + self.motions.shape[1] <= MOST_DENSE
         return not (few if self.is_dense is None else self.is_dense)
 
     @cached_property

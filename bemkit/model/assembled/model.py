@@ -16,12 +16,9 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody, groups
-from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.boundary_tractions import insert_loads
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.choice import choose_linear_solver
-from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import DenseCholesky, LinearSolver
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
@@ -88,7 +85,8 @@ class AssembledModel:
             )
             traction = np.array(body.to_place(traction))
             traction_space = body.scene.discretisation.traction_space(body.mesh)
-            insert_loads(traction, body.scene, body.mesh, traction_space)
+            touching = self.prepared.assembly.contact_parts(body.body)
+            insert_loads(traction, body.scene, body.mesh, traction_space, touching)
             strained = without_motion(body.own_mesh.unit, dof_points(body.own_space), displacement)
             energy = 0.5 * float(np.sum(strained * force)) * self.prepared.force_unit * units.displacement
             fields.append((body.to_place(displacement) * units.displacement, traction, energy))
@@ -110,9 +108,8 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     for group in groups(bodies):
         first = bodies[group[0]]
         material = first.material.scaled(prepared.units.modulus)
-        map_ = first.scene.discretisation.elastic_map(
-            first.own_mesh.unit, material, _linear_solver(prepared, int(group[0]))
-        )
+        solver = linear_solver(prepared, int(group[0])).solver
+        map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
         base = map_.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         work += base.work
         for number in group.tolist():
@@ -153,15 +150,6 @@ def _firsts(bodies: Sequence[PlacedBody]) -> list[int]:
         for number in group.tolist():
             first[number] = int(group[0])
     return first
-
-
-def _linear_solver(prepared: PreparedAssembly, number: int) -> LinearSolver:
-    body, conditions = prepared.bodies[number], prepared.conditions[number]
-    if not body.scene.discretisation.is_symmetric:
-        return DenseCholesky()
-    n_retained = int(np.count_nonzero(conditions.is_retained))
-    requested = prepared.assembly.linear_solver
-    return choose_linear_solver(requested, body.space.n_dofs, n_retained, physical_memory()).solver
 
 
 def _problem(prepared: PreparedAssembly, body: JoinedBodies) -> ContactProblem:

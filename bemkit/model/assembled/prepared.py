@@ -16,6 +16,9 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
+from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.memory import physical_memory
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 
@@ -195,3 +198,13 @@ def _retained(
     return tuple(
         replace(each, is_retained=own[:, None] & ~each.is_fixed) for each, own in zip(conditions, touched, strict=True)
     )
+
+
+def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver:
+    """Return the linear solver that the map of a body takes, and why."""
+    body, conditions = prepared.bodies[number], prepared.conditions[number]
+    if not body.scene.discretisation.is_symmetric:
+        return ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
+    n_retained = int(np.count_nonzero(conditions.is_retained))
+    requested = prepared.assembly.linear_solver
+    return choose_linear_solver(requested, body.space.n_dofs, n_retained, physical_memory())

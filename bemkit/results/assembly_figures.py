@@ -1,0 +1,124 @@
+"""Figures of an assembly: all bodies, deformed, and every contact once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.drawing import BLUE, GREY, new_figure
+from bemkit.results.figures import (
+    SI,
+    STATUS_COLOURS,
+    Units,
+    at_mesh_nodes,
+    contact_figures,
+    draw_obstacles,
+    exaggeration,
+    fill,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_CONTACTS = 6
+"""Contacts up to which each has figures of its own."""
+
+
+def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> dict[str, Figure]:
+    """Draw everything there is to show.
+
+    Returns
+    -------
+    dict of str to matplotlib.figure.Figure
+        By file names without ``.png``: ``deformation``, ``contacts``, and if there are few contacts those of
+        `bemkit.results.figures.contact_figures`.
+    """
+    figures = {
+        "deformation": draw_deformed_bodies(solution, units=units),
+        "contacts": draw_contact_map(solution, units=units),
+    }
+    return figures | (contact_figures(solution, units=units) if len(solution.contact.parts) <= MOST_CONTACTS else {})
+
+
+def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Figure:
+    """Draw all bodies as they were and deformed, all displacements enlarged by one factor that the picture tells.
+
+    Gaps between bodies are enlarged with the displacements as far as these close them: what touches touches.
+    """
+    bodies = list(solution.bodies.values())
+    moved = np.concatenate([body.boundary.displacement for body in bodies])
+    corners = np.concatenate(
+        [body.mesh.nodes for body in bodies if not body.mesh.is_exterior] or [bodies[0].mesh.nodes]
+    )
+    factor = exaggeration(float(np.hypot(*np.ptp(corners, axis=0))), moved)
+    figure = new_figure(6.4, 6.4)
+    axes = figure.add_subplot()
+    for number, body in enumerate(bodies):
+        _draw_body(axes, body, factor, is_labelled=number == 0)
+    axes.set_aspect("equal")
+    axes.margins(0.05)
+    conditions = [part.condition for body in bodies for part in body.scene.contact_parts]
+    draw_obstacles(axes, [getattr(condition, "obstacle", None) for condition in conditions])
+    _name_axes(axes, solution.title, units)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure:
+    """Draw all bodies, and each contact once: its status by colour, its pressure by the length of a comb."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    table = solution.contact
+    figure = new_figure(6.4, 6.4)
+    axes = figure.add_subplot()
+    for body in solution.bodies.values():
+        for loop in _loops(body.mesh.nodes, body):
+            axes.plot(*loop.T, color=GREY, linewidth=0.8, zorder=1)
+    axes.set_aspect("equal")
+    axes.margins(0.05)
+    points = np.stack([table.x, table.y], axis=1)
+    largest = float(np.max(-table.sigma_n, initial=0.0))
+    size = float(np.hypot(*np.ptp(points, axis=0))) or 1.0
+    length = 0.1 * size * np.maximum(-table.sigma_n, 0.0) / (largest or 1.0)
+    tips = points - length[:, None] * solution.contact_directions
+    words = np.array(table.status_words())
+    for word, colour in STATUS_COLOURS.items():
+        own = words == word
+        if own.any():
+            axes.add_collection(LineCollection(np.stack([points, tips], axis=1)[own], colors=colour, linewidths=1.4))
+            axes.scatter(points[own, 0], points[own, 1], s=7.0, color=colour, zorder=3, linewidths=0.0)
+    present = [word for word in STATUS_COLOURS if np.any(words == word)]
+    handles = [Line2D([], [], color=STATUS_COLOURS[word], marker="o", label=word) for word in present]
+    _name_axes(axes, f"Contacts, pressure up to {largest:.4g} {units.stress}\n{solution.title}", units)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _draw_body(axes: Axes, body: BodyResult, factor: float, *, is_labelled: bool) -> None:
+    space = body.scene.discretisation.displacement_space(body.mesh)
+    displacement = at_mesh_nodes(space, body.boundary.displacement)
+    deformed = _loops(body.mesh.nodes + factor * displacement, body)
+    labels = ("as drawn", f"deformed, displacements \u00d7 {factor:g}") if is_labelled else (None, None)
+    for number, (before, after) in enumerate(zip(_loops(body.mesh.nodes, body), deformed, strict=True)):
+        initial, enlarged = labels if number == 0 else (None, None)
+        axes.plot(*before.T, color=GREY, linestyle="--", linewidth=0.9, label=initial)
+        axes.plot(*after.T, color=BLUE, linewidth=1.4, label=enlarged)
+    if not body.mesh.is_exterior:
+        fill(axes, deformed)
+
+
+def _loops(nodes: FloatArray, body: BodyResult) -> list[FloatArray]:
+    """Return the closed loops of a body through given places of its nodes."""
+    elements = body.mesh.elements
+    return [nodes[np.append(elements[loop, 0], elements[loop[0], 0])] for loop in body.mesh.loops]
+
+
+def _name_axes(axes: Axes, title: str, units: Units) -> None:
+    axes.set_xlabel(f"$x$ [{units.length}]")
+    axes.set_ylabel(f"$y$ [{units.length}]")
+    axes.set_title(title, parse_math=False, fontsize=11)

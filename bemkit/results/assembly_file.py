@@ -1,0 +1,64 @@
+"""Assemblies in result files: the layout of `bemkit.results.result_file`, with a group for each body.
+
+/assembly        text, the assembly as TOML, instead of /scene
+/bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
+/contact         with columns direction_x, direction_y and, with friction, friction_bound
+/contacts        table: what each contact transmits
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.hdf5 import Reader, rows_of, write_table
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_outcome
+from bemkit.results.part_forces import ContactForce
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
+
+if TYPE_CHECKING:
+    import h5py
+
+_CONTACT_NUMBERS = tuple(entry.name for entry in fields(ContactForce) if entry.name != "name")
+_DIRECTIONS, _BOUND = ("direction_x", "direction_y"), "friction_bound"
+
+
+def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
+    """Write a solution into an open file, all but the text of the assembly."""
+    columns = dict(zip(_DIRECTIONS, solution.contact_directions.T, strict=True))
+    if solution.friction_bound is not None:
+        columns[_BOUND] = solution.friction_bound
+    write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
+    numbers = {name: np.array([getattr(one, name) for one in solution.contacts]) for name in _CONTACT_NUMBERS}
+    write_table(file.create_group("contacts"), {"name": [one.name for one in solution.contacts], **numbers})
+    for number, body in enumerate(solution.bodies.values()):
+        group = file.create_group(f"bodies/{number}")
+        group.attrs.update({"name": body.name, "energy": body.energy})
+        write_fields(group, body.mesh, body.boundary)
+
+
+def read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
+    """Read a solution of an assembly."""
+    has_bound = reader.has(f"contact/{_BOUND}")
+    outcome, columns = read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
+    contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
+    bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
+    return AssemblySolution(
+        assembly=assembly,
+        bodies={body.name: body for body in bodies},
+        contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
+        friction_bound=columns.get(_BOUND),
+        contacts=tuple(ContactForce(**row) for row in contacts),
+        **outcome,
+    )
+
+
+def _read_body(reader: Reader, number: int, body: Body, assembly: Assembly) -> BodyResult:
+    scene = assembly.scene_of(body)
+    mesh, boundary = read_fields(reader, f"bodies/{number}/", lambda: body.placement.mesh(scene.build_mesh()).curves)
+    energy = float(reader.attributes(f"bodies/{number}")["energy"])
+    return BodyResult(body.name, scene, mesh, boundary, energy)
