@@ -88,7 +88,7 @@ def meeting_points(points: FloatArray, directions: FloatArray, side: ContactSide
     if side.is_straight:
         start = cross(directions, side.start[rows] - points)
         end = cross(directions, side.end[rows] - points)
-        return np.clip((start + end) / (start - end), -1.0, 1.0)
+        return np.clip((start + end) / np.where(start == end, 1.0, start - end), -1.0, 1.0)
     elements = side.elements[rows]
 
     def beside(xi: FloatArray) -> FloatArray:

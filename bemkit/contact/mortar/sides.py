@@ -80,6 +80,13 @@ class ContactSide:
         return bool(self.mesh.is_straight[self.elements].all())
 
     @cached_property
+    def sagittas(self) -> FloatArray:
+        """(m,) array [m]: distances of the middles of the elements from those of their chords."""
+        if self.is_straight:
+            return np.zeros(self.elements.size)
+        return norms(self.mesh.centres[self.elements] - 0.5 * (self.start + self.end))
+
+    @cached_property
     def resolution(self) -> float:
         """Distance [m] that the coordinates of the side cannot resolve."""
         return _RESOLUTION * float(max(np.abs(self.start).max(), np.abs(self.end).max()))
