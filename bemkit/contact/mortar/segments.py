@@ -114,7 +114,7 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
     middle = (0.5 * (low + high))[:, None]
     along = non_mortar.directions(directions, row, middle)[:, 0]
     points = non_mortar.points(row, middle)[:, 0]
-    partner, eta = project(points, along, mortar, reach, 0.0)
+    partner, eta = project(points, along, mortar, reach)
     to_partner = mortar.points(partner, eta[:, None])[:, 0] - points
     distance = np.where(partner < 0, 0.0, np.einsum("sc,sc->s", to_partner, along))
     slack = np.maximum(resolution, 2.0 * (non_mortar.sagittas[row] + mortar.sagittas[partner]))
