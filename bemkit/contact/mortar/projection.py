@@ -11,8 +11,10 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.vectors import angles_between, cross
 
 _MOST_STEPS = 100
-_N_PASSES = 3
+_MOST_PASSES = 8
 """From the second pass on the projection follows the mean direction instead of the normal of the one side."""
+_SETTLED = 1e-13
+"""Change of a direction [rad] from one pass to the next that needs no further one."""
 _BESIDE = 0.1
 """In lengths of an element: a point that lies beside its end by less takes the normal at the end."""
 
@@ -66,7 +68,7 @@ def project(
     reach : float [m]
         Largest distance along the direction.
     slack : float or (m,) array [m]
-        How far a point may lie beside the ends of an element.
+        How far points that meet no element may lie beside one.
 
     Returns
     -------
@@ -78,7 +80,9 @@ def project(
     to_start, to_end = side.start - points[:, None], side.end - points[:, None]
     # along the tangent, against which a side that faces the direction runs
     start, end = cross(directions[:, None], to_start), cross(directions[:, None], to_end)
-    is_met = (start >= -slack) & (end <= slack) & (end < start)
+    is_met = (start >= 0.0) & (end <= 0.0) & (end < start)
+    is_missed = ~is_met.any(axis=1)
+    is_met[is_missed] = ((start >= -slack) & (end <= slack) & (end < start))[is_missed]
     share = start / np.where(is_met, start - end, 1.0)
     ahead, ahead_at_end = ((directions[:, None] * to).sum(axis=-1) for to in (to_start, to_end))
     distance = np.where(is_met, np.abs((1.0 - share) * ahead + share * ahead_at_end), np.inf)
@@ -122,16 +126,16 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals
-    each = np.arange(rows.size)
-    for _ in range(_N_PASSES):
+    each, half = np.arange(rows.size), np.zeros(rows.size)
+    for _ in range(_MOST_PASSES):
         partner, eta = project(points, directions, mortar, reach, _BESIDE * mortar.lengths)
         met = np.flatnonzero(partner >= 0)
         if not met.size:
             break
         opposite = -mortar.smooth_normals(partner[met], eta[met])
-        half = np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
-        if not half.any():
-            return normals
+        before, half = half, np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
+        if np.abs(half - before).max() <= _SETTLED:
+            break
         cosine, sine = np.cos(half)[:, None], np.sin(half)[:, None]
         directions = cosine * normals + sine * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
     return directions

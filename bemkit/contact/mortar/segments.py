@@ -13,6 +13,9 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross
 
+_SLIVER = 1e-10
+"""Pieces shorter than this, in local coordinates, belong to their neighbours."""
+
 
 @dataclass(frozen=True, eq=False)
 class Segments:
@@ -102,7 +105,7 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
         return cross(along, ends[point] - non_mortar.mesh.points(elements, xi[:, None])[:, 0])
 
     cuts = bracketed_roots(beside, row.size, 0.1 * resolution) if row.size else np.zeros(0)
-    tolerance = 2.0 * resolution / non_mortar.lengths
+    tolerance = np.maximum(2.0 * resolution / non_mortar.lengths, _SLIVER)
     is_inside = 1.0 - np.abs(cuts) > tolerance[row]
     row = np.concatenate([all_rows, row[is_inside]])
     low = np.concatenate([np.full(n_rows, -1.0), cuts[is_inside]])
