@@ -133,10 +133,10 @@ def _integrate(
     quadrature = quadrature_on(segments, side, mortar, directions)
     psi, rows, integrals = multiplier_functions(side, segments, quadrature, may_carry)
     dofs, first, number = np.unique(side.dofs, return_index=True, return_inverse=True)
-    number = number.reshape(side.dofs.shape)
-    full = np.bincount(number.ravel(), _basis_integrals(side).ravel())
+    number_of = number.reshape(side.dofs.shape)
+    full = np.bincount(number_of.ravel(), _basis_integrals(side).ravel())
     weights = np.zeros(dofs.size)
-    np.add.at(weights, number[rows], integrals.sum(axis=2))
+    np.add.at(weights, number_of[rows], integrals.sum(axis=2))
     has_weight = weights > 0.0
     slivers = dofs[has_weight & (weights < _LEAST_SHARE * full)]
 
@@ -146,17 +146,20 @@ def _integrate(
     position[order] = np.arange(order.size)
     nodal_weights = weights[order]
 
-    def rows_of(row: IntArray, columns: IntArray, values: FloatArray, n_columns: int) -> csr_matrix:
-        """Sum values (k, n_local, j) into the rows of the nodes of elements `row`, at columns (k, j)."""
-        row, column = np.broadcast_arrays(position[number[row]][:, :, None], columns[:, None])
+    def rows_of(elements: IntArray, columns: IntArray, values: FloatArray, n_columns: int) -> csr_matrix:
+        """Sum values (k, n_local, j) into the rows of the nodes of elements (k,), at columns (k, j)."""
+        row, column = np.broadcast_arrays(position[number_of[elements]][:, :, None], columns[:, None])
         is_kept = (row >= 0) & (values != 0.0)
-        row, column = row[is_kept], column[is_kept]
-        return csr_matrix((values[is_kept] / nodal_weights[row], (row, column)), shape=(order.size, n_columns))
+        entries, number = np.unique(row[is_kept] * n_columns + column[is_kept], return_inverse=True)
+        row, column = np.divmod(entries, n_columns)
+        sums = np.bincount(number, values[is_kept]) / nodal_weights[row]
+        starts = np.searchsorted(row, np.arange(order.size + 1))
+        return csr_matrix((sums, column, starts), shape=(order.size, n_columns))
 
     weighted = psi * quadrature.weights[:, None]
     on_mortar = mortar.space.basis(quadrature.eta.ravel()).reshape(-1, *quadrature.eta.shape).transpose(1, 2, 0)
     gap = np.zeros((dofs.size, 2))
-    np.add.at(gap, number[quadrature.row], np.matmul(weighted, quadrature.gap))
+    np.add.at(gap, number_of[quadrature.row], np.matmul(weighted, quadrature.gap))
     element, local = np.divmod(first[order], side.space.local_nodes.size)
     xi = side.space.local_nodes[local][:, None]
     direction = side.directions(directions, element, xi)[:, 0]

@@ -20,7 +20,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.mortar.segments import MortarQuadrature, Segments
 from bemkit.contact.mortar.sides import ContactSide
 
-_AT_THE_EDGE = 1e-12
+_AT_THE_EDGE = 1e-9
 """A node this far, in local coordinates, outside of the covered part counts as covered."""
 
 

@@ -11,8 +11,12 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.vectors import angles_between, cross
 
 _MOST_STEPS = 100
-_N_PASSES = 2
-"""The second pass follows the mean direction instead of the normal of the one side."""
+_MOST_PASSES = 8
+"""From the second pass on the projection follows the mean direction instead of the normal of the one side."""
+_SETTLED = 1e-13
+"""Change of a direction [rad] from one pass to the next that needs no further one."""
+_BESIDE = 0.1
+"""In lengths of an element: a point that lies beside its end by less takes the normal at the end."""
 
 
 def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, tolerance: float) -> FloatArray:
@@ -33,6 +37,12 @@ def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, 
     """
     a, b = np.full(n_roots, -1.0), np.full(n_roots, 1.0)
     f_a, f_b = function(a), function(b)
+    # without a change of sign both ends of the bracket become the nearer one
+    stays = f_a * f_b > 0.0
+    ends, values = np.where(np.abs(f_a) < np.abs(f_b), (a, f_a), (b, f_b))
+    a, b, f_a, f_b = (
+        np.where(stays, own, other) for own, other in ((ends, a), (ends, b), (values, f_a), (values, f_b))
+    )
     for _ in range(_MOST_STEPS):
         slope = f_b - f_a
         c = np.clip(b - f_b * (b - a) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
@@ -46,7 +56,7 @@ def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, 
 
 
 def project(
-    points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: float
+    points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: FloatArray | float = 0.0
 ) -> tuple[IntArray, FloatArray]:
     """Find the points of a side that lie ahead of, or behind, other points.
 
@@ -57,8 +67,8 @@ def project(
     side : ContactSide
     reach : float [m]
         Largest distance along the direction.
-    slack : float [m]
-        How far a point may lie beside the end of the side.
+    slack : float or (m,) array [m]
+        How far points that meet no element may lie beside one.
 
     Returns
     -------
@@ -70,7 +80,9 @@ def project(
     to_start, to_end = side.start - points[:, None], side.end - points[:, None]
     # along the tangent, against which a side that faces the direction runs
     start, end = cross(directions[:, None], to_start), cross(directions[:, None], to_end)
-    is_met = (start >= -slack) & (end <= slack) & (end < start)
+    is_met = (start >= 0.0) & (end <= 0.0) & (end < start)
+    is_missed = ~is_met.any(axis=1)
+    is_met[is_missed] = ((start >= -slack) & (end <= slack) & (end < start))[is_missed]
     share = start / np.where(is_met, start - end, 1.0)
     ahead, ahead_at_end = ((directions[:, None] * to).sum(axis=-1) for to in (to_start, to_end))
     distance = np.where(is_met, np.abs((1.0 - share) * ahead + share * ahead_at_end), np.inf)
@@ -88,7 +100,7 @@ def meeting_points(points: FloatArray, directions: FloatArray, side: ContactSide
     if side.is_straight:
         start = cross(directions, side.start[rows] - points)
         end = cross(directions, side.end[rows] - points)
-        return np.clip((start + end) / (start - end), -1.0, 1.0)
+        return np.clip((start + end) / np.where(start == end, 1.0, start - end), -1.0, 1.0)
     elements = side.elements[rows]
 
     def beside(xi: FloatArray) -> FloatArray:
@@ -114,17 +126,16 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals
-    slack = max(non_mortar.resolution, mortar.resolution)
-    each = np.arange(rows.size)
-    for _ in range(_N_PASSES):
-        partner, eta = project(points, directions, mortar, reach, slack)
+    each, half = np.arange(rows.size), np.zeros(rows.size)
+    for _ in range(_MOST_PASSES):
+        partner, eta = project(points, directions, mortar, reach, _BESIDE * mortar.lengths)
         met = np.flatnonzero(partner >= 0)
         if not met.size:
             break
-        opposite = -mortar.directions(mortar.normals, partner[met], eta[met, None])[:, 0]
-        half = np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
-        if not half.any():
-            return normals
+        opposite = -mortar.smooth_normals(partner[met], eta[met])
+        before, half = half, np.interp(each, met, 0.5 * angles_between(normals[met], opposite))
+        if np.abs(half - before).max() <= _SETTLED:
+            break
         cosine, sine = np.cos(half)[:, None], np.sin(half)[:, None]
         directions = cosine * normals + sine * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
     return directions

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.mortar.overlap import faces_away
 from bemkit.contact.mortar.projection import bracketed_roots, meeting_points, project
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross
+
+_SLIVER = 1e-10
+"""Pieces shorter than this, in local coordinates, belong to their neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +87,8 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
     directions : (n_knots, 2) array
         Of the projection, at the knots of the non-mortar side.
     reach : float [m]
-        A piece is covered if the mortar side lies within this distance of its middle.
+        A piece is covered if the mortar side lies within this distance of its middle: ahead of it, or behind it where
+        the bodies overlap.
     """
     n_rows, all_rows = non_mortar.elements.size, np.arange(non_mortar.elements.size)
     resolution = max(non_mortar.resolution, mortar.resolution)
@@ -100,7 +105,7 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
         return cross(along, ends[point] - non_mortar.mesh.points(elements, xi[:, None])[:, 0])
 
     cuts = bracketed_roots(beside, row.size, 0.1 * resolution) if row.size else np.zeros(0)
-    tolerance = 2.0 * resolution / non_mortar.lengths
+    tolerance = np.maximum(2.0 * resolution / non_mortar.lengths, _SLIVER)
     is_inside = 1.0 - np.abs(cuts) > tolerance[row]
     row = np.concatenate([all_rows, row[is_inside]])
     low = np.concatenate([np.full(n_rows, -1.0), cuts[is_inside]])
@@ -111,7 +116,12 @@ def common_refinement(non_mortar: ContactSide, mortar: ContactSide, directions: 
     high = _ends(row, low)
     middle = (0.5 * (low + high))[:, None]
     along = non_mortar.directions(directions, row, middle)[:, 0]
-    partner, _ = project(non_mortar.points(row, middle)[:, 0], along, mortar, reach, 0.0)
+    points = non_mortar.points(row, middle)[:, 0]
+    partner, eta = project(points, along, mortar, reach)
+    to_partner = mortar.points(partner, eta[:, None])[:, 0] - points
+    distance = np.where(partner < 0, 0.0, np.einsum("sc,sc->s", to_partner, along))
+    slack = np.maximum(resolution, 2.0 * (non_mortar.sagittas[row] + mortar.sagittas[partner]))
+    partner[faces_away(non_mortar.mesh, mortar.mesh, points + 0.5 * to_partner, distance, slack)] = -1
     return Segments(row, low, high, partner)
 
 

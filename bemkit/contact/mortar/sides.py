@@ -80,6 +80,13 @@ class ContactSide:
         return bool(self.mesh.is_straight[self.elements].all())
 
     @cached_property
+    def sagittas(self) -> FloatArray:
+        """(m,) array [m]: distances of the middles of the elements from those of their chords."""
+        if self.is_straight:
+            return np.zeros(self.elements.size)
+        return norms(self.mesh.centres[self.elements] - 0.5 * (self.start + self.end))
+
+    @cached_property
     def resolution(self) -> float:
         """Distance [m] that the coordinates of the side cannot resolve."""
         return _RESOLUTION * float(max(np.abs(self.start).max(), np.abs(self.end).max()))
@@ -126,6 +133,18 @@ class ContactSide:
             np.where(size[:, None] > 0.0, total, at_knots[self.first_knots]) / np.where(size > 0.0, size, 1.0)[:, None]
         )
 
+    def smooth_normals(self, rows: IntArray, xi: FloatArray) -> FloatArray:
+        """Return outward unit normals (r, 2) at xi (r,) of the elements at the positions `rows` (r,).
+
+        Those of straight elements turn from one to the next by interpolation.
+        """
+        normals = self.directions(self.normals, rows, xi[:, None])[:, 0]
+        is_curved = ~self.mesh.is_straight[self.elements[rows]]
+        if is_curved.any():
+            normals = normals.copy()
+            normals[is_curved] = self.mesh.normals_at(self.elements[rows[is_curved]], xi[is_curved, None])[:, 0]
+        return normals
+
     def points(self, rows: IntArray, xi: FloatArray) -> FloatArray:
         """Return points (r, q, 2) [m] at xi, (q,) or (r, q), of the elements at the positions `rows` (r,)."""
         return self.mesh.points(self.elements[rows], xi)
@@ -146,6 +165,8 @@ class ContactSide:
         (r, q, 2) array
             Unit vectors.
         """
+        if (at_knots == at_knots[0]).all():
+            return np.broadcast_to(at_knots[0], (*xi.shape, 2))
         if self.space.degree:
             basis = self.space.basis(xi.ravel())
         else:

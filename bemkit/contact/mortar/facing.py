@@ -1,0 +1,192 @@
+"""Which sides of many bodies face each other, and which of two carries the multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.mortar.overlap import faces_away
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.geometry.vectors import cross, norms, turned_right
+
+_LEAST_OPPOSITION = 0.5
+"""Cosine of the angle, 60 degrees, between one normal and the other one reversed, below which elements do not face."""
+_LEAST_COVER = 0.01
+"""Of an average element of the finer side: sides that share less only touch at a corner."""
+_WHOLE = 1.0 - 1e-6
+"""Share from which on a side counts as wholly covered: round-off of coordinates and chords of curved elements."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Elements of all sides, as chords."""
+
+    sides: Sequence[ContactSide]
+    owner: IntArray
+    side: IntArray
+    start: FloatArray
+    end: FloatArray
+    sagitta: FloatArray
+
+    @classmethod
+    def of(cls, sides: Sequence[ContactSide], owners: Sequence[int]) -> _Elements:
+        sizes = [side.elements.size for side in sides]
+        return cls(
+            sides,
+            np.repeat(np.asarray(owners), sizes),
+            np.repeat(np.arange(len(sides)), sizes),
+            np.concatenate([side.start for side in sides]),
+            np.concatenate([side.end for side in sides]),
+            np.concatenate([side.sagittas for side in sides]),
+        )
+
+
+def find_facing(
+    sides: Sequence[ContactSide], distance: float, owners: Sequence[int] | None = None
+) -> list[tuple[int, int]]:
+    """Find the pairs of sides that face each other.
+
+    Parameters
+    ----------
+    sides : sequence of ContactSide
+        Of many bodies in place.
+    distance : float [m]
+        Sides face each other where they are not farther apart than this, or overlap by no more.
+    owners : sequence of int, optional
+        The body of each side; sides of one body make no pair. Each side is a body of its own if left out.
+
+    Returns
+    -------
+    list of (int, int)
+        Non-mortar and mortar side, see `is_non_mortar`, by the smaller and then the larger number of the two.
+
+    Notes
+    -----
+    Elements face each other if their normals differ from opposite ones by 60 degrees at most, and if the chords overlap
+    when they are projected along the mean of both normals. A pair covers at least a hundredth of an average element of
+    its finer side; less is a corner that touches.
+    """
+    elements = _Elements.of(sides, range(len(sides)) if owners is None else owners)
+    first, second, cover = _facing_elements(elements, distance)
+    pairs, number = np.unique(
+        np.stack([elements.side[first], elements.side[second]], axis=1), axis=0, return_inverse=True
+    )
+    shared = np.bincount(number.ravel(), cover, minlength=len(pairs))
+    return [
+        (int(one), int(two)) if _is_first_non_mortar(sides[one], sides[two], length) else (int(two), int(one))
+        for (one, two), length in zip(pairs, shared, strict=True)
+        if length >= _LEAST_COVER * min(_mean_length(sides[one]), _mean_length(sides[two]))
+    ]
+
+
+def is_non_mortar(one: ContactSide, two: ContactSide, distance: float = np.inf) -> bool:
+    """Decide whether the first of two sides carries the multipliers.
+
+    Parameters
+    ----------
+    one, two : ContactSide
+    distance : float [m]
+        The sides face each other where they are not farther apart than this.
+
+    Returns
+    -------
+    bool
+        Whether the second side covers the first one wholly and the first one does not cover the second one; if that
+        holds of both sides or of neither, whether the nodes of the first side are closer together, on average, than
+        those of the second, or as close.
+
+    Notes
+    -----
+    A side that is wholly covered has multipliers of full size at all nodes, and fine multipliers see what happens on
+    both sides [Wohlmuth2000]. How stiff the bodies are is not known here: where a stiff body with the finer mesh
+    presses a soft one, the side of the soft one is the better choice.
+    """
+    _, _, cover = _facing_elements(_Elements.of([one, two], [0, 1]), distance)
+    return _is_first_non_mortar(one, two, float(cover.sum()))
+
+
+def _is_first_non_mortar(one: ContactSide, two: ContactSide, cover: float) -> bool:
+    """Apply the rule of `is_non_mortar` to sides that share a length [m]."""
+    lengths = [float(side.lengths.sum()) for side in (one, two)]
+    is_whole = [cover >= _WHOLE * length for length in lengths]
+    if is_whole[0] != is_whole[1]:
+        return is_whole[0]
+    spacing = [_mean_length(side) / max(side.space.degree, 1) for side in (one, two)]
+    return spacing[0] <= spacing[1] * (1.0 + 1e-9)
+
+
+def _mean_length(side: ContactSide) -> float:
+    return float(side.lengths.mean())
+
+
+def _facing_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return pairs of elements, those of the lower side first, and the length (k,) [m] that they share."""
+    first, second = _near_elements(elements, distance)
+    is_pair = elements.owner[first] != elements.owner[second]
+    swap = elements.side[first] > elements.side[second]
+    first, second = np.where(swap, second, first)[is_pair], np.where(swap, first, second)[is_pair]
+    start, end = elements.start, elements.end
+    tangents = (end - start) / norms(end - start)[:, None]
+    opposes = np.einsum("ec,ec->e", tangents[first], tangents[second]) <= -_LEAST_OPPOSITION
+    first, second = first[opposes], second[opposes]
+
+    tangent = tangents[first] - tangents[second]
+    tangent /= norms(tangent)[:, None]
+    origin = start[first]
+    (a1, b1), (b2, a2) = (
+        [np.einsum("ec,ec->e", tangent, points - origin) for points in (start[which], end[which])]
+        for which in (first, second)
+    )
+    low, high = np.maximum(a1, a2), np.minimum(b1, b2)
+    # the normal (t_y, -t_x) out of the first body, and how far along it both chords lie at the ends of the overlap
+    at = np.stack([low, high])
+    ahead1 = (at - a1) / (b1 - a1) * -cross(tangent, end[first] - origin)
+    ahead2 = (at - a2) / (b2 - a2) * cross(tangent, end[second] - start[second]) - cross(tangent, end[second] - origin)
+    gaps = ahead2 - ahead1
+    nearest = np.where(gaps[0] * gaps[1] <= 0.0, 0.0, np.abs(gaps).min(axis=0))
+    slack = elements.sagitta[first] + elements.sagitta[second]
+    is_near = (high > low) & (nearest <= distance + slack)
+    middle = origin + at.mean(axis=0)[:, None] * tangent
+    middle += 0.5 * (ahead1 + ahead2).mean(axis=0)[:, None] * turned_right(tangent)
+    # few pairs lie behind each other, and those one by one
+    depth, sides = gaps.mean(axis=0), np.stack([elements.side[first], elements.side[second]], axis=1)
+    behind = np.flatnonzero(is_near & (depth < -2.0 * slack))
+    for one, two in np.unique(sides[behind], axis=0):
+        rows = behind[(sides[behind] == (one, two)).all(axis=1)]
+        resolution = max(elements.sides[one].resolution, elements.sides[two].resolution)
+        meshes = elements.sides[one].mesh, elements.sides[two].mesh
+        is_near[rows] &= ~faces_away(*meshes, middle[rows], depth[rows], np.maximum(resolution, 2.0 * slack[rows]))
+    return first[is_near], second[is_near], (high - low)[is_near]
+
+
+def _near_elements(elements: _Elements, distance: float) -> tuple[IntArray, IntArray]:
+    """Return all pairs of elements whose circles come nearer than a distance.
+
+    Notes
+    -----
+    Elements are sorted by size, a factor of two to a class, with a tree for each class, so that neither one long nor
+    many tiny elements make the search long.
+    """
+    from scipy.spatial import cKDTree
+
+    centre = 0.5 * (elements.start + elements.end)
+    radius = 0.5 * norms(elements.end - elements.start) + elements.sagitta
+    distance = min(distance, float(norms(np.ptp(centre, axis=0))))  # farther than that is nothing
+    octave = np.frexp(radius)[1]
+    members = [np.flatnonzero(octave == size) for size in np.unique(octave)]
+    trees = [cKDTree(centre[member]) for member in members]
+    found = [np.zeros((0, 2), np.intp)]
+    for large, (member, tree) in enumerate(zip(members, trees, strict=True)):
+        largest = radius[member].max() + distance
+        inside = tree.query_pairs(2.0 * largest - distance, output_type="ndarray")
+        found.append(member[inside])
+        for other, smaller in zip(members[:large], trees[:large], strict=True):
+            near = tree.sparse_distance_matrix(smaller, largest + radius[other].max(), output_type="ndarray")
+            found.append(np.stack([member[near["i"]], other[near["j"]]], axis=1))
+    pairs = np.concatenate(found)
+    apart = norms(centre[pairs[:, 0]] - centre[pairs[:, 1]])
+    pairs = pairs[apart <= radius[pairs].sum(axis=1) + distance]
+    return pairs[:, 0], pairs[:, 1]
