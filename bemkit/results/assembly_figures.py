@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.drawing import BLUE, GREY, new_figure
+from bemkit.results.drawing import GREY, new_figure
 from bemkit.results.figures import (
     SI,
     STATUS_COLOURS,
     Units,
-    at_mesh_nodes,
     contact_figures,
+    draw_body,
     draw_obstacles,
     exaggeration,
-    fill,
+    outlines,
 )
 
 if TYPE_CHECKING:
@@ -47,18 +47,16 @@ def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> di
 def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Figure:
     """Draw all bodies as they were and deformed, all displacements enlarged by one factor that the picture tells.
 
-    Gaps between bodies are enlarged with the displacements as far as these close them: what touches touches.
+    The factor is so small that no body is drawn inside another one by more than a line is thick.
     """
     bodies = list(solution.bodies.values())
     moved = np.concatenate([body.boundary.displacement for body in bodies])
-    corners = np.concatenate(
-        [body.mesh.nodes for body in bodies if not body.mesh.is_exterior] or [bodies[0].mesh.nodes]
-    )
-    factor = exaggeration(float(np.hypot(*np.ptp(corners, axis=0))), moved)
+    size = float(np.hypot(*np.ptp(np.concatenate([body.mesh.nodes for body in bodies]), axis=0)))
+    factor = exaggeration(size, moved, solution.contact)
     figure = new_figure(6.4, 6.4)
     axes = figure.add_subplot()
     for number, body in enumerate(bodies):
-        _draw_body(axes, body, factor, is_labelled=number == 0)
+        draw_body(axes, _space(body), body.boundary.displacement, factor, is_labelled=number == 0)
     axes.set_aspect("equal")
     axes.margins(0.05)
     conditions = [part.condition for body in bodies for part in body.scene.contact_parts]
@@ -77,7 +75,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
     figure = new_figure(6.4, 6.4)
     axes = figure.add_subplot()
     for body in solution.bodies.values():
-        for loop in _loops(body.mesh.nodes, body):
+        for loop in outlines(_space(body), body.boundary.displacement, 0.0):
             axes.plot(*loop.T, color=GREY, linewidth=0.8, zorder=1)
     axes.set_aspect("equal")
     axes.margins(0.05)
@@ -99,23 +97,8 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
     return figure
 
 
-def _draw_body(axes: Axes, body: BodyResult, factor: float, *, is_labelled: bool) -> None:
-    space = body.scene.discretisation.displacement_space(body.mesh)
-    displacement = at_mesh_nodes(space, body.boundary.displacement)
-    deformed = _loops(body.mesh.nodes + factor * displacement, body)
-    labels = ("as drawn", f"deformed, displacements \u00d7 {factor:g}") if is_labelled else (None, None)
-    for number, (before, after) in enumerate(zip(_loops(body.mesh.nodes, body), deformed, strict=True)):
-        initial, enlarged = labels if number == 0 else (None, None)
-        axes.plot(*before.T, color=GREY, linestyle="--", linewidth=0.9, label=initial)
-        axes.plot(*after.T, color=BLUE, linewidth=1.4, label=enlarged)
-    if not body.mesh.is_exterior:
-        fill(axes, deformed)
-
-
-def _loops(nodes: FloatArray, body: BodyResult) -> list[FloatArray]:
-    """Return the closed loops of a body through given places of its nodes."""
-    elements = body.mesh.elements
-    return [nodes[np.append(elements[loop, 0], elements[loop[0], 0])] for loop in body.mesh.loops]
+def _space(body: BodyResult) -> BoundarySpace:
+    return body.scene.discretisation.displacement_space(body.mesh)
 
 
 def _name_axes(axes: Axes, title: str, units: Units) -> None:

@@ -34,6 +34,10 @@ _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "sli
 
 _EXAGGERATION = 0.08
 """The largest displacement is drawn about this long, in diameters of the body."""
+_LINE = 0.003
+"""Thickness of a line, in sizes of the picture."""
+_POINTS_OF_CURVE = 9
+"""Points of an element whose displacement or shape is curved."""
 _FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6, "marker": "o", "markersize": 2.0})
 _SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
 _LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
@@ -115,29 +119,57 @@ def contact_figures(solution: SolvedContact, *, units: Units = SI) -> dict[str, 
 
 
 def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
-    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells."""
-    mesh = solution.mesh.whole
-    displacement = node_displacement(solution)
-    factor = exaggeration(mesh.diameter, displacement)
-    deformed = mesh.nodes + factor * displacement
+    """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
+
+    The factor is so small that no contact node is drawn inside its obstacle by more than a line is thick.
+    """
+    mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
+    space = make_space(mesh)
+    displacement = reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement)
+    factor = exaggeration(mesh.diameter, displacement, solution.contact)
     figure = new_figure(5.6, 5.6)
     axes = figure.add_subplot()
-    for number, loop in enumerate(mesh.loops):
-        order = np.append(mesh.elements[loop, 0], mesh.elements[loop[0], 0])
-        initial, enlarged = ("initial", f"deformed, displacements \u00d7 {factor:g}") if number == 0 else (None, None)
-        axes.plot(*mesh.nodes[order].T, color=GREY, linestyle="--", linewidth=1.2, label=initial)
-        axes.plot(*deformed[order].T, color=BLUE, linewidth=1.8, label=enlarged)
-    if not mesh.is_exterior:
-        fill(axes, [deformed[mesh.elements[loop, 0]] for loop in mesh.loops])
+    draw_body(axes, space, displacement, factor, is_labelled=True)
     _draw_symmetry_lines(axes, solution.mesh.symmetry)
     axes.set_aspect("equal")
     axes.margins(0.08)
     draw_obstacles(axes, [getattr(part.condition, "obstacle", None) for part in solution.scene.contact_parts])
     axes.set_xlabel(f"$x$ [{units.length}]")
     axes.set_ylabel(f"$y$ [{units.length}]")
-    axes.set_title(solution.scene.title, parse_math=False, fontsize=11)
+    axes.set_title(solution.title, parse_math=False, fontsize=11)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def draw_body(
+    axes: Axes, space: BoundarySpace, displacement: FloatArray, factor: float, *, is_labelled: bool = False
+) -> None:
+    """Draw the outline of a body, dashed, and the deformed body."""
+    before, after = outlines(space, displacement, 0.0), outlines(space, displacement, factor)
+    labels = ("initial", f"deformed, displacements \u00d7 {factor:g}") if is_labelled else (None, None)
+    for number, (initial, deformed) in enumerate(zip(before, after, strict=True)):
+        of_initial, of_deformed = labels if number == 0 else (None, None)
+        axes.plot(*initial.T, color=GREY, linestyle="--", linewidth=1.0, label=of_initial)
+        axes.plot(*deformed.T, color=BLUE, linewidth=1.6, label=of_deformed)
+    if not space.mesh.is_exterior:
+        fill(axes, after)
+
+
+def outlines(space: BoundarySpace, displacement: FloatArray, factor: float) -> list[FloatArray]:
+    """Return the closed loops (n, 2) of a body moved by a multiple of its displacement, curves as fine as the eye."""
+    mesh = space.mesh
+    n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
+    xi = np.linspace(-1.0, 1.0, n_points)[:-1]
+    moved = mesh.points(np.arange(mesh.n_elements), xi)
+    if space.is_continuous:
+        values = np.einsum("pq,epc->eqc", space.basis(xi), displacement[space.element_dofs])
+    else:
+        at_start = at_mesh_nodes(space, displacement)[mesh.elements]
+        shares = np.stack([0.5 - 0.5 * xi, 0.5 + 0.5 * xi])
+        values = np.einsum("pq,epc->eqc", shares, at_start)
+    moved = moved + factor * values
+    loops = [moved[loop].reshape(-1, 2) for loop in mesh.loops]
+    return [np.concatenate([loop, loop[:1]]) for loop in loops]
 
 
 def draw_contact_displacement(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
@@ -187,30 +219,34 @@ def draw_contact_status(solution: SolvedContact, part: str, *, units: Units = SI
     return figure
 
 
-def exaggeration(diameter: float, displacement: FloatArray) -> float:
-    """Choose the factor 1, 2 or 5 times a power of ten by which displacements are drawn; 1 if there are none.
+def exaggeration(size: float, displacement: FloatArray, contact: ContactTable) -> float:
+    """Choose the factor 1, 2 or 5 times a power of ten by which displacements are drawn.
 
     Parameters
     ----------
-    diameter : float [m]
+    size : float [m]
+        Of what is drawn.
     displacement : (n, 2) array [m]
+    contact : ContactTable
+        Drawn so large, displacements close gaps that are not enlarged with them.
+
+    Returns
+    -------
+    float
+        Such that the largest displacement is seen, and no contact node is drawn beyond its partner by more than a line
+        is thick; 1 if that is impossible, or if nothing moves.
     """
     largest = float(np.hypot(*displacement.T).max())
     if not 0.0 < largest < np.inf:
         return 1.0
-    wanted = _EXAGGERATION * diameter / largest
+    wanted = _EXAGGERATION * size / largest
+    closing = np.isfinite(contact.gap) & (contact.u_n > 0.0)
+    room = np.maximum(contact.gap[closing], 0.0) + _LINE * size
+    wanted = min(wanted, float(np.min(room / contact.u_n[closing], initial=np.inf)))
+    if wanted <= 1.0 and closing.any():
+        return 1.0
     power = 10.0 ** floor(log10(wanted))
     return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= wanted or step == 1.0)
-
-
-def node_displacement(solution: Solution) -> FloatArray:
-    """Return the displacement at the nodes of ``solution.mesh.whole``, (n_nodes, 2) array [m].
-
-    It is interpolated between the two elements that meet where they differ.
-    """
-    make_space = solution.scene.discretisation.displacement_space
-    space = make_space(solution.mesh.whole)
-    return at_mesh_nodes(space, reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement))
 
 
 def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:
