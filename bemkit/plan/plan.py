@@ -244,7 +244,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     """Say what scenes that follow each other in time need; see `make_plan`."""
     first = steps[0]
     sizes = find_sizes(first)
-    loads = tuple(GivenData.of(first.conditions, step.force, step.conditions.displacement) for step in steps)
+    loads = tuple(step.map_data for step in steps)
     case = BodyCase(first.mesh, first.material, first.conditions, loads, first.linear_solver)
     needs = first.scene.discretisation.needs(case)
     return Plan(

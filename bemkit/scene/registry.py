@@ -135,6 +135,15 @@ CONDITIONS = Registry(
     },
 )
 
+BODY_FORCES = Registry(
+    "body force",
+    {
+        "gravity": "bemkit.scene.body_forces:Gravity",
+        "rotation": "bemkit.scene.body_forces:Rotation",
+        "heating": "bemkit.scene.body_forces:Heating",
+    },
+)
+
 OBSTACLES = Registry(
     "obstacle",
     {

@@ -27,9 +27,11 @@ from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
+from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Condition, Part
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import (
+    BODY_FORCES,
     CONDITIONS,
     DISCRETISATIONS,
     GRADINGS,
@@ -48,6 +50,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Shape, SHAPES),
     (Grading, GRADINGS),
     (Condition, CONDITIONS),
+    (BodyForce, BODY_FORCES),
     (Obstacle, OBSTACLES),
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),

@@ -26,7 +26,7 @@ MAX_BYTES = 1_000_000
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "symmetry", "law", "shape", "material", "mesh", "parts"),
+    *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "mesh", "parts"),
 )
 _PART_KEYS = ("sides", "where", "condition")
 
@@ -130,6 +130,8 @@ def scene_to_toml(scene: Scene) -> str:
         raise SceneError(str(error)) from error
     if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
         del table["law"], table["solver"]
+    if not scene.body_forces:
+        del table["body_forces"]
     table["parts"] = {part["name"]: _ordered(part, _PART_KEYS) for part in table["parts"]}
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
