@@ -123,6 +123,6 @@ def _reason(
             "f_xx + f_yy = 0, such as '20 + 5 * x'"
         )
     return (
-        f"is harmonic, but polynomials of degree {HIGHEST_DEGREE} miss it by {miss:.1e} of its size: give a number, a "
-        "polynomial, or in a body with one hole a multiple of log(r) besides, r the distance from the centre of the hole"
+        f"is harmonic, but polynomials of degree {HIGHEST_DEGREE} miss it by {miss:.1e} of its size: give a number or "
+        "a polynomial, in a body with one hole plus a multiple of log(r), r the distance from the centre of the hole"
     )

@@ -124,5 +124,12 @@ class ParticularFields:
         """Return the tractions (n_elements, n_local, 2) [Pa] projected onto a space on the unit mesh."""
         return self.modulus * projected_tractions(self.solution, space)
 
+    @property
+    def held_energy(self) -> float:
+        """E' times the square of the largest thermal strain times the area [J/m]."""
+        points = self._to_unit(np.concatenate([self.mesh.nodes, self.mesh.centres]))
+        strain = float(np.abs(self.solution.expansion(points)).max())
+        return self.modulus * strain**2 * self.mesh.area
+
     def _to_unit(self, points: FloatArray) -> FloatArray:
         return np.asarray((points - self.mesh.centre) / self.mesh.diameter)

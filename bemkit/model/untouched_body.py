@@ -83,11 +83,11 @@ class UntouchedBody(LinearBody):
             return Imbalance(np.nan, np.nan)
         points, balanced = dof_points(self.space), admissible_modes(self.space.mesh)
         round_off = round_off_of(displacement, self.condensed.sensitivity)
-        inside, heat = self.condensed.volume_force, self.condensed.thermal_force
-        total = float(np.abs(force).sum()) + heat or 1.0
+        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
+        total = float(np.abs(force).sum()) + inner or 1.0
         missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
-        return residual.joined(resultant_imbalance(points, force, balanced, round_off, inside, heat))
+        return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))
 
 
 def untouched_state() -> ContactState:

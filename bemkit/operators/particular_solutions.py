@@ -14,7 +14,6 @@ is the gradient of a thermoelastic potential [TimoshenkoGoodier1970].
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import NamedTuple, Protocol
@@ -87,7 +86,8 @@ class CentrifugalForce:
         freedom, square = 1.0 - material.effective_poisson_ratio, np.abs(z) ** 2
         c = -0.125 * self.factor * material.plane_compressibility / freedom
         mean = -0.25 * self.factor / freedom * square
-        return ComplexState(c * square * z, 2.0 * c * square + 0j, c * z**2, mean, np.zeros_like(square))
+        along = (2.0 * c * square).astype(complex)
+        return ComplexState(c * square * z, along, c * z**2, mean, np.zeros_like(square))
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,8 @@ class LogarithmicExpansion:
         log, m = np.log(np.abs(arm)), self.strength / (1.0 - material.effective_poisson_ratio)
         across = 0.25 * m * arm / arm.conj()
         mean = -material.shear_modulus * m * log
-        return ComplexState(0.5 * m * arm * (log - 0.5), 0.5 * m * log + 0j, across, mean, self.strength * log)
+        along = (0.5 * m * log).astype(complex)
+        return ComplexState(0.5 * m * arm * (log - 0.5), along, across, mean, self.strength * log)
 
 
 @dataclass(frozen=True)
@@ -193,9 +194,10 @@ class ParticularSolution:
 
     def _state(self, points: FloatArray) -> ComplexState:
         z = points[:, 0] + 1j * points[:, 1]
-        nothing = ComplexState(*(np.zeros_like(z) for _ in range(3)), *(np.zeros(z.shape) for _ in range(2)))
+        none = np.zeros_like(z)
+        nothing = ComplexState(none, none, none, none.real, none.real)
         return reduce(_sum, (source.state(z, self.material) for source in self.sources), nothing)
 
 
-def _sum(first: Iterable[ComplexArray], second: Iterable[ComplexArray]) -> ComplexState:
-    return ComplexState(*(a + b for a, b in zip(first, second, strict=True)))
+def _sum(first: ComplexState, second: ComplexState) -> ComplexState:
+    return ComplexState._make(a + b for a, b in zip(first, second, strict=True))

@@ -18,7 +18,6 @@ from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 

@@ -18,6 +18,8 @@ from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import ConstantSpace
+from bemkit.model.particular import ParticularFields
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
@@ -28,6 +30,10 @@ from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
     from bemkit.results.coefficient_decay import CoefficientErrors
+
+
+_FREE_SHARE = 1e-16
+"""Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +103,8 @@ class Solution:
     force_tangential : float [N/m]
         The total friction force on the body along the boundary tangent: the integral of sigma_t.
     energy : float [J/m]
-        Elastic energy 1/2 a(u, u).
+        Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
+        also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
     transitions : tuple of Transition
     timings : mapping of str to float [s]
         Of each stage of the run, and of all.
@@ -147,6 +154,26 @@ class Solution:
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @cached_property
+    def particular(self) -> ParticularFields | None:
+        """The particular solution of the body forces, known in closed form; None without body forces."""
+        return ParticularFields.of(self.scene, self.mesh)
+
+    @cached_property
+    def map_boundary(self) -> BoundaryFields:
+        """The fields on the boundary less the particular solution: what elements stand for, and what has an error."""
+        if self.particular is None:
+            return self.boundary
+        own, mesh = self.boundary, self.mesh.unit
+        means = self.particular.tractions(ConstantSpace(mesh))[:, 0]
+        dofs = means
+        if len(own.traction_dofs) > len(means):
+            dofs = self.particular.tractions(self.scene.discretisation.traction_space(mesh)).reshape(-1, 2)
+        displacement = own.displacement - self.particular.displacement(own.points)
+        return replace(
+            own, displacement=displacement, traction=own.traction - means, traction_dofs=own.traction_dofs - dofs
+        )
+
+    @cached_property
     def coefficient_errors(self) -> CoefficientErrors | None:
         """Estimated errors of each element of degree 3 and more; None of other elements."""
         discretisation, mesh = self.scene.discretisation, self.mesh
@@ -155,9 +182,9 @@ class Solution:
             return None
         from bemkit.results.coefficient_decay import coefficient_errors
 
-        at_nodes = self.boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
+        at_nodes = self.map_boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
         modulus = self.scene.material.plane_modulus
-        return coefficient_errors(space, tractions, self.boundary.displacement, at_nodes, modulus)
+        return coefficient_errors(space, tractions, self.map_boundary.displacement, at_nodes, modulus)
 
     @cached_property
     def element_errors(self) -> FloatArray | None:
@@ -170,7 +197,8 @@ class Solution:
         from bemkit.results.error_indicators import squared_errors
 
         make_space = discretisation.displacement_space
-        return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
+        fields = self.map_boundary
+        return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
 
     @cached_property
     def estimated_error(self) -> float | None:
@@ -184,7 +212,9 @@ class Solution:
         error = float(self.element_errors.sum())
         if error == 0.0:
             return 0.0
-        return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
+        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
+        size = 2.0 * max(self.energy, held)
+        return float(np.sqrt(error / size)) if size > 0.0 else None
 
     @cached_property
     def estimated_traction_error(self) -> float | None:

@@ -1,4 +1,4 @@
-"""What acts inside the body: its weight, its rotation, its temperature; frozen values in one consistent set of units."""
+"""What acts inside the body: weight, rotation, temperature; frozen values in one consistent set of units."""
 
 from __future__ import annotations
 

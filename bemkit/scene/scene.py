@@ -57,8 +57,8 @@ class Scene:
         On all contact parts that have no law of their own.
     load_factors : tuple of float
         The load history: all tractions, pressures, prescribed displacements and body forces times these numbers, one
-        step after the other. A single number (the default is 1) is the static law, which judges slip by the total displacement;
-        with several, slip counts from the end of the step before (the incremental law).
+        step after the other. A single number (the default is 1) is the static law, which judges slip by the total
+        displacement; with several, slip counts from the end of the step before (the incremental law).
     symmetry : Symmetry, optional
         Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
         x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
@@ -76,8 +76,8 @@ class Scene:
     ------
     ValueError
         If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
-        finite, body forces act in an exterior, an accuracy is asked of collocation or of a load history, conjugate gradients are asked of collocation,
-        or a law with friction or a solver is given without any contact.
+        finite, body forces act in an exterior, an accuracy is asked of collocation or of a load history, conjugate
+        gradients are asked of collocation, or a law with friction or a solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """

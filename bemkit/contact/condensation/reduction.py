@@ -230,13 +230,13 @@ class CondensedBody(DenseBody):
         noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
-        inside, heat = self.condensed.volume_force, self.condensed.thermal_force
-        if inside is not None:
-            given = np.append(given, [*inside[:2], heat])
+        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
+        if resultant is not None:
+            given = np.append(given, [*resultant[:2], inner])
         of_contact = self.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
-        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, inside, heat))
+        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, resultant, inner))
 
     def _in_frames(self, force: FloatArray) -> FloatArray:
         """Return forces (n_nodes, 2) in the frames of the nodes."""

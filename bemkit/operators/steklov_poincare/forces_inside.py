@@ -33,15 +33,16 @@ class ForcesInside:
         Its values, and the nodal forces of its tractions.
     volume_force : (3,) array [N/m], [N/m], [N]
         Resultants along x and y of the forces inside, and their moment about the origin.
-    thermal_force : float [N/m]
-        Sum of the sizes of forces that could hold back what heat expands: E' times the strain, along the boundary.
+    inner_force : float [N/m]
+        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not: of those
+        above, and of E' times the strains that heat causes.
     """
 
     solution: ParticularSolution
     displacement: FloatArray
     force: FloatArray
     volume_force: FloatArray
-    thermal_force: float
+    inner_force: float
 
     @classmethod
     def of(cls, solution: ParticularSolution, space: BoundarySpace) -> ForcesInside:
@@ -55,7 +56,7 @@ class ForcesInside:
             displacement=solution.displacement(points),
             force=force,
             volume_force=-np.array([*force.sum(axis=0), moment]),
-            thermal_force=solution.material.plane_modulus * strained_length,
+            inner_force=float(np.abs(force).sum()) + solution.material.plane_modulus * strained_length,
         )
 
     def add_to(self, weightless: CondensedMap, conditions: NodalConditions) -> CondensedMap:
@@ -88,7 +89,7 @@ class ForcesInside:
             under=under,
             follow=follow,
             volume_force=self.volume_force,
-            thermal_force=self.thermal_force,
+            inner_force=self.inner_force,
             weightless=weightless,
         )
 
