@@ -77,6 +77,9 @@ if TYPE_CHECKING:
     from bemkit.runs.run import run as run
     from bemkit.runs.run import run_all as run_all
     from bemkit.runs.run import run_probe as run_probe
+    from bemkit.scene.body_forces import Gravity as Gravity
+    from bemkit.scene.body_forces import Heating as Heating
+    from bemkit.scene.body_forces import Rotation as Rotation
     from bemkit.scene.conditions import Clamped as Clamped
     from bemkit.scene.conditions import Contact as Contact
     from bemkit.scene.conditions import Part as Part
@@ -129,6 +132,7 @@ _HOME = {
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
+    "scene.body_forces": ("Gravity", "Heating", "Rotation"),
     "scene.conditions": ("Clamped", "Contact", "Part", "PrescribedDisplacement", "Pressure", "Roller", "Traction"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
     "scene.mesh_options": ("MeshOptions",),

@@ -21,7 +21,7 @@ from bemkit.arrays import FloatArray
 from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
 from bemkit.studies.stability.independent_check.boundary import Boundary, beyond, largest, trusted_stress
-from bemkit.studies.stability.independent_check.inside import inner_work, without_particular
+from bemkit.studies.stability.independent_check.inside import inner_work, particular_tractions, without_particular
 from bemkit.studies.stability.independent_check.nodes import Fields
 
 _N_OUTSIDE = 6
@@ -87,6 +87,10 @@ def imbalance(fields: Fields) -> float:
     interpolated = np.einsum("encm,nq->eqcm", motions[boundary.nodes], boundary.basis)
     loads = _loads(solution, boundary)
     inside = inner_work(solution, boundary)
+    if solution.particular is not None:  # its tractions act on the elements as loads do, with the other sign
+        missed = motions_at(solution, boundary.points) - interpolated
+        acting = particular_tractions(solution, boundary) * boundary.shares[..., None]
+        inside = inside + np.einsum("eqc,eqcm->m", acting, missed)
     work = work + np.einsum("eqc,eqcm->m", loads, interpolated) + inside
     size = float(np.abs(contact).sum()) + float(np.abs(loads).sum()) + trusted_stress(solution) * mesh.diameter
     size += float(np.abs(solution.boundary.traction * mesh.lengths[:, None]).sum()) + float(np.abs(inside).sum())

@@ -47,6 +47,13 @@ def without_particular(solution: Solution, boundary: Boundary) -> tuple[FloatArr
     fields, particular = solution.boundary, solution.particular
     if particular is None:
         return fields.displacement, boundary.traction
-    stress = particular.stress(boundary.points.reshape(-1, 2)).reshape(*boundary.points.shape, 2)
-    tractions = np.einsum("eqij,eqj->eqi", stress, boundary.normals)
-    return fields.displacement - particular.displacement(fields.points), boundary.traction - tractions
+    left = fields.displacement - particular.displacement(fields.points)
+    return left, boundary.traction - particular_tractions(solution, boundary)
+
+
+def particular_tractions(solution: Solution, boundary: Boundary) -> FloatArray:
+    """Return the tractions (n_elements, n_places, 2) of the particular solution at quadrature points."""
+    if solution.particular is None:
+        return np.zeros_like(boundary.points)
+    stress = solution.particular.stress(boundary.points.reshape(-1, 2)).reshape(*boundary.points.shape, 2)
+    return np.asarray(np.einsum("eqij,eqj->eqi", stress, boundary.normals))
