@@ -84,6 +84,9 @@ if TYPE_CHECKING:
     from bemkit.scene.assembly import ContactPair as ContactPair
     from bemkit.scene.assembly import Touching as Touching
     from bemkit.scene.body import Body as Body
+    from bemkit.scene.body_forces import Gravity as Gravity
+    from bemkit.scene.body_forces import Heating as Heating
+    from bemkit.scene.body_forces import Rotation as Rotation
     from bemkit.scene.conditions import Clamped as Clamped
     from bemkit.scene.conditions import Contact as Contact
     from bemkit.scene.conditions import Free as Free
@@ -145,6 +148,7 @@ _HOME = {
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
     "scene.assembly": ("Assembly", "ContactPair", "Touching"),
     "scene.body": ("Body",),
+    "scene.body_forces": ("Gravity", "Heating", "Rotation"),
     "scene.conditions": (
         *("Clamped", "Contact", "Free", "Part", "PrescribedDisplacement", "Pressure", "Roller", "Traction"),
     ),

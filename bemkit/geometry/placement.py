@@ -56,6 +56,10 @@ class Placement:
         """Move points (..., 2) [m]."""
         return np.asarray(self.turned(points) + np.array(self.shift))
 
+    def back(self, points: FloatArray) -> FloatArray:
+        """Move points (..., 2) [m] back into the coordinates of the shape."""
+        return self.turned_back(np.asarray(points - np.array(self.shift)))
+
     def turned(self, vectors: FloatArray) -> FloatArray:
         """Turn vectors (..., 2)."""
         return vectors if self.is_shift else np.asarray(vectors @ self.rotation.T)

@@ -28,6 +28,7 @@ from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 
@@ -90,13 +91,16 @@ class Model:
         """
         stays = prepared.candidates.of(self.nodes)
         is_new_friction = self.nodes.is_frictionless & ~stays.nodes.is_frictionless
+        elastic = self.elastic
+        if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
+            elastic = replace(elastic, inside=prepared.inside)
         if stays.has_same_directions(self.contact) and not is_new_friction.any():
-            body = self.body.under(prepared.conditions.displacement, prepared.force)
+            body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
             # a node that has lost its friction stays what it is in the condensed body
             prepared = replace(prepared, conditions=body.conditions, contact=replace(stays, nodes=self.nodes))
         else:
-            body = contact_body(self.elastic, prepared)
-        return Model(prepared, self.elastic, body, _problem(prepared, body))
+            body = contact_body(elastic, prepared)
+        return Model(prepared, elastic, body, _problem(prepared, body))
 
     @property
     def work(self) -> OperationCounts:
@@ -118,7 +122,7 @@ class Model:
             Values at the local nodes of the traction space, element by element: given loads and contact tractions
             projected onto its functions, reactions of supports, and zero on the free boundary.
         energy : float [J/m]
-            Elastic energy 1/2 a(u, u).
+            Elastic energy of the stresses in the plane; without heat 1/2 a(u, u).
         """
         units, mesh = self.units, self.mesh
         displacement, force = self.body.recover(state)
@@ -126,11 +130,18 @@ class Model:
         self._insert_contact(traction, state)
         traction *= units.stress
         insert_loads(traction, self.scene, self.mesh, self.elastic.traction_space)
-        points = dof_points(self.prepared.space)
         # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
-        strained = without_motion(mesh.unit, points, displacement)
-        energy = 0.5 * float(np.sum(strained * force)) * units.stress * units.displacement * units.length
-        return displacement * units.displacement, traction, energy
+        of_map, map_force = self.map_fields(displacement, force)
+        strained = without_motion(mesh.unit, dof_points(self.prepared.space), of_map)
+        energy = 0.5 * float(np.sum(strained * map_force))
+        if isinstance(self.elastic, HeavyElasticity):
+            energy += self.elastic.energy_beyond(displacement, force)
+        return displacement * units.displacement, traction, energy * units.stress * units.displacement * units.length
+
+    def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body."""
+        inside = self.prepared.inside
+        return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
@@ -176,6 +187,8 @@ def build_model(prepared: Prepared) -> Model:
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
     elastic = discretisation.elastic_map(mesh, prepared.material, prepared.linear_solver.solver)
+    if prepared.inside is not None:
+        elastic = HeavyElasticity(elastic, prepared.inside)
     body = contact_body(elastic, prepared)
     return Model(prepared, elastic, body, _problem(prepared, body))
 

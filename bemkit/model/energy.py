@@ -35,7 +35,7 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
     condensed = model.body.condensed
-    displacement, force = model.body.recover(result.state)
+    displacement, force = model.map_fields(*model.body.recover(result.state))
     sensitivity = condensed.sensitivity
     if sensitivity is None:  # a node resists by about E' per displacement, whatever the elements around it are
         sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)

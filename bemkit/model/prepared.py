@@ -21,12 +21,14 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
+from bemkit.model.particular import particular_solution, stress_of
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, integrate_traction
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, Support, integrate_traction
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
 from bemkit.scene.symmetry import check_symmetry
@@ -98,7 +100,7 @@ def parts_on(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, Flo
 
 
 def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
-    """Choose the units by the largest load, prescribed displacement or interference.
+    """Choose the units by the largest load, body force, prescribed displacement or interference.
 
     Raises
     ------
@@ -119,6 +121,7 @@ def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[floa
     The length [m] tells which overlaps and gaps are the round-off of coordinates.
     """
     loads, motions, gaps = [0.0], [0.0], [0.0]
+    loads += [stress_of(force, mesh, scene.material) for force in scene.body_forces]
     places = np.array([-1.0, 0.0, 1.0])
     for part, elements, normals in parts_on(scene, mesh):
         points, normals = mesh.points(elements, places).reshape(-1, 2), np.repeat(normals, places.size, axis=0)
@@ -200,6 +203,8 @@ class Prepared:
         Those of them that can touch their obstacle.
     force : (n_nodes, 2) array [-]
         Given nodal forces.
+    inside : ForcesInside or None
+        What acts inside the body; None if nothing does.
     """
 
     scene: Scene
@@ -210,11 +215,20 @@ class Prepared:
     candidates: ContactData
     contact: ContactData
     force: FloatArray
+    inside: ForcesInside | None = None
 
     @property
     def material(self) -> Material:
         """The material, its modulus in dimensionless units."""
         return self.scene.material.scaled(self.units.modulus)
+
+    @property
+    def map_data(self) -> GivenData:
+        """The forces and displacements under which the elastic map is solved, without what acts inside the body."""
+        conditions, force = self.conditions, self.force
+        if self.inside is not None:
+            conditions, force = self.inside.left_of(conditions, force)
+        return GivenData.of(conditions, force, conditions.displacement)
 
     @cached_property
     def free_motions(self) -> FloatArray:
@@ -290,7 +304,9 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
     candidates = find_contact(scene, mesh, space)
     conditions, nodes = contact_conditions(space, supports_on(scene, mesh, units, space), candidates.nodes)
     force = nodal_forces(scene, mesh, space, units)
-    return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force)
+    solution = particular_solution(scene, mesh, units.modulus, units.stress)
+    inside = None if solution is None else ForcesInside.of(solution, space)
+    return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside)
 
 
 def _check_position(mesh: BoundaryMesh) -> None:
@@ -309,6 +325,8 @@ def _check_same_body(scene: Scene, other: Scene) -> None:
     for name in ("shape", "material", "symmetry", "discretisation"):
         if getattr(scene, name) != getattr(other, name):
             raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
+    if [type(force) for force in scene.body_forces] != [type(force) for force in other.body_forces]:
+        raise InputError("body_forces change their kinds or order: change numbers only, or build a new model")
     for part, changed in zip_longest(scene.parts, other.parts):
         if part is None or changed is None or _layout(part) != _layout(changed):
             name = (part or changed).name

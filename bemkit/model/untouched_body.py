@@ -16,6 +16,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare import CondensedMap
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
@@ -65,13 +66,12 @@ class UntouchedBody(LinearBody):
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
         return self.condensed.recover(np.zeros(0))
 
-    def under(self, displacement: FloatArray, force: FloatArray) -> UntouchedBody:
-        """Return the same body under other prescribed displacements and nodal forces; nothing is factored again."""
-        condensed = self.condensed.under(force, displacement)
+    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> UntouchedBody:
+        """Return the same body under other displacements and forces; see `CondensedBody.under`."""
+        conditions = replace(self.conditions, displacement=displacement)
+        condensed = condensed_under(self.condensed, conditions, force, inside)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)
-        return replace(
-            self, conditions=replace(self.conditions, displacement=displacement), force=force, condensed=condensed
-        )
+        return replace(self, conditions=conditions, force=force, condensed=condensed)
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the forces are from those given on free directions, and all together from equilibrium.
@@ -83,10 +83,11 @@ class UntouchedBody(LinearBody):
             return Imbalance(np.nan, np.nan)
         points, balanced = dof_points(self.space), admissible_modes(self.space.mesh)
         round_off = round_off_of(displacement, self.condensed.sensitivity)
-        total = float(np.abs(force).sum()) or 1.0
+        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
+        total = float(np.abs(force).sum()) + inner or 1.0
         missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
-        return residual.joined(resultant_imbalance(points, force, balanced, round_off, self.condensed.volume_force))
+        return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))
 
 
 def untouched_state() -> ContactState:

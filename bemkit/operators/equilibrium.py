@@ -138,6 +138,7 @@ def resultant_imbalance(
     balanced: Collection[int],
     round_off: float,
     volume_force: FloatArray | None = None,
+    inner_force: float = 0.0,
 ) -> Imbalance:
     """Return resultant force and moment of all forces on a body, relative to the sum of their sizes.
 
@@ -150,6 +151,8 @@ def resultant_imbalance(
         What may be left of a sum of these forces.
     volume_force : (3,) array, optional
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
+    inner_force : float [N/m]
+        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not.
 
     Returns
     -------
@@ -157,7 +160,7 @@ def resultant_imbalance(
         The moment about the mean point, in units of the size of the body.
     """
     inside = np.zeros(3) if volume_force is None else volume_force
-    total = float(np.abs(force).sum() + np.abs(inside[:2]).sum())
+    total = float(np.abs(force).sum() + np.abs(inside[:2]).sum()) + inner_force
     if not balanced or total == 0.0:
         return Imbalance(0.0, 0.0)
     centre = points.mean(axis=0)

@@ -12,7 +12,7 @@ from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, pre
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, free_modes
+from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.plan.plan import Plan, Sizes
 from bemkit.scene.assembly import Assembly
 
@@ -67,7 +67,7 @@ def plan_assembly(steps: Sequence[PreparedAssembly]) -> Plan:
 def _needs(steps: Sequence[PreparedAssembly], number: int) -> BodyNeeds:
     first = steps[0]
     body, conditions = first.bodies[number], first.conditions[number]
-    loads = tuple(GivenData.of(conditions, step.forces[number], step.conditions[number].displacement) for step in steps)
+    loads = tuple(step.map_data(number) for step in steps)
     material = body.material.scaled(first.units.modulus)
     case = BodyCase(body.own_mesh, material, conditions, loads, linear_solver(first, number))
     return body.scene.discretisation.needs(case)

@@ -18,8 +18,8 @@ from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData
 from bemkit.scene.load_history import load_steps
+from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
 
 _BYTES = 8
@@ -112,6 +112,7 @@ def plan_items(
     return (
         *_mesh_items(scene, sizes, proposal),
         *of_body,
+        _body_force_item(scene),
         *_contact_items(scene, sizes, n_steps),
         PlanItem("load history", n_steps > 1, history),
         PlanItem("fields on the boundary", True, "part of every result"),
@@ -150,6 +151,12 @@ def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterat
         f"{sizes.n_fixed} of the displacements held, {sizes.n_open} retained for contact"
     )
     yield PlanItem(f"{displacements} displacements, {tractions} tractions", True, reason)
+
+
+def _body_force_item(scene: Scene) -> PlanItem:
+    kinds = ", ".join(dict.fromkeys(BODY_FORCES.kind_of(force) for force in scene.body_forces))
+    reason = f"{kinds}, in closed form: no elements inside the body" if kinds else "nothing acts inside the body"
+    return PlanItem("particular solution", bool(kinds), reason)
 
 
 def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanItem]:
@@ -244,7 +251,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     """Say what scenes that follow each other in time need; see `make_plan`."""
     first = steps[0]
     sizes = find_sizes(first)
-    loads = tuple(GivenData.of(first.conditions, step.force, step.conditions.displacement) for step in steps)
+    loads = tuple(step.map_data for step in steps)
     case = BodyCase(first.mesh, first.material, first.conditions, loads, first.linear_solver)
     needs = first.scene.discretisation.needs(case)
     return Plan(

@@ -63,6 +63,19 @@ def _uniform_slip(scene: Scene) -> Reference:
     return Reference("a linear field", (Places("floor", s, weight),), answer)
 
 
+def _gravity_column(scene: Scene) -> Reference:
+    """Return the state of uniaxial strain of a column between smooth walls, p = weight * (height - y)."""
+    width, height, gap, weight = 2.0, 10.0, 1e-4, 2400.0 * 9.81
+    material = scene.material
+    modulus = 2.0 * material.shear_modulus * (1.0 - material.poisson_ratio) / (1.0 - 2.0 * material.poisson_ratio)
+    energy = width * weight**2 * height**3 / (6.0 * modulus)
+    s, length = places_along(width, ())
+    one = np.ones_like(s)
+    pressure = weight * height
+    answer = Answer(gap * one, 0.0 * one, -pressure * one, 0.0 * one, energy, pressure * width, 0.0, ())
+    return Reference("uniaxial strain", (Places("floor", s, length),), answer)
+
+
 _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
     {
         "paper-1": lambda _: paper_reference(1),
@@ -72,6 +85,7 @@ _REFERENCES: Mapping[str, Callable[[Scene], Reference]] = MappingProxyType(
             "plate", length=np.pi / 6.0
         ),
         "uniform-slip": _uniform_slip,
+        "gravity-column": _gravity_column,
     }
 )
 

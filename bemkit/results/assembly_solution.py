@@ -16,14 +16,14 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.part_forces import ContactForce, PartForce, part_force
-from bemkit.results.solution import BoundaryFields
+from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
 
 @dataclass(frozen=True, eq=False)
-class BodyResult:
+class BodyResult(SolvedBody):
     """One body of a solved assembly; `bemkit.interior_fields` takes it like a solution.
 
     Parameters
@@ -47,24 +47,6 @@ class BodyResult:
     def __repr__(self) -> str:
         """Return one line."""
         return f"BodyResult({self.name!r}: {self.mesh.n_elements} elements)"
-
-    @cached_property
-    def element_errors(self) -> FloatArray | None:
-        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
-        discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
-        if not discretisation.estimates_error:
-            return None
-        boundary, make_space = self.boundary, discretisation.displacement_space
-        if make_space(self.mesh).degree > 2:
-            from bemkit.results.coefficient_decay import coefficient_errors
-
-            tractions = discretisation.traction_space(self.mesh)
-            at_nodes = boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
-            space = make_space(self.mesh)
-            return coefficient_errors(space, tractions, boundary.displacement, at_nodes, modulus).energy
-        from bemkit.results.error_indicators import squared_errors
-
-        return squared_errors(self.mesh, make_space, boundary.displacement, boundary.traction, modulus)
 
     @cached_property
     def part_forces(self) -> tuple[PartForce, ...]:

@@ -5,15 +5,15 @@ from __future__ import annotations
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
-from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
 
 
-def interior_fields(solution: Solution) -> InteriorFields:
+def interior_fields(solution: SolvedBody) -> InteriorFields:
     """Return the displacement, strain and stress inside the body of a solution.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or BodyResult
         As `run` returns it or `read_result` reads it. Look at its status first: fields of a run that did not converge
         are fields of whatever it reached.
 
@@ -29,7 +29,7 @@ def interior_fields(solution: Solution) -> InteriorFields:
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
     """
-    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.boundary
+    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
     has_dofs = len(boundary.traction_dofs) > mesh.n_elements
     space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
     displacement = reflected_to_whole(half_space, space, boundary.displacement)
@@ -38,4 +38,5 @@ def interior_fields(solution: Solution) -> InteriorFields:
         for each in (mesh.whole, mesh)
     )
     traction = reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
-    return InteriorFields(mesh.whole, solution.scene.material, space, displacement, tractions, traction)
+    material, background = solution.scene.material, solution.particular
+    return InteriorFields(mesh.whole, material, space, displacement, tractions, traction, background)

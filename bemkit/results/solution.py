@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, read_only
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.certificate import Certificate
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
@@ -24,64 +23,21 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at
+from bemkit.results.solved_body import BoundaryFields as BoundaryFields
+from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
-    from bemkit.results.coefficient_decay import CoefficientErrors
+
+
+_FREE_SHARE = 1e-16
+"""Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
 
 
 @dataclass(frozen=True, eq=False)
-class BoundaryFields:
-    """Displacement and traction on the whole boundary.
-
-    Parameters
-    ----------
-    points : (n_points, 2) array [m]
-        Where the displacement is known: the nodes of the displacement space of the scene's discretisation.
-    displacement : (n_points, 2) array [m]
-    centres : (n_elements, 2) array [m]
-    traction : (n_elements, 2) array [Pa]
-        Mean of each element.
-    traction_dofs : (n_elements * n_local, 2) array [Pa], optional
-        Values at the local nodes of the traction space of the discretisation, element by element: loads may jump
-        anywhere; see `ElementwiseSpace`. The means by default.
-
-    Raises
-    ------
-    ValueError
-        If the shapes do not fit together.
-    """
-
-    points: FloatArray
-    displacement: FloatArray
-    centres: FloatArray
-    traction: FloatArray
-    traction_dofs: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-
-    def __post_init__(self) -> None:
-        dofs = self.traction_dofs if self.traction_dofs.size else self.traction.copy()
-        object.__setattr__(self, "traction_dofs", dofs)
-        for place, value in (("points", "displacement"), ("centres", "traction")):
-            shape = (len(getattr(self, place)), 2)
-            for name in (place, value):
-                array = getattr(self, name)
-                if array.shape != shape:
-                    raise InputError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
-                read_only(array)
-        if dofs.ndim != 2 or dofs.shape[1] != 2 or len(dofs) % max(len(self.traction), 1):
-            n = len(self.traction)
-            raise InputError(f"traction_dofs has the shape {dofs.shape}: give a multiple of {n} rows to match traction")
-        read_only(dofs)
-
-    def __repr__(self) -> str:
-        """Return one line."""
-        return f"BoundaryFields({len(self.points)} points, {len(self.centres)} elements)"
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(SolvedBody):
     """What `bemkit.run` returns and a result file holds.
 
     Parameters
@@ -99,7 +55,8 @@ class Solution:
     force_tangential : float [N/m]
         The total friction force on the body along the boundary tangent: the integral of sigma_t.
     energy : float [J/m]
-        Elastic energy 1/2 a(u, u).
+        Elastic energy: half the work of the stresses in the plane on the strains that they cause. In plane strain heat
+        also compresses the body along its length, which costs E (alpha T)^2 / 2 per volume, not counted here.
     transitions : tuple of Transition
     timings : mapping of str to float [s]
         Of each stage of the run, and of all.
@@ -149,32 +106,6 @@ class Solution:
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @cached_property
-    def coefficient_errors(self) -> CoefficientErrors | None:
-        """Estimated errors of each element of degree 3 and more; None of other elements."""
-        discretisation, mesh = self.scene.discretisation, self.mesh
-        space, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
-        if not discretisation.estimates_error or space.degree <= 2:
-            return None
-        from bemkit.results.coefficient_decay import coefficient_errors
-
-        at_nodes = self.boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
-        modulus = self.scene.material.plane_modulus
-        return coefficient_errors(space, tractions, self.boundary.displacement, at_nodes, modulus)
-
-    @cached_property
-    def element_errors(self) -> FloatArray | None:
-        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
-        if self.coefficient_errors is not None:
-            return self.coefficient_errors.energy
-        discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
-        if not discretisation.estimates_error:
-            return None
-        from bemkit.results.error_indicators import squared_errors
-
-        make_space = discretisation.displacement_space
-        return squared_errors(self.mesh, make_space, self.boundary.displacement, self.boundary.traction, modulus)
-
-    @cached_property
     def estimated_error(self) -> float | None:
         """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
@@ -186,7 +117,9 @@ class Solution:
         error = float(self.element_errors.sum())
         if error == 0.0:
             return 0.0
-        return float(np.sqrt(error / (2.0 * self.energy))) if self.energy > 0.0 else None
+        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
+        size = 2.0 * max(self.energy, held)
+        return float(np.sqrt(error / size)) if size > 0.0 else None
 
     @cached_property
     def estimated_traction_error(self) -> float | None:

@@ -224,7 +224,7 @@ class Assembly:
 
         Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in common.
         """
-        identities = (id(each) for each in (body.shape, body.parts, body.mesh, body.discretisation))
+        identities = (id(each) for each in (body.shape, body.parts, body.body_forces, body.mesh, body.discretisation))
         key = (*identities, body.material, self.contact_parts(body))
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
@@ -241,6 +241,7 @@ class Assembly:
                 shape=body.shape,
                 material=body.material,
                 parts=parts,
+                body_forces=body.body_forces,
                 law=self.law if touches_obstacle else Frictionless(),
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,

@@ -10,6 +10,7 @@ from bemkit.formulas import closest
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material
+from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Roller
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
@@ -30,6 +31,8 @@ class Body:
     parts : tuple of Part
         Supports, loads and rigid obstacles. `Part.where` is in the coordinates of the shape; loads, given displacements
         and obstacles are in those of the scene, where the body is placed.
+    body_forces : tuple of BodyForce
+        What acts inside the body, in the coordinates of the scene.
     placement : Placement
         Where the body stands: turned, then shifted.
     copies : Copies, optional
@@ -49,6 +52,7 @@ class Body:
     shape: Shape
     material: Material
     parts: tuple[Part, ...] = ()
+    body_forces: tuple[BodyForce, ...] = ()
     placement: Placement = field(default_factory=Placement)
     copies: Copies | None = None
     discretisation: Discretisation | None = None

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression, ScalarField
+from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
 from bemkit.scene.scene import Scene
 
@@ -30,19 +31,20 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
 
 
 def with_scaled_loads(scene: Scene, factor: float) -> Scene:
-    """Return a scene whose tractions, pressures and prescribed displacements are multiplied by a number.
+    """Return a scene whose loads, prescribed displacements and body forces are multiplied by a number.
 
     Returns
     -------
     Scene
-        With the load factor 1; obstacles and the law are unchanged.
+        With the load factor 1; obstacles, the law, and body forces that are constant are unchanged.
     """
 
     def scaled(field: ScalarField) -> ScalarField:
         return _times(factor, field)
 
     parts = tuple(replace(part, condition=with_fields(part.condition, scaled, scaled)) for part in scene.parts)
-    return replace(scene, parts=parts, load_factors=(1.0,))
+    forces = tuple(force if force.is_constant else scaled_body_force(force, factor) for force in scene.body_forces)
+    return replace(scene, parts=parts, body_forces=forces, load_factors=(1.0,))
 
 
 @dataclass(frozen=True)

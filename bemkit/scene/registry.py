@@ -145,6 +145,15 @@ COPIES = Registry(
     },
 )
 
+BODY_FORCES = Registry(
+    "body force",
+    {
+        "gravity": "bemkit.scene.body_forces:Gravity",
+        "rotation": "bemkit.scene.body_forces:Rotation",
+        "heating": "bemkit.scene.body_forces:Heating",
+    },
+)
+
 OBSTACLES = Registry(
     "obstacle",
     {

@@ -24,6 +24,7 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material
+from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -55,12 +56,14 @@ class Scene:
     law : FrictionLaw
         On all contact parts that have no law of their own.
     load_factors : tuple of float
-        The load history: all tractions, pressures and prescribed displacements times these numbers, one step after
-        the other. A single number (the default is 1) is the static law, which judges slip by the total displacement;
-        with several, slip counts from the end of the step before (the incremental law).
+        The load history: all tractions, pressures, prescribed displacements and body forces times these numbers, one
+        step after the other. A single number (the default is 1) is the static law, which judges slip by the total
+        displacement; with several, slip counts from the end of the step before (the incremental law).
     symmetry : Symmetry, optional
         Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
         x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
+    body_forces : tuple of BodyForce
+        What acts inside the body: gravity, rotation, heating.
     discretisation : Discretisation
     linear_solver : LinearSolver or Automatic
         How the displacements of the body away from the contact boundary are solved for.
@@ -73,8 +76,8 @@ class Scene:
     ------
     ValueError
         If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
-        finite, an accuracy is asked of collocation or of a load history, conjugate gradients are asked of collocation,
-        or a law with friction or a solver is given without any contact.
+        finite, body forces act in an exterior, an accuracy is asked of collocation or of a load history, conjugate
+        gradients are asked of collocation, or a law with friction or a solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -86,6 +89,7 @@ class Scene:
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
     symmetry: Symmetry | None = None
+    body_forces: tuple[BodyForce, ...] = ()
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
@@ -112,7 +116,13 @@ class Scene:
                 "discretisation is 'hp', whose degree rises until an accuracy is reached: give mesh.accuracy, such as "
                 "1e-6, or a fixed degree"
             )
-        names = [side.name for loop in self.shape.outline().loops for side in loop]
+        outline = self.shape.outline()
+        if self.body_forces and outline.is_exterior:
+            raise InputError(
+                f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
+                "heat expands it without bound: leave the body forces out, or give a bounded shape"
+            )
+        names = [side.name for loop in outline.loops for side in loop]
         for part in self.parts:
             for side in part.sides:
                 if side not in names:

@@ -29,10 +29,12 @@ from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
 from bemkit.scene.body import Body
+from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Condition, Part
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.registry import (
+    BODY_FORCES,
     CONDITIONS,
     COPIES,
     DISCRETISATIONS,
@@ -53,6 +55,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Grading, GRADINGS),
     (Condition, CONDITIONS),
     (Copies, COPIES),
+    (BodyForce, BODY_FORCES),
     (Obstacle, OBSTACLES),
     (FrictionLaw, LAWS),
     (Discretisation, DISCRETISATIONS),

@@ -23,6 +23,7 @@ from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
+from bemkit.scene.body_forces import BodyForce, Heating
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 
 _PER_PIECE = 4
@@ -57,6 +58,10 @@ class SymmetricScene(Protocol):
     @property
     def laws(self) -> Mapping[str, FrictionLaw]:
         """The friction law of each contact part, by name."""
+
+    @property
+    def body_forces(self) -> tuple[BodyForce, ...]:
+        """What acts inside the body."""
 
     @property
     def symmetry(self) -> Symmetry | None:
@@ -179,6 +184,10 @@ class _Whole:
                 f"the image {format_point(points[k])} of the boundary point {format_point(samples.points[k])} lies "
                 f"{away[k]:.3g} away from the boundary"
             )
+        inside = _inside(self.scene, samples.points), _inside(self.scene, points)
+        found = _first_difference(*inside, (samples.points, points), signs)
+        if found is not None:
+            return found
         names = _part_names(self.mesh)
         images = _Samples(points, signs * samples.normals, tuple(names[e] for e in location.element.tolist()))
         pairs = list(zip(samples.parts, images.parts, strict=True))
@@ -204,18 +213,41 @@ class _Whole:
         places = (format_point(here.points[0]), format_point(there.points[0]))
         if kind != kind_there:
             return f"the boundary is {kind} at {places[0]} and {kind_there} at its image {places[1]}"
-        for name, values in own.items():
-            expected = values * signs if values.shape[1] == 2 else values
-            size = max(_largest(values), _largest(images[name]), self.mesh.diameter if name == "gap" else 0.0)
-            same = expected == images[name]  # infinite gaps
-            off = np.abs(np.where(same, 0.0, expected) - np.where(same, 0.0, images[name])).max(axis=1)
-            k = int(np.argmax(off))
-            if not off[k] <= _TOLERANCE * size:
-                return (
-                    f"the {name} is {_text(values[k])} at {format_point(here.points[k])} and {_text(images[name][k])} "
-                    f"at its image {format_point(there.points[k])}"
-                )
-        return None
+        return _first_difference(own, images, (here.points, there.points), signs, gap_size=self.mesh.diameter)
+
+
+def _first_difference(
+    own: Mapping[str, FloatArray],
+    images: Mapping[str, FloatArray],
+    places: tuple[FloatArray, FloatArray],
+    signs: FloatArray,
+    gap_size: float = 0.0,
+) -> str | None:
+    """Say which of some values (n, 1), or vectors (n, 2), at points and at their images are not each other's image."""
+    here, there = places
+    for name, values in own.items():
+        expected = values * signs if values.shape[1] == 2 else values
+        size = max(_largest(values), _largest(images[name]), gap_size if name == "gap" else 0.0)
+        same = expected == images[name]  # infinite gaps
+        off = np.abs(np.where(same, 0.0, expected) - np.where(same, 0.0, images[name])).max(axis=1)
+        k = int(np.argmax(off))
+        if not off[k] <= _TOLERANCE * size:
+            return (
+                f"the {name} is {_text(values[k])} at {format_point(here[k])} and {_text(images[name][k])} "
+                f"at its image {format_point(there[k])}"
+            )
+    return None
+
+
+def _inside(scene: SymmetricScene, points: FloatArray) -> dict[str, FloatArray]:
+    """Return the body force (n, 2) and the thermal strain (n, 1); a harmonic one is told by its boundary values."""
+    force, strain = np.zeros_like(points), np.zeros((len(points), 1))
+    for each in scene.body_forces:
+        if isinstance(each, Heating):
+            strain += each.strain_at(points)[:, None]
+        else:
+            force += each.force_at(points)
+    return {"body force": force, "thermal strain": strain}
 
 
 def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tuple[str, dict[str, FloatArray]]:

@@ -27,13 +27,13 @@ MAX_BYTES = 1_000_000
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "symmetry", "law", "shape", "material", "mesh", "parts"),
+    *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "mesh", "parts"),
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
     *("law", "touching", "mesh", "bodies", "contacts"),
 )
-_BODY_KEYS = ("shape", "material", "placement", "copies", "discretisation", "mesh", "parts")
+_BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
 _PART_KEYS = ("sides", "where", "condition")
 
 
@@ -169,6 +169,8 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
         return tomli_w.dumps(_ordered(table, _ASSEMBLY_KEYS), multiline_strings=True)
     if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
         del table["law"], table["solver"]
+    if not scene.body_forces:
+        del table["body_forces"]
     table["parts"] = _named(table["parts"], _PART_KEYS)
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 

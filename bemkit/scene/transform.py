@@ -15,6 +15,7 @@ from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
 from bemkit.scene.scene import Scene
 
@@ -152,7 +153,7 @@ def transformed_scene(
     scene : Scene
     affine : AffineMap
     stress : float
-        Factor of all loads, and of the stresses in the friction law.
+        Factor of all loads, of the stresses of body forces, and of those in the friction law.
     displacement : float, optional
         Factor of gaps and prescribed displacements; the first factor of the map if left out.
     modulus : float
@@ -168,8 +169,15 @@ def transformed_scene(
     parts = tuple(_transformed_part(part, affine, stress, factor) for part in scene.parts)
     law = TransformedLaw(scene.law, 1.0 / stress, affine)
     symmetry = None if scene.symmetry is None else affine.transformed(scene.symmetry)
+    forces = tuple(_transformed_body_force(force, affine, stress, modulus) for force in scene.body_forces)
     return replace(
-        scene, shape=TransformedShape(scene.shape, affine), material=material, parts=parts, law=law, symmetry=symmetry
+        scene,
+        shape=TransformedShape(scene.shape, affine),
+        material=material,
+        parts=parts,
+        law=law,
+        symmetry=symmetry,
+        body_forces=forces,
     )
 
 
@@ -186,7 +194,7 @@ def with_gap_offset(scene: Scene, offset: float) -> Scene:
 
 
 def with_turned_loads(scene: Scene, angle: float) -> Scene:
-    """Return a scene whose tractions and pressures are turned anticlockwise by an angle [rad]."""
+    """Return a scene whose tractions, pressures and weight are turned anticlockwise by an angle [rad]."""
     cosine, sine = float(np.cos(angle)), float(np.sin(angle))
 
     def turned(condition: Condition) -> Condition:
@@ -197,7 +205,14 @@ def with_turned_loads(scene: Scene, angle: float) -> Scene:
                 return Pressure(_combined(pressure, cosine, shear, sine), _combined(shear, cosine, pressure, -sine))
         return condition
 
-    return with_conditions(scene, turned)
+    def turned_weight(force: BodyForce) -> BodyForce:
+        if not isinstance(force, Gravity):
+            return force
+        x, y = force.acceleration
+        return replace(force, acceleration=(cosine * x - sine * y, sine * x + cosine * y))
+
+    forces = tuple(turned_weight(force) for force in scene.body_forces)
+    return replace(with_conditions(scene, turned), body_forces=forces)
 
 
 def with_conditions(scene: Scene, change: Callable[[Condition], Condition]) -> Scene:
@@ -218,6 +233,19 @@ def _combined(
 def _transformed_part(part: Part, affine: AffineMap, stress: float, displacement: float) -> Part:
     where = None if part.where is None else TransformedRegion(part.where, affine)
     return replace(part, condition=_transformed_condition(part.condition, affine, stress, displacement), where=where)
+
+
+def _transformed_body_force(force: BodyForce, affine: AffineMap, stress: float, modulus: float) -> BodyForce:
+    length = affine.factor[0]
+    match force:
+        case Gravity(acceleration=(x, y)):
+            return replace(force, acceleration=(x * stress / length, y * stress / length))
+        case Rotation():
+            (centre,) = affine.forward(np.array([force.centre])).tolist()
+            return replace(force, density=force.density * stress / length**2, centre=tuple(centre))
+        case Heating():
+            temperature = TransformedField(force.temperature, affine)
+            return replace(force, expansion=force.expansion * stress / modulus, temperature=temperature)
 
 
 def _transformed_condition(condition: Condition, affine: AffineMap, stress: float, displacement: float) -> Condition:

@@ -23,6 +23,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance, round_off_of
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 
@@ -186,7 +187,7 @@ class CondensedBody(DenseBody):
         """What it took to come here, from the operators on."""
         return self.condensed.work + OperationCounts(contact_unknowns=self.n_unknowns)
 
-    def under(self, displacement: FloatArray, force: FloatArray) -> CondensedBody:
+    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> CondensedBody:
         """Return the same body under another load, without another factorisation.
 
         Parameters
@@ -195,9 +196,11 @@ class CondensedBody(DenseBody):
             Prescribed displacements in the frames of the nodes, as in `NodalConditions`.
         force : (n_nodes, 2) array [N/m]
             Given nodal forces.
+        inside : ForcesInside, optional
+            What acts inside the body, if that changes.
         """
         conditions = replace(self.conditions, displacement=displacement)
-        condensed = self.condensed.under(force, displacement)
+        condensed = condensed_under(self.condensed, conditions, force, inside)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)
         unknowns = Unknowns.of(conditions, self.nodes)
         return replace(
@@ -227,13 +230,13 @@ class CondensedBody(DenseBody):
         noise = NOISE_FACTOR * round_off
         reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
         given = self._in_frames(self.force)[~self.conditions.is_fixed]
-        inside = self.condensed.volume_force
-        if inside is not None:
-            given = np.append(given, inside[:2])
+        resultant, inner = self.condensed.volume_force, self.condensed.inner_force
+        if resultant is not None:
+            given = np.append(given, [*resultant[:2], inner])
         of_contact = self.unbalanced(state).beside(given, reaction if reaction > noise else 0.0, round_off)
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
-        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, inside))
+        return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, resultant, inner))
 
     def _in_frames(self, force: FloatArray) -> FloatArray:
         """Return forces (n_nodes, 2) in the frames of the nodes."""

@@ -21,6 +21,7 @@ from bemkit.model.boundary_tractions import insert_loads
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity, condensed_under
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
 
 
@@ -55,15 +56,16 @@ class AssembledModel:
         prepared : PreparedAssembly
             From `PreparedAssembly.under` of this model's.
         """
-        condensed = tuple(
-            each.under(force, conditions.displacement)
-            for each, force, conditions in zip(self.condensed, prepared.forces, prepared.conditions, strict=True)
+        condensed = tuple(_under(each, prepared, number) for number, each in enumerate(self.condensed))
+        elastic = tuple(
+            replace(each, inside=inside) if isinstance(each, HeavyElasticity) and inside is not None else each
+            for each, inside in zip(self.elastic, prepared.insides, strict=True)
         )
         offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
         body = self.body.under([each.load for each in condensed], offset)
         if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
             body = replace(body, tangent_is_eliminated=is_eliminated)
-        return AssembledModel(prepared, self.elastic, condensed, body, _problem(prepared, body), self.work)
+        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work)
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.
@@ -87,10 +89,19 @@ class AssembledModel:
             traction_space = body.scene.discretisation.traction_space(body.mesh)
             touching = self.prepared.assembly.contact_parts(body.body)
             insert_loads(traction, body.scene, body.mesh, traction_space, touching)
-            strained = without_motion(body.own_mesh.unit, dof_points(body.own_space), displacement)
-            energy = 0.5 * float(np.sum(strained * force)) * self.prepared.force_unit * units.displacement
+            energy = _energy(body, elastic, displacement, force) * self.prepared.force_unit * units.displacement
             fields.append((body.to_place(displacement) * units.displacement, traction, energy))
         return fields
+
+
+def _energy(body: PlacedBody, elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> float:
+    """Return the elastic energy of a body, dimensionless; see `bemkit.model.contact_model.Model.boundary_fields`."""
+    beyond = 0.0
+    if isinstance(elastic, HeavyElasticity):
+        beyond = elastic.energy_beyond(displacement, force)
+        displacement, force = displacement - elastic.inside.displacement, force - elastic.inside.force
+    strained = without_motion(body.own_mesh.unit, dof_points(body.own_space), displacement)
+    return 0.5 * float(np.sum(strained * force)) + beyond
 
 
 def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
@@ -110,14 +121,12 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
         material = first.material.scaled(prepared.units.modulus)
         solver = linear_solver(prepared, int(group[0])).solver
         map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
-        base = map_.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
+        first_inside = prepared.insides[group[0]]
+        base = _loaded(map_, first_inside).condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         work += base.work
         for number in group.tolist():
-            elastic[number] = map_
-            same = number == group[0]
-            condensed[number] = (
-                base if same else base.under(prepared.forces[number], prepared.conditions[number].displacement)
-            )
+            elastic[number] = _loaded(map_, prepared.insides[number])
+            condensed[number] = base if number == group[0] else _under(base, prepared, number)
     maps = tuple(each for each in condensed if each is not None)
     motions = [_motions(*pair) for pair in zip(bodies, prepared.conditions, strict=True)]
     members = tuple(
@@ -141,6 +150,16 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     return AssembledModel(
         prepared, tuple(each for each in elastic if each is not None), maps, joined, _problem(prepared, joined), work
     )
+
+
+def _loaded(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
+    return elastic if inside is None else HeavyElasticity(elastic, inside)
+
+
+def _under(condensed: CondensedMap, prepared: PreparedAssembly, number: int) -> CondensedMap:
+    """Return a condensed map under the loads of a body."""
+    conditions, force = prepared.conditions[number], prepared.forces[number]
+    return condensed_under(condensed, conditions, force, prepared.insides[number])
 
 
 def _firsts(bodies: Sequence[PlacedBody]) -> list[int]:

@@ -15,12 +15,15 @@ from bemkit.contact.problem import LawError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
+from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, supported
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.body_forces import BodyForce, seen_from
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +42,8 @@ class PreparedAssembly:
     forces : tuple of (n_nodes, 2) array [-]
         Given nodal forces of each body, in the axes of its own mesh.
     rows : tuple of ContactRows
+    insides : tuple of ForcesInside or None
+        What acts inside each body, in the axes of its own mesh; None where nothing does.
     """
 
     assembly: Assembly
@@ -47,6 +52,7 @@ class PreparedAssembly:
     conditions: tuple[NodalConditions, ...]
     forces: tuple[FloatArray, ...]
     rows: tuple[ContactRows, ...]
+    insides: tuple[ForcesInside | None, ...]
 
     @property
     def force_unit(self) -> float:
@@ -102,6 +108,13 @@ class PreparedAssembly:
     def tangent_is_eliminated(self) -> BoolArray:
         """(n_contact,) bool array: nodes without friction, or held by a support."""
         return np.concatenate([np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)])
+
+    def map_data(self, number: int) -> GivenData:
+        """Return the forces and displacements of a body without what acts inside it; see `Prepared.map_data`."""
+        conditions, force, inside = self.conditions[number], self.forces[number], self.insides[number]
+        if inside is not None:
+            conditions, force = inside.left_of(conditions, force)
+        return GivenData.of(conditions, force, conditions.displacement)
 
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
@@ -179,7 +192,24 @@ def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) 
         *body_rows(assembly, assembly.contacts, bodies, conditions),
         *obstacle_rows(bodies, conditions),
     )
-    return PreparedAssembly(assembly, bodies, units, _retained(bodies, conditions, rows), tuple(forces), rows)
+    retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units)
+    return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
+
+
+def _insides(bodies: Sequence[PlacedBody], units: Units) -> tuple[ForcesInside | None, ...]:
+    """Return what acts inside each body; copies that are turned alike share it."""
+    found: dict[tuple[int, tuple[BodyForce, ...]], ForcesInside | None] = {}
+    insides = []
+    for body in bodies:
+        forces = tuple(seen_from(force, body.turn) for force in body.body.body_forces)
+        key = (id(body.own_mesh), forces)
+        if key not in found:
+            own = body.units(units.modulus, units.stress * units.length)
+            scene = replace(body.scene, body_forces=forces)
+            solution = particular_solution(scene, body.own_mesh, own.modulus, own.stress)
+            found[key] = None if solution is None else ForcesInside.of(solution, body.own_space)
+        insides.append(found[key])
+    return tuple(insides)
 
 
 def _retained(

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import comb
+from typing import Protocol
 
 import numpy as np
 
@@ -40,6 +41,19 @@ from bemkit.operators.somigliana.moments import (
 CHUNK_PAIRS = 8192
 
 
+class Background(Protocol):
+    """A field in the whole body that is added to the one of the boundary data, such as a particular solution."""
+
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2) displacement [m] at (n, 2) points [m]."""
+
+    def displacement_gradient(self, points: FloatArray) -> FloatArray:
+        """Evaluate its (n, 2, 2) gradient [-]."""
+
+    def stress(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) stress [Pa]."""
+
+
 class InteriorFields:
     """Displacement, its gradient, strain and stress at points inside a body.
 
@@ -54,6 +68,8 @@ class InteriorFields:
     traction_space : BoundarySpace
     traction_dofs : (n_scalar, 2) array [Pa]
         Boundary tractions, stress @ n with n out of the body.
+    background : Background, optional
+        A field to add; boundary data are those without it.
 
     Raises
     ------
@@ -87,8 +103,10 @@ class InteriorFields:
         displacement_dofs: FloatArray,
         traction_space: BoundarySpace,
         traction_dofs: FloatArray,
+        background: Background | None = None,
     ) -> None:
         self.mesh = mesh
+        self.background = background
         self.material = material
         self._displacement = _element_polynomials(mesh, displacement_space, displacement_dofs, "displacement")
         self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
@@ -126,7 +144,8 @@ class InteriorFields:
                 moments = self._displacement_moments(x[pair], element, is_curved)
                 terms = self._displacement_terms(moments, element, reference[pair])
                 result[rows] += terms.reshape(x.size, -1).sum(axis=1)
-        return np.column_stack([result.real, result.imag])
+        own = np.column_stack([result.real, result.imag])
+        return own if self.background is None else own + self.background.displacement(points)
 
     def displacement_gradient(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; otherwise as `displacement`."""
@@ -137,7 +156,8 @@ class InteriorFields:
         # du/dz = (u_x,x + u_y,y + i (u_y,x - u_x,y)) / 2, du/dzbar = (u_x,x - u_y,y + i (u_y,x + u_x,y)) / 2
         first = np.column_stack([along.real + across.real, across.imag - along.imag])
         second = np.column_stack([across.imag + along.imag, along.real - across.real])
-        return np.stack([first, second], axis=1)
+        own = np.stack([first, second], axis=1)
+        return own if self.background is None else own + self.background.displacement_gradient(points)
 
     def strain(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) strain, the symmetric part of the gradient; otherwise as `displacement`."""
@@ -148,9 +168,9 @@ class InteriorFields:
         """Evaluate the (n, 2, 2) stress [Pa]; otherwise as `displacement`."""
         potential, shear = self._potentials(points)
         middle, difference, off = 2.0 * potential.real, shear.real, shear.imag
-        return np.stack(
-            [np.column_stack([middle + difference, off]), np.column_stack([off, middle - difference])], axis=1
-        )
+        first = np.column_stack([middle + difference, off])
+        own = np.stack([first, np.column_stack([off, middle - difference])], axis=1)
+        return own if self.background is None else own + self.background.stress(points)
 
     def _potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return Phi and D (n,) [Pa]."""

@@ -43,6 +43,11 @@ class CondensedMap:
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     volume_force : (3,) array, optional
         Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
+    inner_force : float [N/m]
+        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not.
+    weightless : CondensedMap, optional
+        Of a body with forces or heat inside: the same body without; see
+        `bemkit.operators.steklov_poincare.forces_inside`.
     """
 
     stiffness: FloatArray
@@ -54,6 +59,8 @@ class CondensedMap:
     iterations: tuple[Iterations, ...] = ()
     work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
+    inner_force: float = 0.0
+    weightless: CondensedMap | None = None
 
 
 class SteklovPoincare(Protocol):

@@ -21,6 +21,7 @@ from bemkit.arrays import FloatArray
 from bemkit.operators.material import Material
 from bemkit.results.solution import Solution
 from bemkit.studies.stability.independent_check.boundary import Boundary, beyond, largest, trusted_stress
+from bemkit.studies.stability.independent_check.inside import inner_work, particular_tractions, without_particular
 from bemkit.studies.stability.independent_check.nodes import Fields
 
 _N_OUTSIDE = 6
@@ -85,9 +86,14 @@ def imbalance(fields: Fields) -> float:
     # what the elements make of a rotation: on curved ones it is not one exactly
     interpolated = np.einsum("encm,nq->eqcm", motions[boundary.nodes], boundary.basis)
     loads = _loads(solution, boundary)
-    work = work + np.einsum("eqc,eqcm->m", loads, interpolated)
+    inside = inner_work(solution, boundary)
+    if solution.particular is not None:  # its tractions act on the elements as loads do, with the other sign
+        missed = motions_at(solution, boundary.points) - interpolated
+        acting = particular_tractions(solution, boundary) * boundary.shares[..., None]
+        inside = inside + np.einsum("eqc,eqcm->m", acting, missed)
+    work = work + np.einsum("eqc,eqcm->m", loads, interpolated) + inside
     size = float(np.abs(contact).sum()) + float(np.abs(loads).sum()) + trusted_stress(solution) * mesh.diameter
-    size += float(np.abs(solution.boundary.traction * mesh.lengths[:, None]).sum())
+    size += float(np.abs(solution.boundary.traction * mesh.lengths[:, None]).sum()) + float(np.abs(inside).sum())
     free = _free_motions(solution, boundary)
     return float(np.abs(work @ free.T).max(initial=0.0)) / size if size > 0.0 else 0.0
 
@@ -130,10 +136,10 @@ def energy_mismatch(fields: Fields) -> float:
     """Return the difference of the elastic energy from half the work of all external forces, over that of their sizes.
 
     Held components without prescribed displacement do no work; where one is prescribed, the mean reactions of elements
-    tell the work up to the discretisation error only, and nothing is compared.
+    tell the work up to the discretisation error only, and nothing is compared; nor is it with forces or heat inside.
     """
     solution, _, boundary, nodes, _ = fields
-    if any(np.any(held.values != 0.0) for held in boundary.held):
+    if solution.scene.body_forces or any(np.any(held.values != 0.0) for held in boundary.held):
         return 0.0
     displacement = solution.boundary.displacement
     contact = solution.contact.weight[:, None] * nodes.acting
@@ -144,14 +150,15 @@ def energy_mismatch(fields: Fields) -> float:
     return abs(solution.energy - work) / size if size > 0.0 else 0.0
 
 
-def strained_displacement(solution: Solution) -> FloatArray:
-    """Return the nodal displacements (n_nodes, 2) [m] without their rigid part."""
+def strained_displacement(solution: Solution, displacement: FloatArray | None = None) -> FloatArray:
+    """Return nodal displacements (n_nodes, 2) [m], those of the solution unless given, without their rigid part."""
     fields = solution.boundary
+    displacement = fields.displacement if displacement is None else displacement
     motions = motions_at(solution, fields.points)[:, :, admissible_modes_of(solution)].reshape(
         2 * len(fields.points), -1
     )
-    rigid = np.linalg.lstsq(motions, fields.displacement.ravel(), rcond=None)[0]
-    return np.asarray(fields.displacement - (motions @ rigid).reshape(-1, 2))
+    rigid = np.linalg.lstsq(motions, displacement.ravel(), rcond=None)[0]
+    return np.asarray(displacement - (motions @ rigid).reshape(-1, 2))
 
 
 def _trusted_work(fields: Fields) -> float:
@@ -176,10 +183,11 @@ def reciprocity_mismatch(fields: Fields) -> float:
     the nodes, all others at the quadrature points.
     """
     solution, _, boundary, nodes, scales = fields
-    displacement = boundary.interpolated(strained_displacement(solution))
+    left, traction = without_particular(solution, boundary)
+    displacement = boundary.interpolated(strained_displacement(solution, left))
     points, force_points = (_with_images(solution, each, is_point=True) for each in (boundary.points, nodes.points))
     normals, displacement = (_with_images(solution, each) for each in (boundary.normals, displacement))
-    loads = _with_images(solution, boundary.traction * boundary.shares[:, :, None])
+    loads = _with_images(solution, traction * boundary.shares[:, :, None])
     forces = _with_images(solution, nodes.acting * solution.contact.weight[:, None])
     shares = np.concatenate([boundary.shares] * (len(points) // len(boundary.points)))
     # what is left of a rigid motion a million times longer is round-off

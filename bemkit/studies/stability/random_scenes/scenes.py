@@ -33,6 +33,7 @@ from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_scenes.bodies import Body, random_body
 from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.inside import random_body_forces
 from bemkit.studies.stability.random_scenes.parts import random_actions, random_contact, random_law
 from bemkit.testing.lemke import LemkePivoting
 
@@ -72,8 +73,22 @@ def random_case(seed: int, index: int) -> RandomCase:
         taken = [side for part in contact for side in part.sides]
         parts = (*contact, *random_actions(draw, body, taken, down, modulus))
         layout = {"shape": body.shape, "parts": parts, "law": law}
+    layout |= _inside(index, seed, layout, modulus)
     scene = _scene(draw, f"random scene {index} of seed {seed}", modulus, layout)
     return RandomCase(seed, index, _history(draw, scene))
+
+
+def _inside(index: int, seed: int, layout: dict[str, Any], modulus: float) -> dict[str, Any]:
+    """Draw what acts inside a body now and then, by numbers of its own, so that all else is drawn as without."""
+    draw = Draw(np.random.PCG64([seed, index, 1]))
+    outline = layout["shape"].outline()
+    if outline.is_exterior or not draw.chance(0.3):
+        return {}
+    points = np.concatenate([side.curve.point(np.linspace(0.0, 1.0, 9)) for loop in outline.loops for side in loop])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.hypot(*(high - low)))
+    forces = random_body_forces(draw, size, 0.5 * (low + high), modulus, layout.get("symmetry"))
+    return {"body_forces": forces}
 
 
 def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Scene:

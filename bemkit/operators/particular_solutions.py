@@ -1,0 +1,203 @@
+r"""Particular solutions of elasticity under forces and temperatures inside a body, in closed form.
+
+With z = x + i y, complex displacements u = u_x + i u_y, forces b = b_x + i b_y, and beta the plane compressibility:
+
+    uniform force b              u = -beta conj(b) z^2 / 2,       sigma = -Re(conj(b) z) I
+    centrifugal force q z        u = C |z|^2 z,                   C = -q beta / (8 (1 - nu))
+    expansion Re f(z)            u = int f dz,                    sigma = 0
+    expansion s log |z|          u = m z (log |z| - 1/2) / 2,     m = s / (1 - nu)
+
+Nothing is divided by 1 - 2 nu, so that they hold for incompressible bodies, too. The first is a state of hydrostatic
+pressure, the third says that a harmonic temperature leaves a body without holes and supports free of stress, the last
+is the gradient of a thermoelastic potential [TimoshenkoGoodier1970].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators.material import Material
+
+_POINTS_ON_RAYS = 24
+_POINTS_ON_ELEMENTS = 12
+
+
+class ComplexState(NamedTuple):
+    """A state at n points: (n,) arrays.
+
+    Parameters
+    ----------
+    displacement, along, across : complex arrays [m], [-], [-]
+        u, du/dz and du/dzbar.
+    mean_stress : array [Pa]
+        (sigma_xx + sigma_yy) / 2; the deviator is 2 mu du/dzbar.
+    expansion : array [-]
+        Free thermal strain along x and y.
+    """
+
+    displacement: ComplexArray
+    along: ComplexArray
+    across: ComplexArray
+    mean_stress: FloatArray
+    expansion: FloatArray
+
+
+class Source(Protocol):
+    """A force or an expansion inside a body, with one elastic state that balances it."""
+
+    @property
+    def is_expansion(self) -> bool:
+        """Whether it is a thermal strain, and no force."""
+
+    def state(self, z: ComplexArray, material: Material) -> ComplexState:
+        """Return a state with div sigma + b = 0 at points z = x + i y [m]."""
+
+
+@dataclass(frozen=True)
+class UniformForce:
+    """A force b [N/m^3], complex, the same everywhere."""
+
+    density: complex
+    is_expansion = False
+
+    def state(self, z: ComplexArray, material: Material) -> ComplexState:
+        """Return the hydrostatic state; see `Source.state`."""
+        potential = -np.conj(self.density) * z
+        along, nothing = material.plane_compressibility * potential, np.zeros_like(z)
+        return ComplexState(0.5 * along * z, along, nothing, potential.real, nothing.real)
+
+
+@dataclass(frozen=True)
+class CentrifugalForce:
+    """A force q z [N/m^3] away from the origin."""
+
+    factor: float
+    is_expansion = False
+
+    def state(self, z: ComplexArray, material: Material) -> ComplexState:
+        """Return the radial state; see `Source.state`."""
+        freedom, square = 1.0 - material.effective_poisson_ratio, np.abs(z) ** 2
+        c = -0.125 * self.factor * material.plane_compressibility / freedom
+        mean = -0.25 * self.factor / freedom * square
+        along = (2.0 * c * square).astype(complex)
+        return ComplexState(c * square * z, along, c * z**2, mean, np.zeros_like(square))
+
+
+@dataclass(frozen=True)
+class HarmonicExpansion:
+    """The thermal strain Re(c_0 + c_1 z + c_2 z^2 + ...), with complex coefficients."""
+
+    coefficients: tuple[complex, ...]
+    is_expansion = True
+
+    def state(self, z: ComplexArray, material: Material) -> ComplexState:
+        """Return the state without stress; see `Source.state`."""
+        polynomial = np.polynomial.Polynomial(self.coefficients)
+        along, nothing = polynomial(z), np.zeros_like(z)
+        return ComplexState(polynomial.integ()(z), along, nothing, nothing.real, along.real)
+
+
+@dataclass(frozen=True)
+class LogarithmicExpansion:
+    """The thermal strain s log |z - centre| around a centre that lies in a hole of the body."""
+
+    strength: float
+    centre: complex
+    is_expansion = True
+
+    def state(self, z: ComplexArray, material: Material) -> ComplexState:
+        """Return the state of the thermoelastic potential, single-valued around the hole; see `Source.state`."""
+        arm = z - self.centre
+        log, m = np.log(np.abs(arm)), self.strength / (1.0 - material.effective_poisson_ratio)
+        across = 0.25 * m * arm / arm.conj()
+        mean = -material.shear_modulus * m * log
+        along = (0.5 * m * log).astype(complex)
+        return ComplexState(0.5 * m * arm * (log - 0.5), along, across, mean, self.strength * log)
+
+
+@dataclass(frozen=True)
+class ParticularSolution:
+    """The sum of the states that balance the forces and expansions inside a body.
+
+    Parameters
+    ----------
+    sources : tuple of Source
+    material : Material
+    """
+
+    sources: tuple[Source, ...]
+    material: Material
+
+    @property
+    def forces(self) -> ParticularSolution:
+        """Of the forces alone."""
+        return replace(self, sources=tuple(source for source in self.sources if not source.is_expansion))
+
+    @property
+    def expansions(self) -> ParticularSolution:
+        """Of the thermal strains alone."""
+        return replace(self, sources=tuple(source for source in self.sources if source.is_expansion))
+
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """Evaluate the displacement (n, 2) [m] at (n, 2) points [m]."""
+        u = self._state(points).displacement
+        return np.column_stack([u.real, u.imag])
+
+    def displacement_gradient(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) gradient [-], [:, i, j] = du_i / dx_j, at (n, 2) points [m]."""
+        _, along, across, _, _ = self._state(points)
+        first = np.column_stack([along.real + across.real, across.imag - along.imag])
+        return np.stack([first, np.column_stack([across.imag + along.imag, along.real - across.real])], axis=1)
+
+    def stress(self, points: FloatArray) -> FloatArray:
+        """Evaluate the (n, 2, 2) stress [Pa] at (n, 2) points [m]."""
+        state = self._state(points)
+        mean, deviator = state.mean_stress, 2.0 * self.material.shear_modulus * state.across
+        first = np.column_stack([mean + deviator.real, deviator.imag])
+        return np.stack([first, np.column_stack([deviator.imag, mean - deviator.real])], axis=1)
+
+    def traction(self, points: FloatArray, normals: FloatArray) -> FloatArray:
+        """Evaluate the tractions sigma n (n, 2) [Pa] at (n, 2) points [m] with unit normals."""
+        return np.asarray(np.einsum("nij,nj->ni", self.stress(points), normals))
+
+    def expansion(self, points: FloatArray) -> FloatArray:
+        """Evaluate the free thermal strain (n,) [-] along x and y at (n, 2) points [m]."""
+        return self._state(points).expansion
+
+    def energy(self, mesh: BoundaryMesh) -> float:
+        """Return the elastic energy [J/m] in a body, by integrals along rays from the centre of the expansions."""
+        z = next((complex(source.centre) for source in self.sources if isinstance(source, LogarithmicExpansion)), 0j)
+        origin = np.array([z.real, z.imag])
+        xi, weights = gauss_legendre(_POINTS_ON_ELEMENTS)
+        elements = np.arange(mesh.n_elements)
+        arms, normals = mesh.points(elements, xi) - origin, mesh.normals_at(elements, xi)
+        swept = np.sum(arms * normals, axis=2) * mesh.jacobian(elements, xi) * weights
+        total = 0.0
+        # the distance from the origin is s^4, which makes powers of its logarithm smooth
+        for place, weight in zip(*gauss_legendre(_POINTS_ON_RAYS), strict=True):
+            s = 0.5 * (1.0 + float(place))
+            density = self._energy_density((origin + s**4 * arms).reshape(-1, 2)).reshape(swept.shape)
+            total += 0.5 * float(weight) * 4.0 * s**7 * float(np.sum(swept * density))
+        return total
+
+    def _energy_density(self, points: FloatArray) -> FloatArray:
+        state, material = self._state(points), self.material
+        hydrostatic = material.plane_compressibility * state.mean_stress**2
+        return np.asarray(hydrostatic + 2.0 * material.shear_modulus * np.abs(state.across) ** 2)
+
+    def _state(self, points: FloatArray) -> ComplexState:
+        z = points[:, 0] + 1j * points[:, 1]
+        none = np.zeros_like(z)
+        nothing = ComplexState(none, none, none, none.real, none.real)
+        return reduce(_sum, (source.state(z, self.material) for source in self.sources), nothing)
+
+
+def _sum(first: ComplexState, second: ComplexState) -> ComplexState:
+    return ComplexState._make(a + b for a, b in zip(first, second, strict=True))

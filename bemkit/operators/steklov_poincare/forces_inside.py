@@ -1,0 +1,191 @@
+"""Any elastic map under forces and heat inside the body, by a particular solution: no mesh of the domain.
+
+With a displacement u_p and stresses sigma_p that balance the forces inside, u = u_h + u_p, and u_h obeys the map S
+without them: S (u - u_p) = f - f_p, with f the nodal forces of all tractions and f_p those of sigma_p n. At the nodes
+u_p is exact, so that whatever S holds exactly stays exact, and u_h alone has a discretisation error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.operators.material import Material
+from bemkit.operators.particular_solutions import ParticularSolution
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
+from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare
+
+_MORE_POINTS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class ForcesInside:
+    """A particular solution as the nodes of a space see it.
+
+    Parameters
+    ----------
+    solution : ParticularSolution
+    displacement, force : (n_nodes, 2) arrays [m], [N/m]
+        Its values, and the nodal forces of its tractions.
+    volume_force : (3,) array [N/m], [N/m], [N]
+        Resultants along x and y of the forces inside, and their moment about the origin.
+    inner_force : float [N/m]
+        Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not: of those
+        above, and of E' times the strains that heat causes.
+    """
+
+    solution: ParticularSolution
+    displacement: FloatArray
+    force: FloatArray
+    volume_force: FloatArray
+    inner_force: float
+
+    @classmethod
+    def of(cls, solution: ParticularSolution, space: BoundarySpace) -> ForcesInside:
+        """Evaluate a solution at the nodes of a space of displacements."""
+        points, mesh = dof_points(space), space.mesh
+        force = integrate_traction(space, np.arange(mesh.n_elements), solution.traction)
+        moment = float(np.sum(points[:, 0] * force[:, 1] - points[:, 1] * force[:, 0]))
+        strained_length = float(np.abs(solution.expansion(mesh.centres)) @ mesh.lengths)
+        return cls(
+            solution=solution,
+            displacement=solution.displacement(points),
+            force=force,
+            volume_force=-np.array([*force.sum(axis=0), moment]),
+            inner_force=float(np.abs(force).sum()) + solution.material.plane_modulus * strained_length,
+        )
+
+    def add_to(self, weightless: CondensedMap, conditions: NodalConditions) -> CondensedMap:
+        """Return a condensed map under forces inside.
+
+        Parameters
+        ----------
+        weightless : CondensedMap
+            Under what is left of the given data: see `left_of`.
+        conditions : NodalConditions
+        """
+        own = np.einsum("nkc,nc->nk", conditions.frame, self.displacement)
+        shift = own[conditions.is_retained]
+
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            displacement, force = weightless.recover(retained_displacement - shift)
+            return displacement + self.displacement, force + self.force
+
+        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
+            return self.under(weightless, replace(conditions, displacement=displacement), force)
+
+        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
+            response, at_rest = weightless.follow(directions)
+            return response, at_rest + own.ravel()[directions] - response @ shift
+
+        return replace(
+            weightless,
+            load=weightless.load + weightless.stiffness @ shift,
+            recover=recover,
+            under=under,
+            follow=follow,
+            volume_force=self.volume_force,
+            inner_force=self.inner_force,
+            weightless=weightless,
+        )
+
+    def left_of(self, conditions: NodalConditions, force: FloatArray) -> tuple[NodalConditions, FloatArray]:
+        """Return the conditions and the given forces (n_nodes, 2) [N/m] less what the particular solution takes."""
+        own = np.einsum("nkc,nc->nk", conditions.frame, self.displacement)
+        displacement = np.where(conditions.is_fixed, conditions.displacement - own, 0.0)
+        return replace(conditions, displacement=displacement), force - self.force
+
+    def under(self, weightless: CondensedMap, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Return a condensed body without forces inside under other data and these."""
+        left, left_force = self.left_of(conditions, force)
+        return self.add_to(weightless.under(left_force, left.displacement), conditions)
+
+
+def condensed_under(
+    condensed: CondensedMap, conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None = None
+) -> CondensedMap:
+    """Return a condensed body under other displacements, forces and, if given, forces inside; nothing is factored."""
+    if inside is None or condensed.weightless is None:
+        return condensed.under(force, conditions.displacement)
+    return inside.under(condensed.weightless, conditions, force)
+
+
+@dataclass(frozen=True, eq=False)
+class HeavyElasticity:
+    """An elastic map under forces and heat inside the body; fulfils `SteklovPoincare`.
+
+    Parameters
+    ----------
+    weightless : SteklovPoincare
+        Any map of a bounded body.
+    inside : ForcesInside
+        On its space of displacements.
+    """
+
+    weightless: SteklovPoincare
+    inside: ForcesInside
+
+    @property
+    def material(self) -> Material:
+        """The material of the body."""
+        return self.weightless.material
+
+    @property
+    def displacement_space(self) -> BoundarySpace:
+        """The space of the displacements."""
+        return self.weightless.displacement_space
+
+    @property
+    def traction_space(self) -> BoundarySpace:
+        """The space of the tractions."""
+        return self.weightless.traction_space
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Condense the map without forces inside, and add these; see `SteklovPoincare.condense`."""
+        return self.inside.add_to(self.weightless.condense(*self.inside.left_of(conditions, force)), conditions)
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return all tractions (n_elements, n_local, 2) [Pa], those of the particular solution projected."""
+        inside = self.inside
+        left = self.weightless.element_tractions(displacement - inside.displacement, force - inside.force)
+        return left + projected_tractions(inside.solution, self.traction_space)
+
+    def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> float:
+        """Return the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
+
+        Parameters
+        ----------
+        displacement, force : (n_nodes, 2) arrays [m], [N/m]
+            As `CondensedMap.recover` gives them.
+
+        Notes
+        -----
+        The energy of sigma_p itself, and the work of sigma_h on the strains of sigma_p: by Betti's theorem that is the
+        work of the tractions t_h on u_p for forces, and of the tractions sigma_p n on u_h for heat.
+        """
+        inside, space = self.inside, self.traction_space
+        displacement, force = displacement - inside.displacement, force - inside.force
+        traction = self.weightless.element_tractions(displacement, force)
+        xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
+        elements = np.arange(space.mesh.n_elements)
+        points = space.mesh.points(elements, xi)
+        moved = inside.solution.forces.displacement(points.reshape(-1, 2)).reshape(points.shape)
+        measure = space.mesh.jacobian(elements, xi) * weights
+        work = float(np.einsum("eq,lq,elc,eqc->", measure, space.basis(xi), traction, moved, optimize=True))
+        of_heat = integrate_traction(self.displacement_space, elements, inside.solution.expansions.traction)
+        return work + float(np.sum(of_heat * displacement)) + inside.solution.energy(space.mesh)
+
+
+def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:
+    """Return the tractions (n_elements, n_local, 2) [Pa] of a solution, projected onto a space element by element."""
+    xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
+    elements, basis = np.arange(space.mesh.n_elements), space.basis(xi)
+    points, normals = space.mesh.points(elements, xi), space.mesh.normals_at(elements, xi)
+    values = solution.traction(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+    measure = space.mesh.jacobian(elements, xi) * weights
+    gram = np.einsum("eq,lq,mq->elm", measure, basis, basis)
+    return np.asarray(np.linalg.solve(gram, np.einsum("eq,lq,eqc->elc", measure, basis, values)))

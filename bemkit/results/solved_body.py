@@ -1,0 +1,129 @@
+"""Fields on the boundary of a solved body, and what is estimated from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, read_only
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import ConstantSpace
+from bemkit.model.particular import ParticularFields
+from bemkit.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from bemkit.results.coefficient_decay import CoefficientErrors
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryFields:
+    """Displacement and traction on the whole boundary.
+
+    Parameters
+    ----------
+    points : (n_points, 2) array [m]
+        Where the displacement is known: the nodes of the displacement space of the scene's discretisation.
+    displacement : (n_points, 2) array [m]
+    centres : (n_elements, 2) array [m]
+    traction : (n_elements, 2) array [Pa]
+        Mean of each element.
+    traction_dofs : (n_elements * n_local, 2) array [Pa], optional
+        Values at the local nodes of the traction space of the discretisation, element by element: loads may jump
+        anywhere; see `ElementwiseSpace`. The means by default.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit together.
+    """
+
+    points: FloatArray
+    displacement: FloatArray
+    centres: FloatArray
+    traction: FloatArray
+    traction_dofs: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def __post_init__(self) -> None:
+        dofs = self.traction_dofs if self.traction_dofs.size else self.traction.copy()
+        object.__setattr__(self, "traction_dofs", dofs)
+        for place, value in (("points", "displacement"), ("centres", "traction")):
+            shape = (len(getattr(self, place)), 2)
+            for name in (place, value):
+                array = getattr(self, name)
+                if array.shape != shape:
+                    raise InputError(f"{name} has the shape {array.shape}: give {shape} to match {place}")
+                read_only(array)
+        if dofs.ndim != 2 or dofs.shape[1] != 2 or len(dofs) % max(len(self.traction), 1):
+            n = len(self.traction)
+            raise InputError(f"traction_dofs has the shape {dofs.shape}: give a multiple of {n} rows to match traction")
+        read_only(dofs)
+
+    def __repr__(self) -> str:
+        """Return one line."""
+        return f"BoundaryFields({len(self.points)} points, {len(self.centres)} elements)"
+
+
+class SolvedBody:
+    """What one body alone and one of several have in common.
+
+    Attributes
+    ----------
+    scene : Scene
+    mesh : BoundaryMesh
+    boundary : BoundaryFields
+    """
+
+    scene: Scene
+    mesh: BoundaryMesh
+    boundary: BoundaryFields
+
+    @cached_property
+    def particular(self) -> ParticularFields | None:
+        """The particular solution of the body forces, known in closed form; None without body forces."""
+        return ParticularFields.of(self.scene, self.mesh)
+
+    @cached_property
+    def map_boundary(self) -> BoundaryFields:
+        """The fields on the boundary less the particular solution: what elements stand for, and what has an error."""
+        if self.particular is None:
+            return self.boundary
+        own, mesh = self.boundary, self.mesh.unit
+        means = self.particular.tractions(ConstantSpace(mesh))[:, 0]
+        dofs = means
+        if len(own.traction_dofs) > len(means):
+            dofs = self.particular.tractions(self.scene.discretisation.traction_space(mesh)).reshape(-1, 2)
+        displacement = own.displacement - self.particular.displacement(own.points)
+        return replace(
+            own, displacement=displacement, traction=own.traction - means, traction_dofs=own.traction_dofs - dofs
+        )
+
+    @cached_property
+    def coefficient_errors(self) -> CoefficientErrors | None:
+        """Estimated errors of each element of degree 3 and more; None of other elements."""
+        discretisation, mesh = self.scene.discretisation, self.mesh
+        space, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+        if not discretisation.estimates_error or space.degree <= 2:
+            return None
+        from bemkit.results.coefficient_decay import coefficient_errors
+
+        at_nodes = self.map_boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
+        modulus = self.scene.material.plane_modulus
+        return coefficient_errors(space, tractions, self.map_boundary.displacement, at_nodes, modulus)
+
+    @cached_property
+    def element_errors(self) -> FloatArray | None:
+        """(n_elements,) array [J/m]: estimated squared errors in the energy norm; None without an estimate."""
+        if self.coefficient_errors is not None:
+            return self.coefficient_errors.energy
+        discretisation, modulus = self.scene.discretisation, self.scene.material.plane_modulus
+        if not discretisation.estimates_error:
+            return None
+        from bemkit.results.error_indicators import squared_errors
+
+        make_space = discretisation.displacement_space
+        fields = self.map_boundary
+        return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
