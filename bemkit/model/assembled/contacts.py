@@ -137,13 +137,14 @@ def body_rows(
     pairs: Sequence[ContactPair],
     bodies: Sequence[PlacedBody],
     conditions: Sequence[NodalConditions],
+    with_obstacles: Sequence[ContactRows],
 ) -> Iterator[ContactRows]:
-    """Yield the contacts between bodies.
+    """Yield the contacts between bodies; those with obstacles are known.
 
     Notes
     -----
     Where two contact sides of one body meet in a corner, and both are in contact, the node there carries a multiplier
-    of the longer contact alone: three bodies that meet in one point would otherwise be tied in a circle, and their
+    of the longer contact alone, and that with a rigid obstacle comes first: three bodies that meet in one point would otherwise be tied in a circle, and their
     tractions there could not be told apart. The other contact hands its share to its neighbours, as at crosspoints of
     mortar methods [Wohlmuth2000].
     """
@@ -151,6 +152,8 @@ def body_rows(
     ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
     lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
+    for rows in with_obstacles:
+        taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.name.split(".", 1)[1]))
     found: dict[int, ContactRows] = {}
     for k in sorted(range(len(pairs)), key=lambda k: -lengths[k]):
         (first, part, side), (second, _, other_side) = ordered[k]

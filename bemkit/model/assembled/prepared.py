@@ -188,10 +188,8 @@ def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) 
             else body.scene.discretisation.displacement_space(body.mesh.unit)
         )
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, space, in_place)))
-    rows = (
-        *body_rows(assembly, assembly.contacts, bodies, conditions),
-        *obstacle_rows(bodies, conditions),
-    )
+    with_obstacles = tuple(obstacle_rows(bodies, conditions))
+    rows = (*body_rows(assembly, assembly.contacts, bodies, conditions, with_obstacles), *with_obstacles)
     retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units)
     return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
 
