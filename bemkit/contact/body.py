@@ -7,6 +7,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 from bemkit.errors import BemkitError, InputError
 from bemkit.operators.equilibrium import Imbalance
 
@@ -145,13 +146,14 @@ class LinearBody(Protocol):
         """
         ...
 
-    def rigid_motions(self) -> FloatArray:
+    def rigid_motions(self) -> RigidMotions:
         """Return the motions of the body that only contact can hold; by default there are none.
 
         Returns
         -------
-        (n_motions, n_contact, 2) array
-            Normal and tangential components at the contact nodes; linearly independent.
+        (n_motions, n_contact, 2) array, or sparse (n_motions, 2 n_contact) array
+            Normal and tangential components at the contact nodes; linearly independent. Sparse, with index
+            ``2 node + component``, if the body has many members, each with motions of its own.
         """
         return np.zeros((0, self.n_contact, 2))
 
@@ -163,7 +165,11 @@ class LinearBody(Protocol):
         (n_motions,) array [N]
             Per unit of thickness and of motion.
         """
-        return np.zeros(len(self.rigid_motions()))
+        return np.zeros(self.rigid_motions().shape[0])
+
+    def moving_bodies(self, coefficients: FloatArray) -> str:
+        """Name what a combination (n_motions,) of the rigid motions moves, in words that go before "moves"."""
+        return "the body"
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body, those inside it included, are from equilibrium.
@@ -190,8 +196,8 @@ class LinearBody(Protocol):
             return Imbalance(0.0, 0.0)
         astray = self.stiffness_scale * np.abs(response.displacement - state.displacement).max(axis=1)
         missing = max(float(np.abs(forces[0] - forces[1]).max()), float((self.weights * astray).max()))
-        motions = self.rigid_motions().reshape(-1, 2 * self.n_contact)
-        size = float(np.abs(motions).max(initial=0.0)) or 1.0
+        motions = as_rows(self.rigid_motions())
+        size = float(largest_components(motions).max(initial=0.0)) or 1.0
         work = np.abs(self.rigid_load() + motions @ forces[0].ravel()) / size
         # what an error of the displacements makes of the tractions
         most = max(largest, self.stiffness_scale * float((self.weights[:, None] * np.abs(state.displacement)).max()))

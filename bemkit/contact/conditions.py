@@ -4,16 +4,19 @@ Components are (n, t) throughout: index 0 along the outward normal, index 1 alon
 conditions at a node is its normal, the second its tangential one.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.rigid_motions import FREE_MOTION_TOLERANCE, RigidMotions, null_space
 from bemkit.errors import InputError
 
-_FREE_MOTION_TOLERANCE = 1e-9
-"""A unit rigid motion that changes no condition by more than this is free of them. Normals leave about 1e-16; one held
-node out of a million gives 1e-3."""
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,27 +71,40 @@ class LinearConditions:
             np.where(rows, other.value, self.value),
         )
 
-    def free_motions(self, motions: FloatArray) -> FloatArray:
+    def free_motions(self, motions: RigidMotions) -> RigidMotions:
         """Return the rigid motions that change no condition: nothing but tractions are prescribed along them.
 
         Parameters
         ----------
-        motions : (n_motions, n_contact, 2) array
+        motions : (n_motions, n_contact, 2) array, or sparse (n_motions, 2 n_contact) array
             Motions without tractions, linearly independent.
 
         Returns
         -------
-        (n_free, n_contact, 2) array
-            An orthonormal basis.
+        (n_free, n_contact, 2) array, or sparse (n_free, 2 n_contact) array
+            A basis, orthonormal unless it is sparse.
         """
-        if not len(motions):
+        if not motions.shape[0]:
             return motions
+        if not isinstance(motions, np.ndarray):
+            return self._sparse_free_motions(motions)
         basis = np.linalg.qr(motions.reshape(len(motions), -1).T)[0].T.reshape(-1, self.n_contact, 2)
         size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
         rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
         felt = np.einsum("nrc,mnc->nrm", rows, basis).reshape(-1, len(basis))
         _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
-        return np.tensordot(directions[np.count_nonzero(singular > _FREE_MOTION_TOLERANCE) :], basis, axes=1)
+        return np.tensordot(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :], basis, axes=1)
+
+    def _sparse_free_motions(self, motions: csr_array) -> csr_array:
+        from scipy import sparse
+
+        size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
+        rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
+        at = np.arange(self.n_contact)
+        conditions = sparse.bsr_array((np.ascontiguousarray(rows), at, np.arange(self.n_contact + 1)))
+        norms = np.sqrt((motions**2).sum(axis=1))
+        unit = sparse.csr_array(sparse.diags_array(1.0 / norms) @ motions)
+        return sparse.csr_array(null_space(sparse.csr_array(sparse.csr_array(conditions) @ unit.T)) @ unit)
 
     def regularised(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
         """Return the conditions with weak springs added wherever only tractions are prescribed.

@@ -28,14 +28,17 @@ _FEW_MOTIONS = 400
 """So many motions that hang together are examined by a singular value decomposition, more of them by iteration."""
 
 
-def n_motions(motions: RigidMotions) -> int:
-    """Return the number of rigid motions."""
-    return int(motions.shape[0])
+def as_rows(motions: RigidMotions) -> RigidMotions:
+    """Return motions, dense or sparse, with one row (2 n_contact,) for each."""
+    return motions.reshape(len(motions), 2 * motions.shape[1]) if isinstance(motions, np.ndarray) else motions
 
 
-def is_sparse(motions: RigidMotions) -> bool:
-    """Whether motions are those of many members, as a sparse array."""
-    return not isinstance(motions, np.ndarray)
+def largest_components(motions: RigidMotions) -> FloatArray:
+    """Return (n_motions,) the size of the largest component of each motion."""
+    rows = as_rows(motions)
+    if isinstance(rows, np.ndarray):
+        return np.asarray(np.abs(rows).max(axis=1, initial=0.0))
+    return np.asarray(abs(rows).max(axis=1).toarray(), dtype=float).ravel()
 
 
 def null_space(matrix: csr_array) -> csr_array:

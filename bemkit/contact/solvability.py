@@ -6,6 +6,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.problem import ContactProblem
+from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
@@ -13,6 +14,10 @@ linear programming (tolerance 1e-7) cannot decide and the drivers can."""
 
 _FARTHEST = 1e7
 """Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
+
+
+_MANY_MOTIONS = 60
+"""From here on the simplex method takes longer than an interior point method."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +33,14 @@ class UnsolvableLoad:
         zero everywhere if the body slides, nan where a node can never touch.
     work : float [N]
         Work of the load on this motion, less what friction takes up; positive.
+    who : str
+        What it moves, in words.
     """
 
     motion: FloatArray
     lift: FloatArray
     work: float
+    who: str = "the body"
 
     @property
     def is_sliding(self) -> bool:
@@ -45,12 +53,12 @@ class UnsolvableLoad:
     def description(self) -> str:
         """One sentence that names the escape."""
         if np.isnan(self.lift).all():
-            how = "moves the body where no obstacle can meet it"
+            how = f"moves {self.who} where no obstacle can meet it"
         elif not self.is_sliding:
             how = "pushes" if np.ptp(self.motion[:, 0]) < 1e-6 else "tips"
-            how += " the body away from the obstacle"
+            how += f" {self.who} away from the obstacle"
         else:
-            how = "slides the body along the obstacle against all the friction there is"
+            how = f"slides {self.who} along the obstacle against all the friction there is"
         return f"the load {how} (work {self.work:.3g} on that rigid motion)"
 
 
@@ -65,11 +73,11 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
     test never condemns a load that can be held; what it misses the driver's status still reports.
     """
-    motions = problem.body.rigid_motions()
-    if not len(motions):
+    motions = as_rows(problem.body.rigid_motions())
+    if not motions.shape[0]:
         return None
-    unit = np.abs(motions).reshape(len(motions), -1).max(axis=1)
-    motions, load = motions / unit[:, None, None], problem.body.rigid_load() / unit
+    unit = largest_components(motions)
+    motions, load = motions * (1.0 / unit[:, None]), problem.body.rigid_load() / unit
     forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
@@ -79,14 +87,14 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     for cohesion, slope in _friction_envelopes(problem):
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
         coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
-        motion = np.tensordot(coefficients, motions, axes=1)
+        motion = (coefficients @ motions).reshape(-1, 2)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
         if work > _RELATIVE_WORK * force_scale:
             size = float(np.abs(motion).max())
             motion, work = motion / size, work / size
             lift = np.where(touches, -motion[:, 0] - slope * np.abs(motion[:, 1]), np.nan)
             if best is None or work > best.work:
-                best = UnsolvableLoad(motion, lift, work)
+                best = UnsolvableLoad(motion, lift, work, problem.body.moving_bodies(coefficients / unit))
     return best
 
 
@@ -125,52 +133,53 @@ def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, Float
     return [(cohesion, slope), *([(cap, none)] if is_capped else [])]
 
 
-def _largest_escape(motions: FloatArray, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
+def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
     """Return (n_motions,) coefficients of the escape on which the load does most work, zeros if none.
 
     Their absolute values add up to one at most, which favours escapes along a single motion: among several, the
     simplest to name. `slope` is nan at nodes that never touch.
+
+    Notes
+    -----
+    In its static form: of all contact forces that friction allows, those are sought that leave the least of the load,
+    ``min max |M p + load|`` over the motions M. The multipliers of these conditions are the escape. It is sparse if the
+    motions are.
     """
     touches = np.isfinite(slope)
-    normal, tangential = motions[:, touches, 0].T, motions[:, touches, 1].T  # (n_touching, n_motions)
-    slope, resistance = slope[touches], resistance[touches]
-    if len(motions) == 1:
+    if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
+        normal, tangential = motions.reshape(-1, 2)[touches].T
         for sign in np.sign(load):
-            if np.all(sign * normal[:, 0] + slope * np.abs(tangential[:, 0]) <= 1e-9):
+            if np.all(sign * normal + slope[touches] * np.abs(tangential) <= 1e-9):
                 return np.array([sign])
         return np.zeros(1)
 
     from scipy import sparse
     from scipy.optimize import linprog
 
-    # Unknowns: coefficients c, a >= |c|, and e >= |v_t| where something resists. Maximise load c - resistance e.
-    n_motions, resists = len(motions), resistance > 0.0
-    n_resisting = int(np.count_nonzero(resists))
-    wedged = slope[~resists, None] * tangential[~resists]
-    own = np.eye(n_motions)
-    on_motions = [normal[resists], tangential[resists], -tangential[resists]]
-    on_motions += [normal[~resists] + wedged, normal[~resists] - wedged, own, -own, np.zeros((1, n_motions))]
-    on_sizes = np.zeros((3 * n_resisting + 2 * len(wedged), n_motions))
-    unit = sparse.eye_array(n_resisting)
-    on_slips = sparse.vstack([sparse.diags_array(slope[resists]), -unit, -unit])
-    n_others = 2 * len(wedged) + 2 * n_motions + 1
-    conditions = sparse.hstack(
+    # Unknowns: p_n and p_t of the nodes that touch, and the largest rest r of the load. Minimise r.
+    n_motions, n = motions.shape[0], int(np.count_nonzero(touches))
+    of_touching = sparse.csc_array(motions)[:, np.flatnonzero(np.repeat(touches, 2))]
+    on_normal, on_tangential = of_touching[:, 0::2], of_touching[:, 1::2]
+    most, none = sparse.csr_array(np.ones((n_motions, 1))), sparse.csr_array((n, 1))
+    wedged, unit = sparse.diags_array(slope[touches]), sparse.eye_array(n)
+    conditions = sparse.block_array(
         [
-            sparse.csr_array(np.concatenate(on_motions)),
-            sparse.csr_array(np.concatenate([on_sizes, -own, -own, np.ones((1, n_motions))])),
-            sparse.vstack([on_slips, sparse.csr_array((n_others, n_resisting))]),
+            [on_normal, on_tangential, -most],
+            [-on_normal, -on_tangential, -most],
+            [wedged, unit, none],
+            [wedged, -unit, none],
         ],
         format="csr",
     )
-    limits = np.zeros(conditions.shape[0])
-    limits[-1] = 1.0
+    limits = np.concatenate([-load, load, resistance[touches], resistance[touches]])
     result = linprog(
-        np.concatenate([-load, np.zeros(n_motions), resistance[resists]]),
+        np.append(np.zeros(2 * n), 1.0),
         A_ub=conditions,
         b_ub=limits,
-        bounds=[(None, None)] * n_motions + [(0.0, None)] * (n_motions + n_resisting),
-        method="highs-ipm" if n_resisting else "highs",  # the simplex method takes a pivot for each node that resists
+        bounds=[(None, 0.0)] * n + [(None, None)] * n + [(0.0, None)],
+        method="highs-ipm" if n_motions > _MANY_MOTIONS else "highs",
     )
-    if result.x is None:  # zero is always admissible, so this is the solver's failure: do not condemn the load
+    if result.x is None:  # leaving all of the load is admissible, so this is the solver's failure: do not condemn it
         return np.zeros(n_motions)
-    return np.asarray(result.x[:n_motions], dtype=float)
+    multipliers = -np.asarray(result.ineqlin.marginals, dtype=float)
+    return np.asarray(multipliers[:n_motions] - multipliers[n_motions : 2 * n_motions])

@@ -8,6 +8,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
+from bemkit.contact.rigid_motions import RigidMotions
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
@@ -23,6 +24,9 @@ soon carries the body to where other sets hold it; by the second at most."""
 _NEGLIGIBLE = 100.0
 """Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
 a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+
+_MOST_PINNED = 60
+"""Of more free motions than that the forces are not sorted out: springs hold them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +153,7 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     tractions take their place. The result carries them to the last digit; weak springs would leave a little
     everywhere, which a condition such as "friction only where something presses" cannot tell from contact.
     """
-    free = conditions.free_motions(body.rigid_motions())
+    free = _few(conditions.free_motions(body.rigid_motions()), body.n_contact)
     gives_traction = ~np.any(conditions.on_displacement != 0.0, axis=2)
     gives_traction[:, 1] &= ~body.tangent_is_eliminated  # whose displacement cannot be held
     if not len(free) or np.count_nonzero(gives_traction) < len(free):
@@ -169,6 +173,14 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
     return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
+
+
+def _few(motions: RigidMotions, n_contact: int) -> FloatArray:
+    """Return motions as a dense array (n, n_contact, 2), none if there are too many to be pinned one by one."""
+    if isinstance(motions, np.ndarray):
+        return motions
+    few = motions if motions.shape[0] <= _MOST_PINNED else motions[:0]
+    return np.asarray(few.toarray()).reshape(-1, n_contact, 2)
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:

@@ -140,7 +140,7 @@ class DenseBody(LinearBody):
         Prescribed displacements, zero tractions and slip tractions are met exactly, not just to round-off, so that
         ties such as ``|sigma_t| = s |sigma_n|`` are decided alike in all units.
         """
-        self._check_eliminated_tangents(conditions)
+        refuse_other_tangents(conditions, self.tangent_is_eliminated)
         own = [0, 1]
         acts_on_displacement = np.any(conditions.on_displacement != 0.0, axis=2)
         acts_on_traction = np.any(conditions.on_traction != 0.0, axis=2)
@@ -168,7 +168,7 @@ class DenseBody(LinearBody):
 
     def rigid_motions(self) -> FloatArray:
         """Return the motions given to the constructor."""
-        return super().rigid_motions() if self.motions is None else self.motions
+        return np.zeros((0, self.n_contact, 2)) if self.motions is None else self.motions
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the load on these motions."""
@@ -227,17 +227,6 @@ class DenseBody(LinearBody):
     def _motion_defect(self) -> FloatArray:
         """(n_unknowns,) array [Pa]: what round-off of the stiffness adds to the balance of forces."""
         return np.asarray(np.abs(self._motions @ self.stiffness).max(axis=0) / np.abs(self._motions).max())
-
-    def _check_eliminated_tangents(self, conditions: LinearConditions) -> None:
-        on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
-        asks_more = np.any(on_displacement[:, 1] != 0.0, axis=1) | (on_displacement[:, 0, 1] != 0.0)
-        asks_more |= (on_traction[:, 1, 0] != 0.0) | (on_traction[:, 1, 1] == 0.0) | (conditions.value[:, 1] != 0.0)
-        if np.any(asks_more & self.tangent_is_eliminated):
-            node = int(np.argmax(asks_more & self.tangent_is_eliminated))
-            raise InputError(
-                f"contact node {node} is without friction, and its tangential displacement is eliminated: give "
-                "sigma_t = 0 as the second condition there, or ask ContactProblem.respond, which does"
-            )
 
     def _followed(self, unknowns: FloatArray) -> FloatArray:
         """Return the displacements of the eliminated tangents."""
@@ -304,3 +293,16 @@ class DenseBody(LinearBody):
         """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
         multiples = np.arange(1, self.n_unknowns + 1) * 0.6180339887498949
         return np.asarray(0.5 + np.modf(multiples)[0])
+
+
+def refuse_other_tangents(conditions: LinearConditions, is_eliminated: BoolArray) -> None:
+    """Raise InputError if conditions ask more of an eliminated tangent (n_contact,) than ``sigma_t = 0``."""
+    on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
+    asks_more = np.any(on_displacement[:, 1] != 0.0, axis=1) | (on_displacement[:, 0, 1] != 0.0)
+    asks_more |= (on_traction[:, 1, 0] != 0.0) | (on_traction[:, 1, 1] == 0.0) | (conditions.value[:, 1] != 0.0)
+    if np.any(asks_more & is_eliminated):
+        node = int(np.argmax(asks_more & is_eliminated))
+        raise InputError(
+            f"contact node {node} is without friction, and its tangential displacement is eliminated: give "
+            "sigma_t = 0 as the second condition there, or ask ContactProblem.respond, which does"
+        )

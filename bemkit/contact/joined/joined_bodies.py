@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,12 +10,13 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.body import ContactState, LinearBody
-from bemkit.contact.condensation.dense_body import DenseBody
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.balance import imbalance_of
 from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.member import Member, Shape, deformation, shapes_of
+from bemkit.contact.joined.sparse_form import sparse_response
 from bemkit.contact.rigid_motions import RigidMotions, null_space
 from bemkit.errors import InputError
 from bemkit.operators.equilibrium import Imbalance
@@ -23,7 +24,11 @@ from bemkit.operators.equilibrium import Imbalance
 MOST_DENSE = 2500
 """Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
 
-_LOAD_FREE = ("shapes", "motions", "is_symmetric", "_relative_stiffness", "_motion_fit", "_owners", "modulus")
+_WITHOUT_LOAD = (
+    *("shapes", "motions", "_felt_motions", "stiffness", "is_symmetric", "_relative_stiffness", "_motion_fit"),
+    *("owners", "modulus", "stiffness_scale", "is_costly"),
+)
+"""What stays as it is under another load."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +105,13 @@ class JoinedBodies(LinearBody):
         """
         members = tuple(replace(member, load=load) for member, load in zip(self.members, loads, strict=True))
         other = replace(self, members=members, offset=offset)
-        other.__dict__.update({name: self.__dict__[name] for name in _LOAD_FREE if name in self.__dict__})
+        other.__dict__.update({name: self.__dict__[name] for name in _WITHOUT_LOAD if name in self.__dict__})
         return other
+
+    @cached_property
+    def accuracy(self) -> float:  # type: ignore[override]  # an attribute of the protocol
+        """Relative error of a response."""
+        return 1e-13 if self.is_costly else 1e-14
 
     @cached_property
     def is_costly(self) -> bool:  # type: ignore[override]  # an attribute of the protocol
@@ -116,12 +126,18 @@ class JoinedBodies(LinearBody):
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
-        return self._dense.respond(conditions)
+        if not self.is_costly:
+            return self._dense.respond(conditions)
+        refuse_other_tangents(conditions, self.tangent_is_eliminated)
+        if conditions.free_motions(self.rigid_motions()).shape[0]:
+            raise SingularResponse("the contact conditions leave a rigid motion free")
+        return sparse_response(self, conditions)
 
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
-        motions = (self.relative @ self.motions).T
-        return motions.toarray().reshape(-1, self.n_contact, 2)
+        if self.is_costly:
+            return self._felt_motions
+        return self._felt_motions.toarray().reshape(-1, self.n_contact, 2)
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the loads on these motions."""
@@ -184,6 +200,16 @@ class JoinedBodies(LinearBody):
         return sparse.csr_array(sparse.block_diag([of_member[number] for number in first], format="csr"))
 
     @cached_property
+    def _felt_motions(self) -> sparse.csr_array:
+        """(n_motions, 2 n_contact) sparse array: their relative displacements."""
+        return sparse.csr_array((self.relative @ self.motions).T)
+
+    @cached_property
+    def stiffness(self) -> sparse.csr_array:
+        """(n, n) sparse array [Pa]: the stiffnesses of all members."""
+        return sparse.csr_array(sparse.block_diag([member.stiffness for member in self.members], format="csr"))
+
+    @cached_property
     def motion_owner(self) -> IntArray:
         """(n_motions,) array: the member that each of the motions moves."""
         return np.repeat(np.arange(len(self.members)), [len(member.motions) for member in self.members])
@@ -213,27 +239,27 @@ class JoinedBodies(LinearBody):
         return self._relative_stiffness.body(self)
 
     @cached_property
-    def _motion_fit(self):
+    def _motion_fit(self) -> Callable[[FloatArray], FloatArray]:
         """The function that finds the motions (n_motions,) nearest to relative displacements (2 n_contact,)."""
-        felt = sparse.csc_array(self.relative @ self.motions)
+        felt = sparse.csc_array(self._felt_motions.T)
         if not felt.shape[1]:
             return lambda missed: np.zeros(0)
         factors = sparse.linalg.splu(
             sparse.csc_array(felt.T @ felt), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
         )
-        return lambda missed: factors.solve(felt.T @ missed)
+        return lambda missed: np.asarray(factors.solve(felt.T @ missed))
 
     def _check_held(self) -> None:
         """Refuse members that neither supports nor all contacts together can hold."""
-        free = null_space(sparse.csr_array(self.relative @ self.motions))
+        free = null_space(sparse.csr_array(self._felt_motions.T))
         if not free.shape[0]:
             return
-        names = self.moving_members(np.abs(free).sum(axis=0))
+        names = self.moving_bodies(np.asarray(abs(free).sum(axis=0), dtype=float))
         raise InputError(
-            f"nothing holds {names}: no support, and no contact with anything that is held; let them touch, or hold them"
+            f"nothing holds {names}: no support, and no contact with anything that is held; make contacts or supports"
         )
 
-    def moving_members(self, coefficients: FloatArray) -> str:
+    def moving_bodies(self, coefficients: FloatArray) -> str:
         """Name the members that a combination (n_motions,) of the rigid motions moves."""
         size = np.abs(coefficients)
         moved = np.unique(self.motion_owner[size > 1e-6 * size.max()])
@@ -247,7 +273,7 @@ class JoinedBodies(LinearBody):
         is_eliminated = np.array(self.tangent_is_eliminated, bool)
         if not is_eliminated.any():
             return is_eliminated
-        felt = sparse.csr_array(self.relative @ self.motions)
+        felt = sparse.csr_array(self._felt_motions.T)
         is_kept = np.ones((self.n_contact, 2), bool)
         is_kept[is_eliminated, 1] = False
         free = null_space(sparse.csr_array(felt[is_kept.ravel()]))
