@@ -56,7 +56,7 @@ class LinearConditions:
         """Number of contact nodes."""
         return len(self.value)
 
-    def replaced(self, rows: BoolArray, other: "LinearConditions") -> "LinearConditions":
+    def replaced(self, rows: BoolArray, other: LinearConditions) -> LinearConditions:
         """Return these conditions with the marked ones taken from `other`.
 
         Parameters
@@ -106,7 +106,7 @@ class LinearConditions:
         unit = sparse.csr_array(sparse.diags_array(1.0 / norms) @ motions)
         return sparse.csr_array(null_space(sparse.csr_array(sparse.csr_array(conditions) @ unit.T)) @ unit)
 
-    def regularised(self, displacement: FloatArray, stiffness: float) -> "LinearConditions":
+    def regularised(self, displacement: FloatArray, stiffness: float) -> LinearConditions:
         """Return the conditions with weak springs added wherever only tractions are prescribed.
 
         A body that these conditions leave free to move is then held near `displacement`. The springs carry nothing

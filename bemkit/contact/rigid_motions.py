@@ -30,7 +30,14 @@ _FEW_MOTIONS = 400
 
 def as_rows(motions: RigidMotions) -> RigidMotions:
     """Return motions, dense or sparse, with one row (2 n_contact,) for each."""
-    return motions.reshape(len(motions), 2 * motions.shape[1]) if isinstance(motions, np.ndarray) else motions
+    if isinstance(motions, np.ndarray) and motions.ndim == 3:
+        return motions.reshape(len(motions), 2 * motions.shape[1])
+    return motions
+
+
+def as_dense(motions: RigidMotions, n_contact: int) -> FloatArray:
+    """Return motions as a dense array (n_motions, n_contact, 2)."""
+    return motions if isinstance(motions, np.ndarray) else np.asarray(motions.toarray()).reshape(-1, n_contact, 2)
 
 
 def largest_components(motions: RigidMotions) -> FloatArray:

@@ -17,7 +17,8 @@ _FARTHEST = 1e7
 
 
 _MANY_MOTIONS = 60
-"""From here on the simplex method takes longer than an interior point method."""
+"""Of more motions than that the sum of all rests of the load is made small instead of the largest one, which would take
+a condition for each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,8 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     if not motions.shape[0]:
         return None
     unit = largest_components(motions)
-    motions, load = motions * (1.0 / unit[:, None]), problem.body.rigid_load() / unit
+    load = problem.body.rigid_load() / unit
+    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
     forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
@@ -87,7 +89,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     for cohesion, slope in _friction_envelopes(problem):
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
         coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
-        motion = (coefficients @ motions).reshape(-1, 2)
+        motion = np.asarray(coefficients @ motions).reshape(-1, 2)
         work = float(load @ coefficients) - force_scale * float(resistance @ np.abs(motion[:, 1]))
         if work > _RELATIVE_WORK * force_scale:
             size = float(np.abs(motion).max())
@@ -141,9 +143,11 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
 
     Notes
     -----
-    In its static form: of all contact forces that friction allows, those are sought that leave the least of the load,
-    ``min max |M p + load|`` over the motions M. The multipliers of these conditions are the escape. It is sparse if the
-    motions are.
+    In its static form: of all contact forces that friction allows, those are sought that leave the least rest of the
+    load, ``r = M p + load`` with the motions M. The multipliers of these equations are the escape: with the largest
+    rest as the measure their absolute values add up to one; of many motions the sum of all rests is the measure, so
+    that none of the multipliers exceeds one. Forces are sums of the two on the edges of the cone of friction and of
+    what friction holds without pressure, so that all conditions are bounds, and M stays sparse.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -156,30 +160,33 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
     from scipy import sparse
     from scipy.optimize import linprog
 
-    # Unknowns: p_n and p_t of the nodes that touch, and the largest rest r of the load. Minimise r.
-    n_motions, n = motions.shape[0], int(np.count_nonzero(touches))
-    of_touching = sparse.csc_array(motions)[:, np.flatnonzero(np.repeat(touches, 2))]
-    on_normal, on_tangential = of_touching[:, 0::2], of_touching[:, 1::2]
-    most, none = sparse.csr_array(np.ones((n_motions, 1))), sparse.csr_array((n, 1))
-    wedged, unit = sparse.diags_array(slope[touches]), sparse.eye_array(n)
-    conditions = sparse.block_array(
-        [
-            [on_normal, on_tangential, -most],
-            [-on_normal, -on_tangential, -most],
-            [wedged, unit, none],
-            [wedged, -unit, none],
-        ],
-        format="csr",
-    )
-    limits = np.concatenate([-load, load, resistance[touches], resistance[touches]])
-    result = linprog(
-        np.append(np.zeros(2 * n), 1.0),
-        A_ub=conditions,
-        b_ub=limits,
-        bounds=[(None, 0.0)] * n + [(None, None)] * n + [(0.0, None)],
+    n_motions, resists = motions.shape[0], touches & (resistance > 0.0)
+    by_component = sparse.csc_array(motions)
+    normal, tangential = by_component[:, 2 * np.flatnonzero(touches)], by_component[:, 2 * np.flatnonzero(touches) + 1]
+    wedged = tangential @ sparse.diags_array(slope[touches])
+    held = by_component[:, 2 * np.flatnonzero(resists) + 1]
+    unit = sparse.eye_array(n_motions)
+    balance = sparse.hstack([wedged - normal, -wedged - normal, held, unit, -unit], format="csc")
+    n_forces = balance.shape[1] - 2 * n_motions
+    limits = np.full((balance.shape[1], 2), [0.0, np.inf])
+    limits[n_forces - held.shape[1] : n_forces] = resistance[resists, None] * [-1.0, 1.0]
+    cost = np.append(np.zeros(n_forces), np.ones(2 * n_motions))
+    below_largest, none = sparse.csr_array((0, balance.shape[1])), np.zeros(0)
+    if n_motions <= _MANY_MOTIONS:
+        balance = sparse.hstack([balance, sparse.csc_array((n_motions, 1))])
+        largest = sparse.csr_array(np.full((n_motions, 1), -1.0))
+        below_largest = sparse.hstack([sparse.csr_array((n_motions, n_forces)), unit, unit, largest], format="csr")
+        none = np.zeros(n_motions)
+        limits, cost = np.vstack([limits, [0.0, np.inf]]), np.append(np.zeros_like(cost), 1.0)
+    result = linprog(  # type: ignore[call-overload]  # the stubs know no sparse arrays
+        cost,
+        A_ub=below_largest,
+        b_ub=none,
+        A_eq=balance,
+        b_eq=-load,
+        bounds=limits,
         method="highs-ipm" if n_motions > _MANY_MOTIONS else "highs",
     )
     if result.x is None:  # leaving all of the load is admissible, so this is the solver's failure: do not condemn it
         return np.zeros(n_motions)
-    multipliers = -np.asarray(result.ineqlin.marginals, dtype=float)
-    return np.asarray(multipliers[:n_motions] - multipliers[n_motions : 2 * n_motions])
+    return -np.asarray(result.eqlin.marginals, dtype=float)

@@ -8,7 +8,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
-from bemkit.contact.rigid_motions import RigidMotions
+from bemkit.contact.rigid_motions import RigidMotions, as_dense
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
@@ -177,10 +177,9 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
 
 def _few(motions: RigidMotions, n_contact: int) -> FloatArray:
     """Return motions as a dense array (n, n_contact, 2), none if there are too many to be pinned one by one."""
-    if isinstance(motions, np.ndarray):
-        return motions
-    few = motions if motions.shape[0] <= _MOST_PINNED else motions[:0]
-    return np.asarray(few.toarray()).reshape(-1, n_contact, 2)
+    return as_dense(
+        motions if motions.shape[0] <= _MOST_PINNED or isinstance(motions, np.ndarray) else motions[:0], n_contact
+    )
 
 
 def _determinate(free: FloatArray, allowed: BoolArray) -> BoolArray:

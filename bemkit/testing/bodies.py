@@ -11,6 +11,7 @@ from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.problem import ContactProblem
+from bemkit.contact.rigid_motions import as_dense
 from bemkit.errors import InputError
 from bemkit.testing.failure import demand
 
@@ -117,7 +118,11 @@ def _check_numbers(body: LinearBody) -> None:
     demand(is_good, f"{name}.weights is not an array of positive numbers, one for each contact node")
     demand(bool(np.isfinite(scale)) and scale > 0.0, f"{name}.stiffness_scale is {scale}; it is positive")
     demand(0.0 < body.accuracy <= 1e-4, f"{name}.accuracy is {body.accuracy}; it lies between 0 and 1e-4")
-    motions, load, eliminated = body.rigid_motions(), body.rigid_load(), body.tangent_is_eliminated
+    motions, load, eliminated = (
+        as_dense(body.rigid_motions(), body.n_contact),
+        body.rigid_load(),
+        body.tangent_is_eliminated,
+    )
     for word, array, shape in (
         ("rigid_motions", motions, (len(motions), len(weights), 2)),
         ("rigid_load", load, (len(motions),)),
@@ -127,7 +132,7 @@ def _check_numbers(body: LinearBody) -> None:
 
 
 def _check_rigid_motions(asked: _Asked) -> None:
-    body, name, motions = asked.body, asked.name, asked.body.rigid_motions()
+    body, name, motions = asked.body, asked.name, as_dense(asked.body.rigid_motions(), asked.body.n_contact)
     try:
         asked.problem.respond(separated(body.n_contact))
         responds = True
@@ -174,7 +179,9 @@ def _conditions(asked: _Asked, random: np.random.Generator) -> LinearConditions:
         rows = np.repeat(random.random((n_contact, 1)) < 0.25, 2, axis=1)
         conditions = conditions.replaced(rows, kind)
     conditions = asked.problem.without_eliminated(conditions)
-    return held if len(conditions.free_motions(asked.body.rigid_motions())) else conditions
+    return (
+        held if len(conditions.free_motions(as_dense(asked.body.rigid_motions(), asked.body.n_contact))) else conditions
+    )
 
 
 def _with_other_values(asked: _Asked, kind: LinearConditions, random: np.random.Generator) -> LinearConditions:

@@ -12,6 +12,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.conditions import stick
 from bemkit.contact.piecewise_law import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
+from bemkit.contact.rigid_motions import as_dense
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
@@ -209,7 +210,8 @@ def _springs(problem: ContactProblem, state: ContactState) -> tuple[FloatArray, 
 
     They are carried along from step to step and vanish from the solution.
     """
-    motions, n_unknowns = problem.body.rigid_motions(), 2 * problem.n_contact
+    n_unknowns = 2 * problem.n_contact
+    motions = as_dense(problem.body.rigid_motions(), problem.n_contact)
     if not len(motions):
         return np.zeros((n_unknowns, n_unknowns)), np.zeros(n_unknowns)
     is_held = np.stack([np.ones(problem.n_contact), ~problem.body.tangent_is_eliminated], axis=1)

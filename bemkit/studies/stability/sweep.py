@@ -154,7 +154,7 @@ def condition_number(scene: Scene, case: Case) -> float:
         diagonal = np.abs(np.diagonal(stiffness))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         singular = np.linalg.svd(scale[:, None] * stiffness * scale, compute_uv=False)
-    smallest = float(singular[max(singular.size - 1 - len(body.rigid_motions()), 0)])
+    smallest = float(singular[max(singular.size - 1 - body.rigid_motions().shape[0], 0)])
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 
 

@@ -23,7 +23,7 @@ def test_floating_blocks_keep_the_promises_of_a_body(options):
 
 
 def test_drivers_agree_on_a_row_of_blocks():
-    body = row_of_blocks((1.0, 3.0, 0.5))
+    body = row_of_blocks((1.0, 3.0, 0.5), lift=0.01)
     problem = ContactProblem(body, np.full(body.n_contact, -0.2), Coulomb(0.4))
     states = [solve(problem, solver).state for solver in (SemismoothNewton(), AugmentedLagrangian(), FixedPoint())]
     for state in states[1:]:
