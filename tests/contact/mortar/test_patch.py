@@ -18,7 +18,7 @@ STEEL = Material(1.0, NU)
 
 
 def pressed_blocks(degree: int, shear: float, *, is_held: bool, angle: float = 0.0, swap: bool = False) -> Pair:
-    """Two unit blocks under the pressure 1 and a shear, the lower one on its base; with `is_held` both left sides too."""
+    """Two unit blocks under the pressure 1 and a shear, the lower one held, with `is_held` both left sides as well."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     gradient = np.array([[NU * (1 + NU), 0.0], [2 * (1 + NU) * shear, NU**2 - 1]])
     stress = np.array([[0.0, shear], [shear, -1.0]])
