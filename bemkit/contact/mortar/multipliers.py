@@ -70,20 +70,19 @@ def multiplier_functions(
     def integrate(psi: FloatArray) -> FloatArray:
         return np.asarray(np.add.reduceat(np.matmul(psi, weighted.transpose(0, 2, 1)), first, axis=0))
 
+    is_modified = modified_rows(segments, may_carry)[rows]
     mass = integrate(phi)
-    sizes = np.eye(side.space.local_nodes.size) * mass.sum(axis=2)[:, :, None]
-    psi = np.matmul((sizes @ np.linalg.inv(mass))[number], phi)
-    modified = np.flatnonzero(modified_rows(segments, may_carry)[rows])
-    for k in modified:
-        pieces = slice(first[k], first[k + 1] if k + 1 < rows.size else len(psi))
+    integrals = np.eye(phi.shape[1]) * mass.sum(axis=2)[:, :, None]
+    mass[is_modified] = np.eye(phi.shape[1])  # that of a short piece is singular
+    psi = np.matmul((integrals @ np.linalg.inv(mass))[number], phi)
+    nodes = side.space.local_nodes
+    for k in np.flatnonzero(is_modified):
         covered = (segments.row == rows[k]) & segments.is_covered
-        carries = carrying_nodes(
-            side.space.local_nodes, may_carry[rows[k]], segments.low[covered], segments.high[covered]
-        )
-        psi[pieces] = hats(side.space.local_nodes, carries, quadrature.xi[pieces])
-    if modified.size:
-        sizes[modified] = integrate(psi)[modified]
-    return psi, rows, sizes
+        carries = carrying_nodes(nodes, may_carry[rows[k]], segments.low[covered], segments.high[covered])
+        psi[number == k] = hats(nodes, carries, quadrature.xi[number == k])
+    if is_modified.any():
+        integrals[is_modified] = integrate(psi)[is_modified]
+    return psi, rows, integrals
 
 
 def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, high: FloatArray) -> BoolArray:

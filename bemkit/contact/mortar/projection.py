@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide
-from bemkit.geometry.vectors import angles_between, cross
+from bemkit.geometry.vectors import angles_between, cross, norms
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
@@ -121,6 +121,10 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     With the normals of one side alone, two equal cylinders that are pressed together seem to slide by as much as the
     cube of the distance from their common point, which friction resists; the mean is the same from both sides.
     """
+    if non_mortar.flat_normal is not None and mortar.flat_normal is not None:
+        mean = non_mortar.flat_normal - mortar.flat_normal
+        faces = non_mortar.flat_normal @ mortar.flat_normal < 0.0
+        return np.tile(mean / norms(mean), (len(non_mortar.normals), 1)) if faces else non_mortar.normals
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals

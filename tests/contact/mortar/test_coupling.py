@@ -256,3 +256,13 @@ def test_wrong_elements(elements: list[int]) -> None:
     space = space_of(block((0.0, 0.0), (1.0, 1.0), 3, 2), 1)
     with pytest.raises(GeometryError, match="ContactSide: elements"):
         ContactSide(space, np.array(elements, np.intp))
+
+
+def test_a_short_cover_in_the_middle_of_an_element() -> None:
+    """The node next to it takes it alone, however short it is beside an element, as long as it is no sliver."""
+    narrow = block((0.6, -1.0), (0.61, 0.0), 1, 2)
+    one, two = side_of(block((0.0, 0.0), (1.0, 1.0), 1, 2), 6, "bottom"), side_of(narrow, 1, "top")
+    coupling = couple(one, two)
+    assert_sums_are_exact(coupling, 0.01)
+    nearest = np.argmin(np.abs(dof_points(one.space)[one.dofs[0], 0] - 0.605))
+    assert coupling.nodes.tolist() == [one.dofs[0, nearest]]
