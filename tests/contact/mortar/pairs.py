@@ -96,6 +96,7 @@ def elastic_side(
     contact: str,
     holds: Sequence[tuple[str, Field | None]] = (),
     loads: Sequence[tuple[str, Load]] = (),
+    more_force: FloatArray | None = None,
 ) -> ElasticSide:
     """Condense a body; parts named in `holds` are clamped, with displacements given by a function of the points."""
     elastic = Galerkin(degree).elastic_map(mesh, material, DenseCholesky())
@@ -107,6 +108,8 @@ def elastic_side(
     held, nodes = nodes[is_held[nodes]], nodes[~is_held[nodes]]
     conditions.is_retained[nodes] = True
     force = sum((integrate_traction(space, mesh.part(n), load) for n, load in loads), np.zeros((space.n_dofs // 2, 2)))
+    if more_force is not None:
+        force = force + more_force
     points = dof_points(space)
     motions = rigid_motions(points[nodes], np.zeros(2), 1.0).transpose(2, 0, 1)[: 0 if holds else 3]
     condensed = elastic.condense(conditions, force)

@@ -28,6 +28,10 @@ def found(meshes: list[BoundaryMesh], distance: float = 1e-3) -> list[tuple[str,
     return [(words[one], words[two]) for one, two in find_facing(sides, distance, owners)]
 
 
+def test_no_sides_make_no_pairs() -> None:
+    assert find_facing([], 1.0) == []
+
+
 def test_a_wall_in_running_bond() -> None:
     rows, columns = 5, 4
     meshes = [
