@@ -110,12 +110,10 @@ def couple(
             f"nowhere within the distance {reach:g}: choose sides whose outward normals point at each other"
         )
     may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
-    while may_carry.any():
+    while may_carry[segments.row[segments.is_covered]].any():
         coupling, slivers = _integrate(non_mortar, mortar, directions, segments, may_carry)
-        if coupling.nodes.size and not slivers.size:
-            return coupling
         if not slivers.size:
-            break
+            return coupling
         may_carry &= ~np.isin(non_mortar.dofs, slivers)
     raise NotFacingError(
         f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other only "

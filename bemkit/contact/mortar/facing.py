@@ -69,6 +69,8 @@ def find_facing(
     when they are projected along the mean of both normals. A pair covers at least a hundredth of an average element of
     its finer side; less is a corner that touches.
     """
+    if not sides:
+        return []
     elements = _Elements.of(sides, range(len(sides)) if owners is None else owners)
     first, second, cover = _facing_elements(elements, distance)
     pairs, number = np.unique(

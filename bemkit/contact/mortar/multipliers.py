@@ -4,10 +4,10 @@ On an element that is wholly covered, all of whose nodes carry multipliers, they
 ``int psi_i phi_j = delta_ij int phi_i``, polynomials of the degree of the displacements. Their integrals are those of
 the displacements' basis, which at Gauss-Lobatto points are positive for every degree.
 
-On any other element the dual basis would do harm. On a part of an element the integrals of quadratic and higher basis
-functions may be negative, and a node far from a short covered part would rest on an extrapolation. There the nodes that
-lie in the covered part and may carry a multiplier share it by hat functions: linear between these nodes, constant
-beyond the last of them. If there is no such node, the nearest one takes the part alone. Hats are not negative, so that
+On any other element the multipliers have to see the covered part alone [CichoszBischoff2011], and there the dual basis
+would do harm: the integrals of quadratic and higher basis functions over a part may be negative, and a node far from a
+short part would rest on an extrapolation. Instead the nodes that lie in the covered part and may carry a multiplier
+share it by hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the nearest one takes the part alone. Hats are not negative, so that
 the weights stay positive, and they sum to one like the dual basis, so that uniform tractions are transmitted exactly.
 They are linearly independent of each other on the polynomials that displacements are, so that no constraint is lost.
 """
@@ -70,20 +70,19 @@ def multiplier_functions(
     def integrate(psi: FloatArray) -> FloatArray:
         return np.asarray(np.add.reduceat(np.matmul(psi, weighted.transpose(0, 2, 1)), first, axis=0))
 
+    is_modified = modified_rows(segments, may_carry)[rows]
     mass = integrate(phi)
-    sizes = np.eye(side.space.local_nodes.size) * mass.sum(axis=2)[:, :, None]
-    psi = np.matmul((sizes @ np.linalg.inv(mass))[number], phi)
-    modified = np.flatnonzero(modified_rows(segments, may_carry)[rows])
-    for k in modified:
-        pieces = slice(first[k], first[k + 1] if k + 1 < rows.size else len(psi))
+    integrals = np.eye(phi.shape[1]) * mass.sum(axis=2)[:, :, None]
+    mass[is_modified] = np.eye(phi.shape[1])  # that of a short piece is singular
+    psi = np.matmul((integrals @ np.linalg.inv(mass))[number], phi)
+    nodes = side.space.local_nodes
+    for k in np.flatnonzero(is_modified):
         covered = (segments.row == rows[k]) & segments.is_covered
-        carries = carrying_nodes(
-            side.space.local_nodes, may_carry[rows[k]], segments.low[covered], segments.high[covered]
-        )
-        psi[pieces] = hats(side.space.local_nodes, carries, quadrature.xi[pieces])
-    if modified.size:
-        sizes[modified] = integrate(psi)[modified]
-    return psi, rows, sizes
+        carries = carrying_nodes(nodes, may_carry[rows[k]], segments.low[covered], segments.high[covered])
+        psi[number == k] = hats(nodes, carries, quadrature.xi[number == k])
+    if is_modified.any():
+        integrals[is_modified] = integrate(psi)[is_modified]
+    return psi, rows, integrals
 
 
 def carrying_nodes(nodes: FloatArray, may_carry: BoolArray, low: FloatArray, high: FloatArray) -> BoolArray:

@@ -8,15 +8,13 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide
-from bemkit.geometry.vectors import angles_between, cross
+from bemkit.geometry.vectors import angles_between, cross, norms
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
 """From the second pass on the projection follows the mean direction instead of the normal of the one side."""
 _SETTLED = 1e-13
 """Change of a direction [rad] from one pass to the next that needs no further one."""
-_BESIDE = 0.1
-"""In lengths of an element: a point that lies beside its end by less takes the normal at the end."""
 
 
 def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, tolerance: float) -> FloatArray:
@@ -56,7 +54,7 @@ def bracketed_roots(function: Callable[[FloatArray], FloatArray], n_roots: int, 
 
 
 def project(
-    points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: FloatArray | float = 0.0
+    points: FloatArray, directions: FloatArray, side: ContactSide, reach: float, slack: float = 0.0
 ) -> tuple[IntArray, FloatArray]:
     """Find the points of a side that lie ahead of, or behind, other points.
 
@@ -67,8 +65,8 @@ def project(
     side : ContactSide
     reach : float [m]
         Largest distance along the direction.
-    slack : float or (m,) array [m]
-        How far points that meet no element may lie beside one.
+    slack : float [m]
+        How far points that meet no element may lie beside the nearest one.
 
     Returns
     -------
@@ -80,15 +78,15 @@ def project(
     to_start, to_end = side.start - points[:, None], side.end - points[:, None]
     # along the tangent, against which a side that faces the direction runs
     start, end = cross(directions[:, None], to_start), cross(directions[:, None], to_end)
-    is_met = (start >= 0.0) & (end <= 0.0) & (end < start)
-    is_missed = ~is_met.any(axis=1)
-    is_met[is_missed] = ((start >= -slack) & (end <= slack) & (end < start))[is_missed]
-    share = start / np.where(is_met, start - end, 1.0)
+    beside = np.where(end < start, np.maximum(np.maximum(-start, end), 0.0), np.inf)
+    share = np.clip(start / np.where(end < start, start - end, 1.0), 0.0, 1.0)
     ahead, ahead_at_end = ((directions[:, None] * to).sum(axis=-1) for to in (to_start, to_end))
-    distance = np.where(is_met, np.abs((1.0 - share) * ahead + share * ahead_at_end), np.inf)
-    rows = np.argmin(distance, axis=1)
-    each = np.arange(len(points))
-    rows[~(distance[each, rows] <= min(reach, np.finfo(float).max))] = -1
+    distance = np.abs((1.0 - share) * ahead + share * ahead_at_end)
+    is_near = distance <= reach
+    rows, each = np.argmin(np.where(is_near & (beside == 0.0), distance, np.inf), axis=1), np.arange(len(points))
+    missed = np.flatnonzero(~is_near[each, rows] | (beside[each, rows] > 0.0))
+    beside = np.where(is_near, beside, np.inf)[missed]
+    rows[missed] = np.where(beside.min(axis=1) <= slack, np.argmin(beside, axis=1), -1)
     found = np.flatnonzero(rows >= 0)
     xi = np.zeros(len(points))
     xi[found] = meeting_points(points[found], directions[found], side, rows[found])
@@ -123,12 +121,18 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
     With the normals of one side alone, two equal cylinders that are pressed together seem to slide by as much as the
     cube of the distance from their common point, which friction resists; the mean is the same from both sides.
     """
+    if non_mortar.flat_normal is not None and mortar.flat_normal is not None:
+        mean = non_mortar.flat_normal - mortar.flat_normal
+        faces = non_mortar.flat_normal @ mortar.flat_normal < 0.0
+        return np.tile(mean / norms(mean), (len(non_mortar.normals), 1)) if faces else non_mortar.normals
     rows, local = non_mortar.first_knots
     points = non_mortar.points(rows, non_mortar.knots)[np.arange(rows.size), local]
     normals = directions = non_mortar.normals
+    # the end of a side is met from its end, whatever small angle the first directions are off
+    slack = float(max(non_mortar.lengths.mean(), mortar.lengths.mean()))
     each, half = np.arange(rows.size), np.zeros(rows.size)
     for _ in range(_MOST_PASSES):
-        partner, eta = project(points, directions, mortar, reach, _BESIDE * mortar.lengths)
+        partner, eta = project(points, directions, mortar, reach, slack)
         met = np.flatnonzero(partner >= 0)
         if not met.size:
             break

@@ -12,7 +12,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.vectors import norms
+from bemkit.geometry.vectors import norms, turned_right
 
 _RESOLUTION = 32.0 * np.finfo(float).eps
 """Positions that differ by less than this share of the largest coordinate are the same."""
@@ -122,8 +122,25 @@ class ContactSide:
         return element, local
 
     @cached_property
+    def flat_normal(self) -> FloatArray | None:
+        """(2,) array: outward unit normal if all elements lie on one line, else None.
+
+        It is free of the round-off in the directions of short elements.
+        """
+        along = (self.end - self.start).sum(axis=0)
+        size = float(norms(along))
+        if not self.is_straight or size < self.lengths.max():
+            return None
+        normal = turned_right(along / size)
+        off_line = (np.concatenate([self.start, self.end]) - self.start[0]) @ normal
+        is_flat = np.abs(off_line).max() <= self.resolution and np.all((self.end - self.start) @ along > 0.0)
+        return normal if is_flat else None
+
+    @cached_property
     def normals(self) -> FloatArray:
         """(n_knots, 2) array: outward unit normals, the mean of both elements where two meet."""
+        if self.flat_normal is not None:
+            return np.tile(self.flat_normal, (int(self.knot_numbers.max()) + 1, 1))
         at_knots = self.mesh.normals_at(self.elements, self.knots)
         total = np.zeros((int(self.knot_numbers.max()) + 1, 2))
         np.add.at(total, self.knot_numbers, at_knots)
@@ -139,10 +156,10 @@ class ContactSide:
         Those of straight elements turn from one to the next by interpolation.
         """
         normals = self.directions(self.normals, rows, xi[:, None])[:, 0]
+        if self.is_straight:
+            return normals
         is_curved = ~self.mesh.is_straight[self.elements[rows]]
-        if is_curved.any():
-            normals = normals.copy()
-            normals[is_curved] = self.mesh.normals_at(self.elements[rows[is_curved]], xi[is_curved, None])[:, 0]
+        normals[is_curved] = self.mesh.normals_at(self.elements[rows[is_curved]], xi[is_curved, None])[:, 0]
         return normals
 
     def points(self, rows: IntArray, xi: FloatArray) -> FloatArray:

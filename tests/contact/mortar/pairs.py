@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.dense_body import DenseBody
@@ -77,7 +78,7 @@ def half_disc(*, is_below: bool, far: FloatArray, near: FloatArray) -> BoundaryM
 
 @dataclass
 class ElasticSide:
-    """An elastic body condensed onto both directions, in x and y, of the nodes of its contact side that nothing holds."""
+    """An elastic body condensed onto both directions, in x and y, of the free nodes of its contact side."""
 
     side: ContactSide
     nodes: IntArray
@@ -95,6 +96,7 @@ def elastic_side(
     contact: str,
     holds: Sequence[tuple[str, Field | None]] = (),
     loads: Sequence[tuple[str, Load]] = (),
+    more_force: FloatArray | None = None,
 ) -> ElasticSide:
     """Condense a body; parts named in `holds` are clamped, with displacements given by a function of the points."""
     elastic = Galerkin(degree).elastic_map(mesh, material, DenseCholesky())
@@ -106,6 +108,8 @@ def elastic_side(
     held, nodes = nodes[is_held[nodes]], nodes[~is_held[nodes]]
     conditions.is_retained[nodes] = True
     force = sum((integrate_traction(space, mesh.part(n), load) for n, load in loads), np.zeros((space.n_dofs // 2, 2)))
+    if more_force is not None:
+        force = force + more_force
     points = dof_points(space)
     motions = rigid_motions(points[nodes], np.zeros(2), 1.0).transpose(2, 0, 1)[: 0 if holds else 3]
     condensed = elastic.condense(conditions, force)
@@ -121,18 +125,21 @@ class Pair:
     recover: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
+def in_frames(matrix: csr_matrix, columns: IntArray, frame: FloatArray) -> FloatArray:
+    """Return (2 n, 2 k): x and y components of the displacements of some columns (k,) to the frames (n, 2, 2)."""
+    dense = matrix.toarray()[:, columns]
+    return np.einsum("ij,iac->iajc", dense, frame).reshape(2 * len(frame), 2 * columns.size)
+
+
 def join(one: ElasticSide, two: ElasticSide, **options: object) -> Pair:
     """Couple two bodies, the first one non-mortar."""
     coupling = couple(one.side, two.side, without=one.held, **options)
     n = coupling.nodes.size
 
-    def rows(matrix: object, columns: IntArray) -> FloatArray:
-        dense = matrix.toarray()[:, columns]
-        return np.einsum("ij,iac->iajc", dense, coupling.frame).reshape(2 * n, 2 * columns.size)
-
-    b1, b2 = rows(coupling.on_non_mortar, one.nodes), rows(coupling.on_mortar, two.nodes)
-    shift = rows(coupling.on_non_mortar, one.held) @ one.given.ravel()
-    shift = shift - rows(coupling.on_mortar, two.held) @ two.given.ravel()
+    on_one, on_two = coupling.on_non_mortar, coupling.on_mortar
+    b1, b2 = in_frames(on_one, one.nodes, coupling.frame), in_frames(on_two, two.nodes, coupling.frame)
+    shift = in_frames(on_one, one.held, coupling.frame) @ one.given.ravel()
+    shift = shift - in_frames(on_two, two.held, coupling.frame) @ two.given.ravel()
     # find the traction forces p with w = C p + w0, then invert
     stiffness1, stiffness2 = one.condensed.stiffness, two.condensed.stiffness
     matrix = np.block(
