@@ -37,5 +37,5 @@ def random_body_forces(
 def _temperature(draw: Draw, size: float, centre: FloatArray, symmetry: Symmetry | None) -> float | Expression:
     if symmetry is not None or draw.chance(0.4):
         return draw.one_of((1.0, -0.3))
-    x, y = (f"((x - {float(place)!r}) / {size!r})" for place in centre)
+    x, y = (f"(({name} - {float(place)!r}) / {size!r})" for name, place in zip("xy", centre, strict=True))
     return Expression(draw.one_of((f"1 + {x}", f"{x} * {y}", f"0.5 * {y} + {x} ** 2 - {y} ** 2")))
