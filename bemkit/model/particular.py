@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.formulas import Expression
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.harmonic_fit import TemperatureError, harmonic_sources
@@ -76,7 +77,8 @@ def _sources(
             try:
                 return harmonic_sources(strain, mesh.unit)
             except TemperatureError as error:
-                raise TemperatureError(f"temperature {force.temperature!r} {error}") from None
+                shown = force.temperature.text if isinstance(force.temperature, Expression) else force.temperature
+                raise TemperatureError(f"temperature is {shown!r}, which {error}") from None
 
 
 def _plane_strain_factor(material: Material) -> float:

@@ -165,17 +165,23 @@ class HeavyElasticity:
         Notes
         -----
         The energy of sigma_p itself, and the work of sigma_h on the strains of sigma_p: by Betti's theorem that is the
-        work of the tractions t_h on u_p for forces, and of the tractions sigma_p n on u_h for heat.
+        work of the tractions t_h on u_p for forces, and of the tractions sigma_p n on u_h for heat. The nodal forces
+        do the first on the interpolant of u_p, and the tractions, which hold normals only by interpolation, on the
+        small rest.
         """
-        inside, space = self.inside, self.traction_space
+        inside, space, moved_space = self.inside, self.traction_space, self.displacement_space
         displacement, force = displacement - inside.displacement, force - inside.force
         traction = self.weightless.element_tractions(displacement, force)
         xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
         elements = np.arange(space.mesh.n_elements)
         points = space.mesh.points(elements, xi)
-        moved = inside.solution.forces.displacement(points.reshape(-1, 2)).reshape(points.shape)
+        of_forces = inside.solution.forces
+        at_nodes = of_forces.displacement(dof_points(moved_space))
+        interpolated = np.einsum("pq,epc->eqc", moved_space.basis(xi), at_nodes[moved_space.element_dofs])
+        rest = of_forces.displacement(points.reshape(-1, 2)).reshape(points.shape) - interpolated
         measure = space.mesh.jacobian(elements, xi) * weights
-        work = float(np.einsum("eq,lq,elc,eqc->", measure, space.basis(xi), traction, moved, optimize=True))
+        work = float(np.sum(force * at_nodes))
+        work += float(np.einsum("eq,lq,elc,eqc->", measure, space.basis(xi), traction, rest, optimize=True))
         of_heat = integrate_traction(self.displacement_space, elements, inside.solution.expansions.traction)
         return work + float(np.sum(of_heat * displacement)) + inside.solution.energy(space.mesh)
 

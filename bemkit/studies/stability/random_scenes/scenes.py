@@ -81,14 +81,9 @@ def random_case(seed: int, index: int) -> RandomCase:
 def _inside(index: int, seed: int, layout: dict[str, Any], modulus: float) -> dict[str, Any]:
     """Draw what acts inside a body now and then, by numbers of its own, so that all else is drawn as without."""
     draw = Draw(np.random.PCG64([seed, index, 1]))
-    outline = layout["shape"].outline()
-    if outline.is_exterior or not draw.chance(0.3):
+    if layout["shape"].outline().is_exterior or not draw.chance(0.3):
         return {}
-    points = np.concatenate([side.curve.point(np.linspace(0.0, 1.0, 9)) for loop in outline.loops for side in loop])
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = float(np.hypot(*(high - low)))
-    forces = random_body_forces(draw, size, 0.5 * (low + high), modulus, layout.get("symmetry"))
-    return {"body_forces": forces}
+    return {"body_forces": random_body_forces(draw, layout["shape"], modulus, layout.get("symmetry"))}
 
 
 def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Scene:
