@@ -50,6 +50,10 @@ class MortarCoupling:
         Positive: ``int psi_i`` over the covered part of the non-mortar side.
     gap : (n,) array [m]
         Mean of the distance along d, weighted by psi_i.
+    overlap : float [m]
+        How deep the sides lie in each other at the deepest place, not a mean; zero if they do not.
+    deepest : (2,) array [m]
+        Where that is.
     facing : (n,) array
         Cosine of the angle between d and the normal of the non-mortar body.
     on_non_mortar : (n, n_scalar) csr_matrix
@@ -64,6 +68,8 @@ class MortarCoupling:
     frame: FloatArray
     weights: FloatArray
     gap: FloatArray
+    overlap: float
+    deepest: FloatArray
     facing: FloatArray
     on_non_mortar: csr_matrix
     on_mortar: csr_matrix
@@ -163,6 +169,8 @@ def _integrate(
     direction = side.directions(directions, element, xi)[:, 0]
     distance = np.einsum("nc,nc->n", direction, gap[order]) / nodal_weights
     distance[np.abs(distance) <= max(side.resolution, mortar.resolution)] = 0.0
+    depth = -np.einsum("sqc,sqc->sq", quadrature.gap, side.directions(directions, quadrature.row, quadrature.xi))
+    piece, place = np.divmod(int(np.argmax(depth)), depth.shape[1])
     coupling = MortarCoupling(
         nodes=dofs[order],
         points=side.points(element, xi)[:, 0],
@@ -170,6 +178,8 @@ def _integrate(
         frame=np.stack([direction, np.stack([-direction[:, 1], direction[:, 0]], axis=1)], axis=1),
         weights=nodal_weights,
         gap=distance,
+        overlap=max(float(depth[piece, place]), 0.0),
+        deepest=side.points(quadrature.row[[piece]], quadrature.xi[piece, [place]])[0, 0],
         facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, element, xi)[:, 0]),
         on_non_mortar=rows_of(rows, side.dofs[rows], integrals, side.space.n_dofs // 2),
         on_mortar=rows_of(

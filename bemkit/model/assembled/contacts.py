@@ -213,13 +213,11 @@ def _reach(one: PlacedBody, two: PlacedBody) -> float:
 
 
 def _check_overlap(pair: ContactPair, coupling: MortarCoupling, one: PlacedBody, two: PlacedBody) -> None:
-    overlap = -float(coupling.gap.min(initial=0.0))
     allowed = pair.interference + OVERLAP_TOLERANCE * min(one.mesh.diameter, two.mesh.diameter)
-    if overlap > allowed:
-        node = int(np.argmin(coupling.gap))
-        x, y = coupling.points[node]
+    if coupling.overlap > allowed:
+        x, y = coupling.deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} m at ({x:.6g}, {y:.6g}), and an interference "
+            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} m at ({x:.6g}, {y:.6g}), and an interference "
             f"of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
         )
 
