@@ -82,6 +82,8 @@ def run_assembly_history(
         raise InputError("assemblies is empty: give at least one assembly")
     clock = StageClock.start()
     prepared = prepare_assembly(assemblies[0], meshes)
+    if not prepared.n_contact:
+        raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
     steps = [prepared, *(prepared.under(_like(each, prepared.assembly)) for each in assemblies[1:])]
     plan = plan_assembly(steps)
     check_memory(plan)
@@ -115,8 +117,6 @@ def _like(assembly: Assembly, first: Assembly) -> Assembly:
 def _solved(
     model: AssembledModel, start: ContactState | None, callback: Callable[[StepRecord], None] | None
 ) -> ContactSolution:
-    if not model.problem.n_contact:
-        raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
     solver = model.prepared.assembly.solver
     result = solve(model.problem, solver, start=start, throw=False, callback=callback)
     if not result.history:

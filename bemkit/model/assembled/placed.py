@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace
@@ -117,7 +118,10 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
 
 def _divided(scene: Scene, assembly: Assembly, body: Body) -> BoundaryMesh:
     even = [*(part.name for part in scene.contact_parts), *assembly.contact_parts(body)]
-    return scene.mesh.divide(scene.shape.outline(), scene.selections, even)
+    try:
+        return scene.mesh.divide(scene.shape.outline(), scene.selections, even)
+    except GeometryError as error:
+        raise type(error)(f"body {body.name!r}: {error}") from error
 
 
 def groups(bodies: Sequence[PlacedBody]) -> list[IntArray]:
