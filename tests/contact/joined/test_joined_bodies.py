@@ -174,10 +174,8 @@ def test_wrong_input_is_named():
         (replace(good, motions=np.eye(16)[:1]), "resists the rigid motions"),
         (replace(good, motions=good.motions[:2]), "free to move in more ways"),
     ):
-        body = None
         with pytest.raises(InputError, match=words):
-            body = JoinedBodies((member,), coupling, np.zeros(2), np.ones(1))
-            body.respond(stick(np.zeros(1), np.zeros(1)))
+            JoinedBodies((member,), coupling, np.zeros(2), np.ones(1)).respond(stick(np.zeros(1), np.zeros(1)))
     held = Member(np.eye(2), np.zeros(2), np.zeros((0, 2)), 1.0)
     for change, words in (
         ({"offset": np.zeros(3)}, "offset has the shape"),
