@@ -24,6 +24,8 @@ FREE_MOTION_TOLERANCE = 1e-9
 node out of a million gives 1e-3."""
 _FREE_OF_NORMAL_EQUATIONS = 1e-7
 """The same where squares of the changes are formed, which hold half of the digits."""
+_SHIFT = 1e-12
+"""Added to the normal equations, which are singular: well above their round-off, far below what holds anything."""
 _FEW_MOTIONS = 400
 """So many motions that hang together are examined by a singular value decomposition, more of them by iteration."""
 
@@ -99,9 +101,8 @@ def _null_space_of_group(part: csr_array) -> FloatArray:
 
     # inverse iteration on the normal equations, on more and more vectors until not all of them are null
     normal = csc_array(part.T @ part)
-    tiny = 0.01 * _FREE_OF_NORMAL_EQUATIONS**2
     factors = splu(
-        normal + tiny * eye_array(part.shape[1], format="csc"),
+        normal + _SHIFT * eye_array(part.shape[1], format="csc"),
         permc_spec="MMD_AT_PLUS_A",
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},

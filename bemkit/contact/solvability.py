@@ -1,12 +1,18 @@
 """Whether the obstacle can hold the load at all."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
@@ -19,6 +25,11 @@ _FARTHEST = 1e7
 _MANY_MOTIONS = 60
 """Of more motions than that the sum of all rests of the load is made small instead of the largest one, which would take
 a condition for each."""
+
+
+_MEETS = 1e-7
+"""Speed into an obstacle, relative to the largest of a motion, from which on a node meets it: what linear programming
+leaves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +158,8 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
     load, ``r = M p + load`` with the motions M. The multipliers of these equations are the escape: with the largest
     rest as the measure their absolute values add up to one; of many motions the sum of all rests is the measure, so
     that none of the multipliers exceeds one. Forces are sums of the two on the edges of the cone of friction and of
-    what friction holds without pressure, so that all conditions are bounds, and M stays sparse.
+    what friction holds without pressure, so that all conditions are bounds, and M stays sparse. Where two bodies meet
+    the outermost nodes can nearly always do what those between them could: these join if they meet the escape.
     """
     touches = np.isfinite(slope)
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
@@ -157,9 +169,38 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
                 return np.array([sign])
         return np.zeros(1)
 
+    takes_part = _outermost(motions, touches) if not isinstance(motions, np.ndarray) else touches
+    while True:
+        coefficients = _escape_from(motions, load, resistance, np.where(takes_part, slope, np.nan))
+        motion = np.asarray(coefficients @ motions).reshape(-1, 2)
+        meets = motion[:, 0] + np.where(touches, slope, 0.0) * np.abs(motion[:, 1]) > _MEETS * np.abs(motion).max()
+        meets |= (resistance > 0.0) & (motion[:, 1] != 0.0)
+        if not np.any(meets & touches & ~takes_part):
+            return coefficients
+        takes_part |= meets & touches
+
+
+def _outermost(motions: csr_array, touches: BoolArray) -> BoolArray:
+    """Return (n_contact,) bool: the first and the last of the nodes at which the same motions meet."""
+    nodes = np.flatnonzero(touches)
+    felt = (abs(motions.T)).tocsr()
+    merged = felt[2 * nodes] + felt[2 * nodes + 1]
+    merged.sort_indices()
+    met = merged.indptr[1:] > merged.indptr[:-1]
+    nodes, begins, ends = nodes[met], merged.indptr[:-1][met], merged.indptr[1:][met]
+    pairs = np.stack([merged.indices[begins], merged.indices[ends - 1]], axis=1)
+    chosen = np.zeros(touches.size, bool)
+    for order in (slice(None), slice(None, None, -1)):
+        chosen[nodes[order][np.unique(pairs[order], axis=0, return_index=True)[1]]] = True
+    return chosen
+
+
+def _escape_from(motions: RigidMotions, load: FloatArray, resistance: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return the coefficients of `_largest_escape` for the nodes whose slope is a number."""
     from scipy import sparse
     from scipy.optimize import linprog
 
+    touches = np.isfinite(slope)
     n_motions, resists = motions.shape[0], touches & (resistance > 0.0)
     by_component = sparse.csc_array(motions)
     normal, tangential = by_component[:, 2 * np.flatnonzero(touches)], by_component[:, 2 * np.flatnonzero(touches) + 1]
@@ -185,7 +226,7 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
         A_eq=balance,
         b_eq=-load,
         bounds=limits,
-        method="highs-ipm" if n_motions > _MANY_MOTIONS else "highs",
+        method="highs",
     )
     if result.x is None:  # leaving all of the load is admissible, so this is the solver's failure: do not condemn it
         return np.zeros(n_motions)

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
+from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance
-
-if TYPE_CHECKING:
-    from bemkit.contact.joined.joined_bodies import JoinedBodies
 
 _LIGHTEST = 1e-3
 """Forces on a member below this share of the largest on any are measured by this share: one linear system finds them
 all, and leaves its round-off everywhere."""
 
 
-def imbalance_of(joined: JoinedBodies, state: ContactState) -> Imbalance:
+def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
     """Return how far a state is from a response of the members.
 
     Parameters
     ----------
-    joined : JoinedBodies
+    joined : CoupledMembers
     state : ContactState
 
     Returns
@@ -69,7 +65,7 @@ def imbalance_of(joined: JoinedBodies, state: ContactState) -> Imbalance:
     )
 
 
-def _least_of_partners(joined: JoinedBodies, largest: FloatArray) -> FloatArray:
+def _least_of_partners(joined: CoupledMembers, largest: FloatArray) -> FloatArray:
     """Return (2 n_contact,) the smaller of the largest forces on the members that meet in each component."""
     owners = joined.owners
     at_contact = np.full(owners.shape[0], largest.max())

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
+from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.linear.dense import DenseLU
-
-if TYPE_CHECKING:
-    from bemkit.contact.joined.joined_bodies import JoinedBodies
 
 _TIED = "the bodies tied to each other at all contact nodes (a tie that others imply may have to be left out)"
 
@@ -21,7 +17,7 @@ class RelativeStiffness:
 
     Parameters
     ----------
-    joined : JoinedBodies
+    joined : CoupledMembers
 
     Raises
     ------
@@ -35,7 +31,7 @@ class RelativeStiffness:
     the stiffness of w. Rows of eliminated tangents are left out: there p = 0, and w follows.
     """
 
-    def __init__(self, joined: JoinedBodies) -> None:
+    def __init__(self, joined: CoupledMembers) -> None:
         is_kept = np.ones((joined.n_contact, 2), bool)
         is_kept[joined.tangent_is_eliminated, 1] = False
         self._is_kept = is_kept.ravel()
@@ -55,7 +51,7 @@ class RelativeStiffness:
         if joined.is_symmetric:
             self._stiffness = 0.5 * (self._stiffness + self._stiffness.T)
 
-    def body(self, joined: JoinedBodies) -> DenseBody:
+    def body(self, joined: CoupledMembers) -> DenseBody:
         """Return the body under the loads and offsets of `joined`."""
         n_kept, load = self._coupling.shape[0], joined.load
         loaded = joined.deformation(load)
@@ -72,7 +68,7 @@ class RelativeStiffness:
             modulus=joined.stiffness_scale * float(np.median(joined.weights)),
         )
 
-    def _eliminated(self, joined: JoinedBodies, loaded: FloatArray, at_rest: FloatArray) -> EliminatedTangents | None:
+    def _eliminated(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> EliminatedTangents | None:
         if not joined.tangent_is_eliminated.any():
             return None
         n_kept = self._coupling.shape[0]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import maximum_bipartite_matching
@@ -12,9 +10,7 @@ from scipy.sparse.linalg import splu
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
-
-if TYPE_CHECKING:
-    from bemkit.contact.joined.joined_bodies import JoinedBodies
+from bemkit.contact.joined.coupled_members import CoupledMembers
 
 _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
@@ -24,12 +20,12 @@ _LARGE = 0.3
 """Entries of a row of the coupling above this share of its largest may be pivots."""
 
 
-def sparse_response(joined: JoinedBodies, conditions: LinearConditions) -> ContactState:
+def sparse_response(joined: CoupledMembers, conditions: LinearConditions) -> ContactState:
     """Return the response of many members; see `LinearBody.respond`.
 
     Parameters
     ----------
-    joined : JoinedBodies
+    joined : CoupledMembers
     conditions : LinearConditions
         That leave no rigid motion free.
 
@@ -41,7 +37,8 @@ def sparse_response(joined: JoinedBodies, conditions: LinearConditions) -> Conta
     Notes
     -----
     With tractions that are given by their conditions (open nodes, friction of slipping ones) substituted as
-    ``p = T y + p_0``, the unknowns u and y solve ``K u - B^T T y = f + B^T p_0`` and ``U B u + X T y = c - U o - X p_0``.
+    ``p = T y + p_0``, the unknowns u and y solve ``K u - B^T T y = f + B^T p_0`` and
+    ``U B u + X T y = c - U o - X p_0``.
     The second rows have no diagonal. Exchanged with those of the displacement that each of them ties they make a matrix
     like that of the bodies grown together, which a symmetric minimum degree ordering suits: a third of the entries of
     an ordering by columns.

@@ -1,0 +1,193 @@
+"""Several elastic bodies and the matrix that couples them at their contact nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.joined.member import Member, Shape, deformation, shapes_of
+from bemkit.contact.rigid_motions import null_space
+from bemkit.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledMembers:
+    """Members in contact, and what follows from them without solving a contact system.
+
+    Parameters
+    ----------
+    members, relative, offset, weights, tangent_is_eliminated
+        See `bemkit.contact.joined.joined_bodies.JoinedBodies`.
+    """
+
+    members: tuple[Member, ...]
+    relative: sparse.csr_array
+    offset: FloatArray
+    weights: FloatArray
+    tangent_is_eliminated: BoolArray = None  # type: ignore[assignment]  # a value, to hide the property of the protocol
+
+    def __post_init__(self) -> None:
+        n_contact, n = len(self.weights), sum(member.n_components for member in self.members)
+        relative = sparse.csr_array(self.relative)
+        if self.tangent_is_eliminated is None:
+            object.__setattr__(self, "tangent_is_eliminated", np.zeros(n_contact, bool))
+        for name, array, shape in (
+            ("relative", relative, (2 * n_contact, n)),
+            ("offset", self.offset, (2 * n_contact,)),
+            ("tangent_is_eliminated", self.tangent_is_eliminated, (n_contact,)),
+        ):
+            if array.shape != shape:
+                raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
+        for name, values in (("relative", relative.data), ("offset", self.offset), ("weights", self.weights)):
+            if not np.isfinite(values).all():
+                raise InputError(f"{name} contains {values[~np.isfinite(values)][0]}; give finite numbers")
+        if n_contact == 0 or not self.members:
+            raise InputError(f"{len(self.members)} members with {n_contact} contact nodes; give at least one of each")
+        if self.weights.min() <= 0.0:
+            raise InputError(f"weights has the entry {self.weights.min():g}; the length of a node is positive")
+        object.__setattr__(self, "relative", relative)
+        self._check_held()
+        object.__setattr__(self, "tangent_is_eliminated", self._eliminated_tangents())
+
+    @property
+    def n_contact(self) -> int:
+        """Number of contact nodes."""
+        return len(self.weights)
+
+    @cached_property
+    def stiffness_scale(self) -> float:
+        """E' by the median weight [Pa/m]; see `modulus`."""
+        return self.modulus / float(np.median(self.weights))
+
+    def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return what the members do under the tractions of a state.
+
+        Returns
+        -------
+        displacement : (n,) array [m]
+            Of all members, one after the other, rigid motions by least squares of what is missed.
+        missed : (2 n_contact,) array [m]
+            Relative displacements of the state less those of the members.
+        """
+        displacement = self.deformation(self.load + self.contact_forces(state))
+        missed = state.displacement.ravel() - self.offset - self.relative @ displacement
+        displacement = displacement + self.motions @ self._motion_fit(missed)
+        return displacement, state.displacement.ravel() - self.offset - self.relative @ displacement
+
+    def contact_forces(self, state: ContactState) -> FloatArray:
+        """Return the forces (n,) [N/m] of contact on all members."""
+        return np.asarray(self.relative.T @ (self.weights[:, None] * state.traction).ravel())
+
+    def deformation(self, forces: FloatArray) -> FloatArray:
+        """Return the displacements of all members under forces (n, ...) in equilibrium, but for rigid motions."""
+        return deformation(self.shapes, forces)
+
+    @cached_property
+    def load(self) -> FloatArray:
+        """(n,) array [N/m]: the loads of all members, one after the other."""
+        return np.concatenate([member.load for member in self.members])
+
+    @cached_property
+    def shapes(self) -> tuple[Shape, ...]:
+        """The members by shape."""
+        return shapes_of(self.members)
+
+    @cached_property
+    def is_symmetric(self) -> bool:
+        """Whether all stiffnesses are symmetric."""
+        return all(np.array_equal(shape.member.stiffness, shape.member.stiffness.T) for shape in self.shapes)
+
+    @cached_property
+    def motions(self) -> sparse.csr_array:
+        """(n, n_motions) sparse array: the rigid motions, orthonormal, member by member."""
+        of_member: dict[int, FloatArray] = {}
+        for shape in self.shapes:
+            of_member.update(dict.fromkeys(shape.rows[:, 0].tolist(), shape.motions))
+        first = np.cumsum([0, *(member.n_components for member in self.members)])[:-1].tolist()
+        return sparse.csr_array(sparse.block_diag([of_member[number] for number in first], format="csr"))
+
+    @cached_property
+    def felt_motions(self) -> sparse.csr_array:
+        """(n_motions, 2 n_contact) sparse array: relative displacements of the rigid motions."""
+        return sparse.csr_array((self.relative @ self.motions).T)
+
+    @cached_property
+    def stiffness(self) -> sparse.csr_array:
+        """(n, n) sparse array [Pa]: the stiffnesses of all members."""
+        return sparse.csr_array(sparse.block_diag([member.stiffness for member in self.members], format="csr"))
+
+    @cached_property
+    def motion_owner(self) -> IntArray:
+        """(n_motions,) array: the member that each of the motions moves."""
+        return np.repeat(np.arange(len(self.members)), [len(member.motions) for member in self.members])
+
+    @cached_property
+    def owners(self) -> sparse.csr_array:
+        """(2 n_contact, n_members) sparse array: the members that take part in each component of contact."""
+        of_component = np.repeat(np.arange(len(self.members)), [member.n_components for member in self.members])
+        where = (np.arange(of_component.size), of_component)
+        sums = sparse.csr_array((np.ones(of_component.size), where), (of_component.size, len(self.members)))
+        return sparse.csr_array(abs(self.relative) @ sums)
+
+    @cached_property
+    def modulus(self) -> float:
+        """Median over the contact nodes of the E' of the partner that yields more [Pa]."""
+        owners = self.owners
+        moduli = np.array([member.modulus for member in self.members])
+        bounds = owners.indptr[:-1:2], owners.indptr[1::2]
+        least = [moduli[owners.indices[i:j]].min() for i, j in zip(*bounds, strict=True) if j > i]
+        return float(np.median(least)) if least else float(moduli.min())
+
+    @cached_property
+    def _motion_fit(self) -> Callable[[FloatArray], FloatArray]:
+        """The function that finds the motions (n_motions,) nearest to relative displacements (2 n_contact,)."""
+        felt = sparse.csc_array(self.felt_motions.T)
+        if not felt.shape[1]:
+            return lambda missed: np.zeros(0)
+        factors = sparse.linalg.splu(
+            sparse.csc_array(felt.T @ felt), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        )
+        return lambda missed: np.asarray(factors.solve(felt.T @ missed))
+
+    def moving_bodies(self, coefficients: FloatArray) -> str:
+        """Name the members that a combination (n_motions,) of the rigid motions moves."""
+        size = np.abs(coefficients)
+        moved = np.unique(self.motion_owner[size > 1e-6 * size.max()])
+        names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in moved]
+        if len(names) == 1:
+            return f"body {names[0]}"
+        return f"bodies {', '.join(names[:4])}" + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+
+    def _check_held(self) -> None:
+        """Refuse members that neither supports nor all contacts together can hold."""
+        free = null_space(sparse.csr_array(self.felt_motions.T))
+        if not free.shape[0]:
+            return
+        names = self.moving_bodies(np.asarray(abs(free).sum(axis=0), dtype=float))
+        raise InputError(
+            f"nothing holds {names}: no support, and no contact with anything that is held; make contacts or supports"
+        )
+
+    def _eliminated_tangents(self) -> BoolArray:
+        """Take back as many tangents as it needs to hold the members by what is kept."""
+        is_eliminated = np.array(self.tangent_is_eliminated, bool)
+        if not is_eliminated.any():
+            return is_eliminated
+        felt = sparse.csr_array(self.felt_motions.T)
+        is_kept = np.ones((self.n_contact, 2), bool)
+        is_kept[is_eliminated, 1] = False
+        free = null_space(sparse.csr_array(felt[is_kept.ravel()]))
+        if free.shape[0]:
+            from scipy.linalg import qr
+
+            tangents = np.flatnonzero(is_eliminated)
+            along = (free @ felt[2 * tangents + 1].T).toarray()
+            _, order = qr(along, mode="r", pivoting=True)
+            is_eliminated[tangents[order[: free.shape[0]]]] = False
+        return is_eliminated

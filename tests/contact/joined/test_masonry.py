@@ -1,0 +1,58 @@
+"""Walls and arches of blocks: what stands, what falls, and which blocks move."""
+
+import numpy as np
+import pytest
+
+from bemkit.contact.laws import Coulomb
+from bemkit.contact.problem import ContactProblem
+from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.solvers.base import Status, solve
+from bemkit.solvers.ssn import SemismoothNewton
+from tests.contact.joined.blocks import arch, wall
+
+# t/R of semicircular arches of N equal voussoirs at collapse by five hinges, block by block in limit analysis
+THICKNESS = {15: 0.106265824, 25: 0.107030497}
+
+
+def on_foundation(body, friction_coefficient=0.6):
+    return ContactProblem(body, np.zeros(body.n_contact), Coulomb(friction_coefficient))
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+@pytest.mark.parametrize("n", [15, 25])
+def test_an_arch_stands_and_falls_at_the_thickness_of_limit_analysis(n, is_dense):
+    stands = solve(on_foundation(arch(n, 1.02 * THICKNESS[n], is_dense=is_dense), 0.7), SemismoothNewton())
+    assert stands.is_converged
+    falls = solve(on_foundation(arch(n, 0.98 * THICKNESS[n], is_dense=is_dense), 0.7), SemismoothNewton(), throw=False)
+    assert falls.status is Status.UNSOLVABLE_LOAD
+    assert "voussoir" in falls.message
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+def test_a_wall_carries_its_weight(is_dense):
+    body = wall(4, 5, 4, gravity=(0.0, -1e-3), is_dense=is_dense)
+    found = solve(on_foundation(body), SemismoothNewton())
+    foot = np.diff(body.owners[0::2].indptr) == 1  # nodes of one block only
+    assert body.weights[foot] @ found.state.sigma_n[foot] == pytest.approx(-1e-3 * 4 * 10, rel=1e-11)
+    assert found.certificate.worst <= 1e-11
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+def test_a_push_beyond_what_friction_holds_moves_the_uppermost_course(is_dense):
+    """Friction 0.6 under a course of weight 10 holds 6, on a side of unit height."""
+    below, above = (wall(4, 5, 4, gravity=(0.0, -1e-3), push=6e-3 * share, is_dense=is_dense) for share in (0.98, 1.02))
+    assert solve(on_foundation(below), SemismoothNewton()).is_converged
+    falls = solve(on_foundation(above), SemismoothNewton(), throw=False)
+    assert falls.status is Status.UNSOLVABLE_LOAD
+    assert "'block 16'" in falls.message
+
+
+def test_the_one_block_that_slips_out_is_named():
+    body = wall(2, 2, 4, gravity=(0.0, -1.0))
+    loads = [member.load for member in body.members]
+    last = body.members[-1]
+    upwards = last.motions[1] / len(loads[-1]) * 2
+    loads[-1] = loads[-1] + 3.0 * upwards  # three times the weight of a half block
+    lifted = find_unsolvable_load(on_foundation(body.under(loads, body.offset), 0.0))
+    assert lifted is not None
+    assert "'block 4'" in lifted.description
