@@ -7,9 +7,10 @@ the displacements' basis, which at Gauss-Lobatto points are positive for every d
 On any other element the multipliers have to see the covered part alone [CichoszBischoff2011], and there the dual basis
 would do harm: the integrals of quadratic and higher basis functions over a part may be negative, and a node far from a
 short part would rest on an extrapolation. Instead the nodes that lie in the covered part and may carry a multiplier
-share it by hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the nearest one takes the part alone. Hats are not negative, so that
-the weights stay positive, and they sum to one like the dual basis, so that uniform tractions are transmitted exactly.
-They are linearly independent of each other on the polynomials that displacements are, so that no constraint is lost.
+share it by hat functions: linear between these nodes, constant beyond the last of them. If there is no such node, the
+nearest one takes the part alone. Hats are not negative, so that the weights stay positive, and they sum to one like the
+dual basis, so that uniform tractions are transmitted exactly. No combination of them is orthogonal to all polynomials
+of the displacements, so that no constraint repeats another one.
 """
 
 from __future__ import annotations

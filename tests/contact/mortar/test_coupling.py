@@ -198,6 +198,14 @@ def test_elements_of_any_size() -> None:
             assert_is_dual(pair[0], coupling)
 
 
+@pytest.mark.parametrize("shift", [1e-12, -1e-12])
+def test_ends_that_agree_but_for_round_off(shift: float) -> None:
+    one, two = stacked((2, 2), (4, 7), shift=shift)
+    coupling = couple(one, two)
+    assert_sums_are_exact(coupling, 1.0)
+    assert_is_dual(one, coupling)
+
+
 def test_far_from_the_origin() -> None:
     one, two = (
         side_of(side.mesh.transformed((-1e6, 3e5)), 2, part)
