@@ -26,6 +26,7 @@ PAGE = read("scene-files.md")
 BLOCKS = blocks(PAGE)
 FAMILIES = {
     "Conditions": kinds.CONDITIONS,
+    "Body forces": kinds.BODY_FORCES,
     "Obstacles": kinds.OBSTACLES,
     "Friction laws": kinds.LAWS,
     "Shapes": kinds.SHAPES,
