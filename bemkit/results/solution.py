@@ -200,6 +200,12 @@ class Solution:
         fields = self.map_boundary
         return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
 
+    @property
+    def error_unit(self) -> float:
+        """What squared errors in the energy norm are measured by [J/m]: a(u, u), unless heat expands a free body."""
+        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
+        return 2.0 * max(self.energy, held)
+
     @cached_property
     def estimated_error(self) -> float | None:
         """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
@@ -212,9 +218,7 @@ class Solution:
         error = float(self.element_errors.sum())
         if error == 0.0:
             return 0.0
-        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
-        size = 2.0 * max(self.energy, held)
-        return float(np.sqrt(error / size)) if size > 0.0 else None
+        return float(np.sqrt(error / self.error_unit)) if self.error_unit > 0.0 else None
 
     @cached_property
     def estimated_traction_error(self) -> float | None:
