@@ -228,17 +228,7 @@ class BoundaryMesh:
         return float("inf") if self.is_exterior else float(self.whole.loop_areas.sum())
 
     def part(self, name: str) -> IntArray:
-        """Return the elements of a part.
-
-        Parameters
-        ----------
-        name : str
-            Name of the part.
-
-        Returns
-        -------
-        (k,) int array
-            Element numbers, increasing, read-only.
+        """Return the elements (k,) of a part by its name, increasing, read-only.
 
         Raises
         ------
@@ -314,7 +304,7 @@ class BoundaryMesh:
         return BoundaryMesh(*bisected(self._content, is_halved, self.centres), self.is_exterior, self.symmetry)
 
     def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> "BoundaryMesh":
-        """Return the mesh of the body (x - shift) * factor.
+        """Return the mesh of the body (x - shift) * factor, with the same elements and parts.
 
         Parameters
         ----------
@@ -322,11 +312,6 @@ class BoundaryMesh:
             Point that becomes the origin.
         factor : float
             Magnification, positive.
-
-        Returns
-        -------
-        BoundaryMesh
-            With the same elements and parts.
         """
         shift = as_point(shift, "BoundaryMesh: shift")
         require_positive("BoundaryMesh", factor=factor)
@@ -350,8 +335,7 @@ class BoundaryMesh:
 
     def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> "BoundaryMesh":
         """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
-        content = self._content._replace(nodes=_frozen(nodes), curves=curves)
-        return _unchecked((*content, self.is_exterior, None))
+        return _unchecked((*self._content._replace(nodes=_frozen(nodes), curves=curves), self.is_exterior, None))
 
     @cached_property
     def _unfolded(self) -> "BoundaryMesh":

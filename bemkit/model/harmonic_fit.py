@@ -18,6 +18,7 @@ ACCURACY = 1e-10
 """Largest difference between a field and what stands for it, relative to the field."""
 _GOOD_ENOUGH = 1e-14
 _GRID = 12
+_MOST_ELEMENTS = 200
 _BENEATH = 1e-3
 """Depth of the points beneath the boundary, relative to the size of the body."""
 _RADIUS = 1e-2
@@ -82,7 +83,7 @@ def _fitted(
 def _sample_points(mesh: BoundaryMesh) -> FloatArray:
     """Return points on the boundary, just beneath it, and on a grid inside."""
     whole = mesh.whole
-    elements = np.arange(whole.n_elements)
+    elements = np.unique(np.linspace(0, whole.n_elements - 1, _MOST_ELEMENTS).astype(np.intp))
     boundary, normals = whole.points(elements, _PLACES), whole.normals_at(elements, _PLACES)
     low, high = whole.nodes.min(axis=0), whole.nodes.max(axis=0)
     grid = low + (high - low) * np.stack(np.meshgrid(*2 * [(np.arange(_GRID) + 0.5) / _GRID]), axis=-1)

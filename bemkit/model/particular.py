@@ -12,7 +12,13 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.harmonic_fit import TemperatureError, harmonic_sources
 from bemkit.operators.material import Material, Plane
-from bemkit.operators.particular_solutions import CentrifugalForce, ParticularSolution, Source, UniformForce
+from bemkit.operators.particular_solutions import (
+    CentrifugalForce,
+    HarmonicExpansion,
+    ParticularSolution,
+    Source,
+    UniformForce,
+)
 from bemkit.operators.steklov_poincare.forces_inside import projected_tractions
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.load_history import load_steps
@@ -70,6 +76,8 @@ def _sources(
             return UniformForce(factor * complex(x, y)), CentrifugalForce(factor)
         case Heating():
             scale = _plane_strain_factor(material) * modulus / stress
+            if not callable(force.temperature):
+                return (HarmonicExpansion((scale * force.expansion * force.temperature,)),)
 
             def strain(points: FloatArray) -> FloatArray:
                 return scale * force.strain_at(mesh.centre + mesh.diameter * points)

@@ -174,9 +174,14 @@ class AssemblySolution:
     def estimated_error(self) -> float | None:
         """Estimated error in the energy norm of all bodies, relative to the solution; None without an estimate."""
         errors = [body.element_errors for body in self.bodies.values()]
-        if any(each is None for each in errors) or not self.energy > 0.0:
+        if any(each is None for each in errors) or not self.error_unit > 0.0:
             return None
-        return float(np.sqrt(sum(float(each.sum()) for each in errors if each is not None) / (2.0 * self.energy)))
+        return float(np.sqrt(sum(float(each.sum()) for each in errors if each is not None) / self.error_unit))
+
+    @property
+    def error_unit(self) -> float:
+        """What squared errors in the energy norm are measured by [J/m]; see `SolvedBody.error_unit`."""
+        return sum(body.error_unit for body in self.bodies.values())
 
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies."""

@@ -123,10 +123,8 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
 
     The factor is so small that no contact node is drawn inside its obstacle by more than a line is thick.
     """
-    mesh, make_space = solution.mesh.whole, solution.scene.discretisation.displacement_space
-    space = make_space(mesh)
-    displacement = reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement)
-    factor = exaggeration(mesh.diameter, displacement, solution.contact)
+    space, displacement = whole_displacement(solution)
+    factor = exaggeration(space.mesh.diameter, displacement, solution.contact)
     figure = new_figure(5.6, 5.6)
     axes = figure.add_subplot()
     draw_body(axes, space, displacement, factor, is_labelled=True)
@@ -139,6 +137,13 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
     axes.set_title(solution.title, parse_math=False, fontsize=11)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def whole_displacement(solution: Solution) -> tuple[BoundarySpace, FloatArray]:
+    """Return the space of the displacements on the whole body, images included, and their values (n_nodes, 2) [m]."""
+    make_space = solution.scene.discretisation.displacement_space
+    space = make_space(solution.mesh.whole)
+    return space, reflected_to_whole(make_space(solution.mesh), space, solution.boundary.displacement)
 
 
 def draw_body(

@@ -32,10 +32,6 @@ if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
 
 
-_FREE_SHARE = 1e-16
-"""Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
-
-
 @dataclass(frozen=True, eq=False)
 class Solution(SolvedBody):
     """What `bemkit.run` returns and a result file holds.
@@ -117,9 +113,7 @@ class Solution(SolvedBody):
         error = float(self.element_errors.sum())
         if error == 0.0:
             return 0.0
-        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
-        size = 2.0 * max(self.energy, held)
-        return float(np.sqrt(error / size)) if size > 0.0 else None
+        return float(np.sqrt(error / self.error_unit)) if self.error_unit > 0.0 else None
 
     @cached_property
     def estimated_traction_error(self) -> float | None:

@@ -67,6 +67,10 @@ class BoundaryFields:
         return f"BoundaryFields({len(self.points)} points, {len(self.centres)} elements)"
 
 
+_FREE_SHARE = 1e-16
+"""Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
+
+
 class SolvedBody:
     """What one body alone and one of several have in common.
 
@@ -75,11 +79,14 @@ class SolvedBody:
     scene : Scene
     mesh : BoundaryMesh
     boundary : BoundaryFields
+    energy : float [J/m]
+        Elastic energy.
     """
 
     scene: Scene
     mesh: BoundaryMesh
     boundary: BoundaryFields
+    energy: float
 
     @cached_property
     def particular(self) -> ParticularFields | None:
@@ -127,3 +134,9 @@ class SolvedBody:
         make_space = discretisation.displacement_space
         fields = self.map_boundary
         return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
+
+    @property
+    def error_unit(self) -> float:
+        """What squared errors in the energy norm are measured by [J/m]: a(u, u), unless heat expands a free body."""
+        held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
+        return 2.0 * max(self.energy, held)

@@ -115,7 +115,7 @@ class _Level:
             densities[key] = np.maximum(densities.get(key, own), own)
         copies = {key: sum(one == key for one in self.keys.values()) for key in self.partitions}
         total = sum(copies[key] * float(density.sum()) for key, density in densities.items())
-        allowed = (SAFETY * accuracy) ** 2 * 2.0 * solution.energy
+        allowed = (SAFETY * accuracy) ** 2 * solution.error_unit
         needed = (total / allowed) ** (1.0 / rate) * total / (1.0 - SPREAD) if allowed > 0.0 else 0.0
         error = solution.estimated_error
         smallest = SMALLEST_GROWTH if error is None or error > accuracy else 1.0

@@ -65,7 +65,7 @@ class DensityMeshes:
     def _next_size(self, solution: Solution) -> int:
         """Return the number of elements that the accuracy needs, or a step towards it."""
         rate, density = _rate(solution), _target_density(solution)
-        allowed = (SAFETY * self.accuracy) ** 2 * 2.0 * solution.energy
+        allowed = (SAFETY * self.accuracy) ** 2 * solution.error_unit
         spread = SPREAD if solution.scene.contact_parts else 0.0
         needed = (density.sum() / allowed) ** (1.0 / rate) * density.sum() / (1.0 - spread) if allowed > 0.0 else 0.0
         n_elements = solution.mesh.n_elements

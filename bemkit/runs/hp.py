@@ -96,7 +96,7 @@ class LayeredMeshes:
         errors, size, contact = solution.coefficient_errors, solution.contact_traction_size, solution.contact_elements
         if errors is None:
             return float("inf")
-        energy = float(errors.energy[chosen].sum()) / (2.0 * solution.energy)
+        energy = float(errors.energy[chosen].sum()) / solution.error_unit
         tractions = float(errors.traction[contact[chosen[contact]]].sum()) / size**2 if size > 0.0 else 0.0
         return float(np.sqrt(max(energy, tractions)))
 
@@ -109,7 +109,7 @@ class LayeredMeshes:
             )
         goal = max(SAFETY * self.accuracy, self.error(solution) / GAIN**LARGEST_RISE)
         falling = np.clip(errors.decay, FASTEST, 1.0) ** (2 * rise)
-        excess = _excess_of(errors.energy * falling, 2.0 * solution.energy * goal**2)
+        excess = _excess_of(errors.energy * falling, solution.error_unit * goal**2)
         elements, size = solution.contact_elements, solution.contact_traction_size
         if size > 0.0:
             of_tractions = _excess_of((errors.traction * falling)[elements], (size * goal) ** 2)

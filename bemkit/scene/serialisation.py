@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
-from functools import cache, partial, reduce
+from functools import cache, partial
 from operator import eq
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
-from cattrs import AttributeValidationNote, BaseValidationError, Converter, ForbiddenExtraKeysError
+from cattrs import AttributeValidationNote, Converter
 from cattrs.gen import make_dict_structure_fn
 
 from bemkit.arrays import FloatArray
@@ -33,6 +33,7 @@ from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Condition, Part
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
+from bemkit.scene.explanations import explain
 from bemkit.scene.registry import (
     BODY_FORCES,
     CONDITIONS,
@@ -68,20 +69,7 @@ _NAMED: tuple[tuple[Any, type, str], ...] = (
     (tuple[Part, ...], Part, "parts"),
     (tuple[Body, ...], Body, "bodies"),
 )
-"""Tuples whose entries stand in tables headed by their names: [parts.NAME]."""
-
-_MISSING_REMEDIES: Mapping[str, str] = types.MappingProxyType(
-    {
-        "title": "add a line such as title = 'Block on a foundation'",
-        "shape": "add a table [shape] with kind = 'rectangle', width = 1.0, height = 1.0, or another shape",
-        "material": "add a table [material] with youngs_modulus and poisson_ratio",
-        "parts": "add tables [parts.NAME] with sides and condition",
-        "condition": "add condition = 'clamped', or a table with kind = 'traction', 'contact' ...",
-        "bodies": "add tables [bodies.NAME], each with a shape and a material",
-        "sides": "add sides = ['one.top', 'two.bottom'], each a body and one of its sides",
-        "obstacle": "add obstacle = { kind = 'half-plane', point = [0.0, 0.0], normal = [0.0, 1.0] } or another",
-    }
-)
+"""Tuples whose entries stand in tables headed by their names."""
 
 
 class StructureError(InputError):
@@ -114,7 +102,7 @@ def structure(table: object, wanted: type[T]) -> T:
     except RecursionError:
         raise StructureError("nested too deeply: simplify it") from None
     except Exception as error:  # whatever a constructor raised, it rejects what the user wrote
-        raise StructureError(_explain(error, "")) from error
+        raise StructureError(explain(error)) from error
 
 
 def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaults: bool = False) -> Any:
@@ -248,9 +236,9 @@ def _integer(value: object) -> int:
 
 
 def _exactly(value: object, wanted: type[T], description: str) -> T:
-    if not isinstance(value, wanted):
-        raise InputError(f"{_show(value)} does not fit: give {description}")
-    return value
+    if isinstance(value, wanted):
+        return value
+    raise InputError(f"{_show(value)} does not fit: give {description}")
 
 
 def _array(value: object) -> FloatArray:
@@ -354,12 +342,13 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
 
 def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
     found: list[Any] = []
-    word = wanted.__name__.lower()
     for name, options in _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]").items():
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
-                raise InputError(f"unknown key 'name': the name of a {word} stands in its heading [{heading}.NAME]")
+                raise InputError(
+                    f"unknown key 'name': the name of a {wanted.__name__.lower()} stands in its heading [{heading}.NAME]"
+                )
             found.append(converter.structure({"name": name, **table}, wanted))
     return tuple(found)
 
@@ -372,29 +361,6 @@ def _at(key: str) -> Iterator[None]:
     except Exception as error:
         error.add_note(AttributeValidationNote("", key, None))
         raise
-
-
-def _explain(error: BaseException, path: str) -> str:
-    """Turn the first of the errors found into ``key: value: remedy``."""
-    # the innermost key was noted first
-    keys = [note.name for note in getattr(error, "__notes__", ()) if isinstance(note, AttributeValidationNote)]
-    path = reduce(_join, reversed(keys), path)
-    if keys and isinstance(error, KeyError):
-        return f"{path}: missing: {_MISSING_REMEDIES.get(keys[0], f'add {keys[0]} = ...')}"
-    if isinstance(error, BaseValidationError):
-        # an unknown key comes first: it is often the reason why another one is missing
-        found = sorted(error.exceptions, key=lambda inner: not isinstance(inner, ForbiddenExtraKeysError))
-        return _explain(found[0], path)
-    if isinstance(error, ForbiddenExtraKeysError):
-        key = min(error.extra_fields)
-        names = [entry.name for entry in fields(error.cl) if entry.init]
-        known = f"the keys are {', '.join(names)}" if names else "there are no keys here"
-        return f"{_join(path, shorten(key)[1:-1])}: unknown key: {known}{closest(key, names)}"
-    return f"{path}: {error}" if path else str(error)
-
-
-def _join(path: str, key: str) -> str:
-    return f"{path}.{key}" if path and not key.startswith("[") else f"{path}{key}"
 
 
 def _show(value: object) -> str:

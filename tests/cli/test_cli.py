@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 import bemkit.__main__
-import bemkit.results.result_file
+import bemkit.results.outcome_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import main
@@ -303,7 +303,7 @@ def test_an_interrupt_leaves_no_file(
     def interrupted(*arguments: object, **options: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.results.result_file, "_write_mesh", interrupted)
+    monkeypatch.setattr(bemkit.results.outcome_file, "_write_mesh", interrupted)
     assert call("run", "paper-1", *SMALL, "-o", "r.h5") == (130 if error is KeyboardInterrupt else 2)
     assert os.listdir() == []
     assert capsys.readouterr().err.strip().count("\n") == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
+from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.solvers import Krylov
@@ -364,3 +366,61 @@ def test_body_forces_may_not_change_their_kind() -> None:
     prepared = prepare(given, given.build_mesh())
     with pytest.raises(ValueError, match="body_forces change their kinds or order"):
         prepared.under(dataclasses.replace(given, body_forces=(HEAT,)))
+
+
+def test_result_files_hold_body_forces(tmp_path: Path) -> None:
+    given = block(
+        body_forces=(WEIGHT, bk.Heating(0.1, bk.Expression("1 + x * y"))), parts=(FLOOR,), law=bk.Coulomb(0.3)
+    )
+    solution = bk.run(given)
+    bk.write_result(tmp_path / "result.h5", solution)
+    again = bk.read_result(tmp_path / "result.h5")
+    points = np.array([[0.3, 0.4], [0.6, 0.7]])
+    fields, same = bk.interior_fields(solution), bk.interior_fields(again)
+    np.testing.assert_array_equal(same.stress(points), fields.stress(points))
+    np.testing.assert_array_equal(same.displacement(points), fields.displacement(points))
+    # inside, stresses balance the weight; derivatives by differences
+    step, gradient = 1e-3, np.zeros((2, 2))
+    for axis, shift in enumerate(step * np.eye(2)):
+        gradient += ((fields.stress(points + shift) - fields.stress(points - shift)) / (2.0 * step))[:, :, axis]
+    np.testing.assert_allclose(gradient, np.tile([0.0, 1.0], (2, 1)), atol=1e-5)
+
+
+def test_adaptive_meshes_take_body_forces() -> None:
+    given = block(parts=(FLOOR,), law=bk.Coulomb(0.3), mesh=bk.MeshOptions(accuracy=3e-3))
+    solution, fine = bk.run(given), bk.run(dataclasses.replace(given, mesh=bk.MeshOptions(400)))
+    assert solution.is_converged
+    assert solution.energy == pytest.approx(fine.energy, rel=1e-4)
+    assert solution.force_normal == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("n_elements", [16, 48])
+def test_the_estimated_error_is_that_of_the_part_with_an_error(n_elements: int) -> None:
+    """Against the exact field, in the stiffness of a mesh whose elements are an eighth as long."""
+    solution = bk.run(block(discretisation=bk.LinearGalerkin(), mesh=bk.MeshOptions(n_elements)))
+    mesh, make_space = solution.mesh, bk.LinearGalerkin().displacement_space
+    for _ in range(3):
+        mesh = mesh.refined(np.arange(mesh.n_elements))
+    coarse, fine = make_space(solution.mesh), make_space(mesh)
+    points, own = dof_points(fine), np.arange(mesh.n_elements)
+    assert solution.particular is not None
+    exact = np.column_stack([0.0 * points[:, 0], -(points[:, 1] - 0.5 * points[:, 1] ** 2) / oedometric(MATERIAL)])
+    error = np.zeros_like(exact)
+    at_nodes = solution.map_boundary.displacement[coarse.element_dofs[own // 8]]
+    places = (2.0 * (own % 8)[:, None] + 1.0 + fine.local_nodes) / 8.0 - 1.0
+    for local, dofs in enumerate(fine.element_dofs.T):
+        inherited = np.einsum("pe,epc->ec", coarse.basis(places[:, local]), at_nodes)
+        error[dofs] = exact[dofs] - solution.particular.displacement(points[dofs]) - inherited
+    stiffness = bk.GalerkinMap(mesh, MATERIAL, fine).matrix()
+    true = np.sqrt(error.ravel() @ stiffness @ error.ravel() * 3.0 * oedometric(MATERIAL))
+    assert solution.estimated_error is not None
+    assert 0.4 < solution.estimated_error / true < 2.5
+
+
+def test_the_plan_names_what_acts_inside() -> None:
+    given = block(body_forces=(WEIGHT, HEAT))
+    items = {item.name: item for item in bk.make_plan(given, given.build_mesh()).items}
+    assert items["particular solution"].reason == "gravity, heating, in closed form: no elements inside the body"
+    light = dataclasses.replace(given, body_forces=())
+    items = {item.name: item for item in bk.make_plan(light, light.build_mesh()).items}
+    assert not items["particular solution"].is_needed

@@ -13,13 +13,15 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.results.figures import (
     STATUS_COLOURS,
     Units,
+    at_mesh_nodes,
     draw_contact_displacement,
     draw_contact_status,
     draw_contact_traction,
     draw_deformation,
     exaggeration,
-    node_displacement,
+    outlines,
     save_figures,
+    whole_displacement,
 )
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
@@ -54,12 +56,27 @@ def test_the_deformation_tells_its_factor_and_its_units(solution: Solution) -> N
     figure = draw_deformation(solution, units=Units("mm", "MPa"))
     axes = figure.axes[0]
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    factor = exaggeration(solution.mesh.diameter, node_displacement(solution))
+    space, displacement = whole_displacement(solution)
+    factor = exaggeration(solution.mesh.diameter, displacement, solution.contact)
     assert f"deformed, displacements \u00d7 {factor:g}" in legend
     assert "obstacle" in legend
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$x$ [mm]", "$y$ [mm]")
     drawn = axes.lines[1].get_xydata()[:-1]
-    np.testing.assert_allclose(drawn - solution.mesh.nodes, factor * node_displacement(solution), atol=1e-15)
+    (expected,) = outlines(space, displacement, factor)
+    np.testing.assert_allclose(drawn, expected[:-1], atol=1e-15)
+    at_nodes = solution.mesh.nodes + factor * at_mesh_nodes(space, displacement)
+    for node in at_nodes:  # every corner of an element is drawn
+        assert np.hypot(*(drawn - node).T).min() < 1e-14
+
+
+def test_no_contact_node_is_drawn_beyond_its_obstacle() -> None:
+    """Neither the wavy obstacle, which closes gaps, nor a disc: not by more than a line is thick."""
+    for name in ("wavy-obstacle", "disc-between-plates"):
+        solution = run(with_overrides(load_scene(name), elements=60))
+        space, displacement = whole_displacement(solution)
+        factor = exaggeration(space.mesh.diameter, displacement, solution.contact)
+        depth = factor * solution.contact.u_n - solution.contact.gap
+        assert depth.max() <= 0.0031 * space.mesh.diameter
 
 
 @pytest.mark.parametrize(
@@ -97,7 +114,7 @@ def test_displacements_at_nodes_are_those_of_a_linear_field(solution: Solution) 
     before, after = solution.mesh.node_elements.T
     is_corner = np.sum(solution.mesh.tangents[before] * solution.mesh.tangents[after], axis=1) < 0.5
     assert is_corner.sum() == 4
-    error = np.abs(node_displacement(changed) - solution.mesh.nodes @ gradient).max(axis=1)
+    error = np.abs(at_mesh_nodes(*whole_displacement(changed)) - solution.mesh.nodes @ gradient).max(axis=1)
     assert error[~is_corner].max() < 1e-14  # values up to 5
     assert error.max() < solution.mesh.lengths.max() * np.abs(gradient).max()  # corners are cut by half an element
 
@@ -107,7 +124,8 @@ def test_displacements_at_nodes_are_those_of_a_linear_field(solution: Solution) 
 )
 def test_the_exaggeration_is_a_round_number(largest: float, factor: float) -> None:
     displacement = np.array([[0.0, 0.0], [0.0, -largest]])
-    assert exaggeration(1.0, displacement) == pytest.approx(factor, rel=1e-12)
+    nothing = run(with_overrides(load_scene("clamped-angle"), elements=12)).contact
+    assert exaggeration(1.0, displacement, nothing) == pytest.approx(factor, rel=1e-12)
 
 
 def test_files_of_others_are_left_alone(solution: Solution, tmp_path: Path) -> None:

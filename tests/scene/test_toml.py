@@ -149,7 +149,8 @@ def test_a_scene_survives_the_way_to_toml_and_back(scene: Scene) -> None:
 def test_shipped_scenes_load_and_survive_the_round_trip(name: str) -> None:
     scene = load_scene(name)
     assert scene.title == shipped_scenes()[name]
-    assert scene.build_mesh().n_elements == scene.mesh.elements
+    if isinstance(scene, Scene):
+        assert scene.build_mesh().n_elements == scene.mesh.elements
     assert scene_to_toml(scene_from_toml(scene_to_toml(scene))) == scene_to_toml(scene)
 
 

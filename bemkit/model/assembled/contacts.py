@@ -143,10 +143,10 @@ def body_rows(
 
     Notes
     -----
-    Where two contact sides of one body meet in a corner, and both are in contact, the node there carries a multiplier
-    of the longer contact alone, and that with a rigid obstacle comes first: three bodies that meet in one point would otherwise be tied in a circle, and their
-    tractions there could not be told apart. The other contact hands its share to its neighbours, as at crosspoints of
-    mortar methods [Wohlmuth2000].
+    Where two contact sides of one body meet in a corner, the node there carries a multiplier of one contact alone: of
+    that with a rigid obstacle, else of the longer one. Three bodies that meet in a point would otherwise be tied in a
+    circle, and their tractions there could not be told apart. The other contact hands its share to its neighbours, as
+    at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
     ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
@@ -217,8 +217,8 @@ def _check_overlap(pair: ContactPair, coupling: MortarCoupling, one: PlacedBody,
     if coupling.overlap > allowed:
         x, y = coupling.deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} m at ({x:.6g}, {y:.6g}), and an interference "
-            f"of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
+            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} m at ({x:.6g}, {y:.6g}), and an "
+            f"interference of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
         )
 
 

@@ -192,7 +192,10 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     trusted = max(trusted_stress(each) for each in (solution, before) if each is not None)
     stress = max(largest_traction, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
-    if largest_traction <= CONTACT_LIMIT * trusted:  # the body has only moved: a hundredth of that, to be strict
+    # forces inside strain a body, too, that an overlap has pushed aside and that touches nothing any more
+    deciding = fields[1:] if solution.scene.body_forces and table.n_contact else fields
+    if max(float(np.abs(each).max(initial=0.0)) for each in deciding) <= CONTACT_LIMIT * trusted:
+        # the body has only moved: a hundredth of that, to be strict
         length = max(length, 1e-2 * displacement)
     gaps = np.abs(table.gap[np.isfinite(table.gap)]).max(initial=0.0)
     coordinates = 64.0 * EPSILON * (float(np.abs(solution.mesh.nodes).max()) + float(gaps))
