@@ -56,3 +56,14 @@ def test_the_one_block_that_slips_out_is_named():
     lifted = find_unsolvable_load(on_foundation(body.under(loads, body.offset), 0.0))
     assert lifted is not None
     assert "'block 4'" in lifted.description
+
+
+@pytest.mark.slow
+def test_a_wall_of_a_thousand_blocks_carries_its_weight_and_a_push():
+    body = wall(20, 50, 8, gravity=(0.0, -1e-4), push=6e-4)
+    found = solve(on_foundation(body), SemismoothNewton())
+    foot = np.diff(body.owners[0::2].indptr) == 1
+    assert body.weights[foot] @ found.state.sigma_n[foot] == pytest.approx(-1e-4 * 20 * 100, rel=1e-10)
+    assert -(body.weights[foot] @ found.state.sigma_t[foot]) == pytest.approx(6e-4, rel=1e-8)
+    assert found.certificate.worst <= 1e-10
+    assert found.linear_solves <= 12  # tens at most: each takes seconds
