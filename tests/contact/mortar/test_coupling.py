@@ -60,11 +60,11 @@ def cradle(degrees: tuple[int, int], n: tuple[int, int], half_angle: float) -> t
     return side_of(sector, degrees[0], "pin"), side_of(base, degrees[1], "groove")
 
 
-def assert_sums_are_exact(coupling: MortarCoupling, covered: float) -> None:
+def assert_sums_are_exact(coupling: MortarCoupling, covered: float, lost: float = 0.0) -> None:
     np.testing.assert_allclose(coupling.on_non_mortar.sum(axis=1), 1.0, atol=ROUND_OFF)
     np.testing.assert_allclose(coupling.on_mortar.sum(axis=1), 1.0, atol=ROUND_OFF)
     assert coupling.weights.min() > 0.0
-    assert coupling.weights.sum() == pytest.approx(covered, rel=ROUND_OFF)
+    assert coupling.weights.sum() == pytest.approx(covered, rel=ROUND_OFF, abs=lost)
     assert np.all(np.diff(coupling.arc_length) > 0.0)
     turned = np.stack([-coupling.frame[:, 0, 1], coupling.frame[:, 0, 0]], axis=1)
     np.testing.assert_array_equal(coupling.frame[:, 1], turned)
@@ -110,7 +110,8 @@ def test_sides_that_cover_each_other_in_part(
 ) -> None:
     one, two = stacked(degree, n, shift=shift, turn=rotation(angle))
     coupling = couple(one, two)
-    assert_sums_are_exact(coupling, 1.0 - abs(shift))
+    # pieces of 1e-10 belong to their neighbours; constants have no other node that would take a sliver
+    assert_sums_are_exact(coupling, 1.0 - abs(shift), 1e-10 if degree[0] else 0.01 / n[0])
     # multipliers are means, not extrapolations
     assert np.abs(coupling.on_non_mortar).max() <= 1.0 + 1e-12
     assert np.linalg.matrix_rank(coupling.on_non_mortar.toarray()) == coupling.nodes.size
@@ -126,7 +127,8 @@ def test_nodes_without_multiplier_hand_it_over(
     without = data.draw(st.lists(st.sampled_from(alone.tolist()), max_size=min(degree, 4), unique=True))
     coupling = couple(one, two, without=np.array(without, np.intp))
     assert not set(without) & set(coupling.nodes)
-    assert_sums_are_exact(coupling, 1.0 - shift)
+    # a sliver is lost that no other node of its element can take
+    assert_sums_are_exact(coupling, 1.0 - shift, 0.01 / (n[0] + 1))
 
 
 def test_an_element_without_multipliers_is_left_out() -> None:

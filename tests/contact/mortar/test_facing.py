@@ -73,10 +73,20 @@ def test_two_blocks(low: tuple[float, float], pairs: list[tuple[str, str]]) -> N
     assert found(meshes) == pairs
 
 
-def test_thin_plates_meet_only_between_them() -> None:
+@pytest.mark.parametrize("thickness", [(0.01, 0.01), (0.9, 0.01), (0.01, 0.9)])
+def test_plates_meet_only_between_them(thickness: tuple[float, float]) -> None:
     """Their outer sides oppose each other as well, and lie no farther apart than the distance."""
-    meshes = [block((0.0, -0.01), (1.0, 0.0), 50, 1), block((0.0, 0.0), (1.0, 0.01), 50, 1)]
-    assert found(meshes, 0.1) == [("0 top", "1 bottom")]
+    meshes = [block((0.0, -thickness[0]), (1.0, 0.0), 50, 3), block((0.0, 0.0), (1.0, thickness[1]), 50, 3)]
+    assert found(meshes, 1.0) == [("0 top", "1 bottom")]
+
+
+@pytest.mark.parametrize(("distance", "pairs"), [(0.531, []), (0.533, [("0 top", "1 bottom")])])
+def test_distance_of_inclined_sides(distance: float, pairs: list[tuple[str, str]]) -> None:
+    """From the corner (0, 0.5) along the mean normal of sides at 40 degrees it is 0.5 / cos(20 degrees) = 0.53209."""
+    along = np.array([np.cos(np.radians(40.0)), np.sin(np.radians(40.0))])
+    tilted = np.array([[0.0, 0.5], [along[0], along[1] + 0.5], [along[0], along[1] + 2.5], [-0.1, 1.5]])
+    meshes = [block((0.0, -1.0), (1.0, 0.0), 4, 2), quadrangle(tilted, [np.linspace(0.0, 1.0, 5)] * 4)]
+    assert found(meshes, distance) == pairs
 
 
 @pytest.mark.parametrize(("angle", "is_pair"), [(50.0, True), (70.0, False)])
@@ -93,12 +103,14 @@ def test_bodies_make_no_pair_with_themselves() -> None:
     assert find_facing(sides, 1e-3) == [(2, 4)]
 
 
-def test_cylinders_face_each_other_about_the_point_where_they_touch() -> None:
+@pytest.mark.parametrize("n", [8, 9])
+def test_cylinders_face_each_other_about_the_point_where_they_touch(n: int) -> None:
+    """With 8 points the middles of two elements touch, and their chords are 0.004 apart."""
     far = 0.6 + 0.4 * np.linspace(0.0, 1.0, 9)
-    discs = [half_disc(is_below=below, far=far, near=np.linspace(0.4, 0.6, 9)) for below in (False, True)]
+    discs = [half_disc(is_below=below, far=far, near=np.linspace(0.4, 0.6, n)) for below in (False, True)]
     spaces = [space_of(mesh, 2) for mesh in discs]
     sides = [ContactSide(space, space.mesh.part(part)) for space in spaces for part in ("contact", "a", "b")]
-    assert find_facing(sides, 1e-3, [0, 0, 0, 1, 1, 1]) == [(0, 3)]
+    assert find_facing(sides, 1e-6, [0, 0, 0, 1, 1, 1]) == [(0, 3)]
 
 
 @pytest.mark.parametrize(
