@@ -24,6 +24,7 @@ from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces
 from bemkit.results.solution import BoundaryFields
+from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.history import UnsolvableSceneError
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
@@ -147,7 +148,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
     finite = all(np.isfinite(body.energy) and np.isfinite(body.boundary.displacement).all() for body in bodies.values())
     if result.is_converged and not finite:
         result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
-    return AssemblySolution(
+    solution = AssemblySolution(
         assembly=prepared.assembly,
         bodies=bodies,
         status=result.status,
@@ -166,6 +167,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         work=model.work,
         message=result.message,
     )
+    return replace(solution, warnings=find_assembly_warnings(solution))
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

@@ -346,9 +346,8 @@ def _named(converter: Converter, wanted: type, heading: str, value: object, _: A
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
-                raise InputError(
-                    f"unknown key 'name': the name of a {wanted.__name__.lower()} stands in its heading [{heading}.NAME]"
-                )
+                word = wanted.__name__.lower()
+                raise InputError(f"unknown key 'name': the name of a {word} stands in its heading [{heading}.NAME]")
             found.append(converter.structure({"name": name, **table}, wanted))
     return tuple(found)
 
