@@ -1,5 +1,7 @@
 """Walls and arches of blocks: what stands, what falls, and which blocks move."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,25 @@ def test_the_one_block_that_slips_out_is_named():
     lifted = find_unsolvable_load(on_foundation(body.under(loads, body.offset), 0.0))
     assert lifted is not None
     assert "'block 4'" in lifted.description
+
+
+def test_a_leaning_wall_stands_in_steps_up_to_its_limit():
+    """On ground that slopes by q the wall slides at q = 0.6; a jump to 98 % of that stalls, four steps get there."""
+    upright, sideways = (wall(5, 4, 4, gravity=gravity, is_dense=False) for gravity in ((0.0, -1e-4), (1e-4, 0.0)))
+
+    def leaning(share):
+        pairs = zip(upright.members, sideways.members, strict=True)
+        return on_foundation(upright.under([a.load + 0.6 * share * b.load for a, b in pairs], upright.offset))
+
+    falls = solve(leaning(1.02), SemismoothNewton(), throw=False)
+    assert falls.status is Status.UNSOLVABLE_LOAD
+    assert "bodies 'block 0'" in falls.message
+    state = None
+    for share in (0.5, 0.74, 0.86, 0.98):
+        slip = None if state is None else state.u_t
+        state = solve(replace(leaning(share), reference_slip=slip), SemismoothNewton(), start=state).state
+    foot = np.diff(upright.owners[0::2].indptr) == 1
+    assert upright.weights[foot] @ state.sigma_t[foot] == pytest.approx(-0.98 * 0.6e-4 * 40, rel=1e-9)
 
 
 @pytest.mark.slow
