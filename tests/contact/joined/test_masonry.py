@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bemkit.contact.laws import Coulomb
+from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import Status, solve
@@ -47,6 +47,21 @@ def test_a_push_beyond_what_friction_holds_moves_the_uppermost_course(is_dense):
     falls = solve(on_foundation(above), SemismoothNewton(), throw=False)
     assert falls.status is Status.UNSOLVABLE_LOAD
     assert "'block 16'" in falls.message
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+@pytest.mark.parametrize("bound", [1e-4, 3e-4])
+def test_friction_of_all_nodes_counts_where_it_needs_no_pressure(bound, is_dense):
+    """A course of length 4 under friction of a given size, pushed on its side of unit height."""
+
+    def escape(share):
+        body = wall(2, 2, 4, gravity=(0.0, -1e-2), push=4.0 * bound * share, is_dense=is_dense)
+        return find_unsolvable_load(ContactProblem(body, np.zeros(body.n_contact), Tresca(bound)))
+
+    assert escape(0.99) is None
+    moves = escape(1.01)
+    assert moves is not None
+    assert "'block 2', 'block 3', 'block 4'" in moves.description
 
 
 def test_the_one_block_that_slips_out_is_named():
