@@ -10,7 +10,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.contact.joined.blocks import arch, wall
+from tests.contact.joined.blocks import arch, joined, rectangle, wall
 
 # t/R of semicircular arches of N equal voussoirs at collapse by five hinges, block by block in limit analysis
 THICKNESS = {15: 0.106265824, 25: 0.107030497}
@@ -62,6 +62,25 @@ def test_friction_of_all_nodes_counts_where_it_needs_no_pressure(bound, is_dense
     moves = escape(1.01)
     assert moves is not None
     assert "'block 2', 'block 3', 'block 4'" in moves.description
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+def test_the_order_of_the_contact_nodes_decides_nothing(is_dense):
+    """A square pressed beside the middle of its foot, whose outermost nodes are neither first nor last."""
+    square = rectangle(1.0, 1.0, 4)
+    pairs = [(0, square.node(x, 0.0), -1, -1, 0, -1, 0.25) for x in (0.25, 0.0, 1.0, 0.5, 0.75)]
+
+    def escape(x):
+        load = np.zeros_like(square.points)
+        load[square.node(0.0, 1.0), 1], load[square.node(1.0, 1.0), 1] = x - 1.0, -x
+        return find_unsolvable_load(
+            on_foundation(joined([square.member(load=load.ravel())], [0.0], pairs, is_dense=is_dense))
+        )
+
+    assert escape(0.02) is None
+    assert escape(0.98) is None
+    assert "tips" in escape(-0.02).description
+    assert "tips" in escape(1.02).description
 
 
 def test_the_one_block_that_slips_out_is_named():
