@@ -22,7 +22,7 @@ from bemkit.plan import Plan, check_memory
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
-from bemkit.results.part_forces import contact_forces
+from bemkit.results.part_forces import contact_forces, nodal_resultants
 from bemkit.results.solution import BoundaryFields
 from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.history import UnsolvableSceneError
@@ -156,7 +156,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         contact=table,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, prepared.law),
-        contacts=contact_forces(table, prepared.frame, transitions, slip),
+        contacts=contact_forces(table, nodal_resultants(table, prepared.frame), transitions),
         history=result.history,
         linear_solves=result.linear_solves,
         outer_steps=result.steps,

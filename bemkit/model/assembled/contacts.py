@@ -54,6 +54,8 @@ class ContactRows:
     weights, gap : (n,) arrays [m]
     on_body, on_other : sparse (n, n_nodes) arrays
         The relative displacement of row i is ``frame[i] @ (on_body[i] @ u - on_other[i] @ u_other)``.
+    elements, other_elements : int arrays
+        Of both sides; none of a rigid obstacle.
     is_held : (n,) bool array
         Where a support holds the node in one direction: there is no friction of its own.
     """
@@ -70,6 +72,8 @@ class ContactRows:
     gap: FloatArray
     on_body: sparse.csr_array
     on_other: sparse.csr_array | None
+    elements: IntArray
+    other_elements: IntArray
     is_held: BoolArray
 
     @property
@@ -128,6 +132,8 @@ def obstacle_rows(bodies: Sequence[PlacedBody], conditions: Sequence[NodalCondit
                 found.gap[rows],
                 pick,
                 None,
+                body.part_elements(part.name),
+                np.zeros(0, np.intp),
                 fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
             )
 
@@ -182,6 +188,8 @@ def body_rows(
             coupling.gap + pairs[k].gap,
             sparse.csr_array(coupling.on_non_mortar),
             sparse.csr_array(coupling.on_mortar),
+            side.elements,
+            other_side.elements,
             np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)),
         )
     yield from (found[k] for k in range(len(pairs)))
