@@ -30,7 +30,9 @@ class TemperatureError(InputError):
     """A temperature that is not harmonic, or that no polynomial and logarithm stand for."""
 
 
-def harmonic_sources(field: Callable[[FloatArray], FloatArray], mesh: BoundaryMesh) -> tuple[Source, ...]:
+def harmonic_sources(
+    field: Callable[[FloatArray], FloatArray], mesh: BoundaryMesh, round_off: float = 0.0
+) -> tuple[Source, ...]:
     """Return the expansions that stand for a harmonic field in a body.
 
     Parameters
@@ -39,12 +41,14 @@ def harmonic_sources(field: Callable[[FloatArray], FloatArray], mesh: BoundaryMe
         (n, 2) points [-] of the body -> (n,) values.
     mesh : BoundaryMesh
         Of size one, around the origin.
+    round_off : float
+        Relative error of values of the field far from the origin of its own coordinates.
 
     Raises
     ------
     TemperatureError
         If no harmonic polynomial of degree `HIGHEST_DEGREE`, in a body with one hole together with a logarithm around
-        its centre, comes as near as `ACCURACY`.
+        its centre, comes as near as `ACCURACY` and round-off allow.
     """
     points = _sample_points(mesh)
     values, z = field(points), points[:, 0] + 1j * points[:, 1]
@@ -58,11 +62,11 @@ def harmonic_sources(field: Callable[[FloatArray], FloatArray], mesh: BoundaryMe
             miss, found = _fitted(values, z, degree, holes)
             if miss < best:
                 best, sources = miss, found
-            if best <= _GOOD_ENOUGH * size:
+            if best <= max(_GOOD_ENOUGH, round_off) * size:
                 break
-        if best <= ACCURACY * size:
+        if best <= (ACCURACY + round_off) * size:
             return sources
-    raise TemperatureError(_reason(field, mesh, points, size, best / size))
+    raise TemperatureError(_reason(field, mesh, points, size, best / size, ACCURACY + round_off))
 
 
 def _fitted(
@@ -106,7 +110,12 @@ def _hole_centres(mesh: BoundaryMesh) -> list[complex]:
 
 
 def _reason(
-    field: Callable[[FloatArray], FloatArray], mesh: BoundaryMesh, points: FloatArray, size: float, miss: float
+    field: Callable[[FloatArray], FloatArray],
+    mesh: BoundaryMesh,
+    points: FloatArray,
+    size: float,
+    miss: float,
+    accuracy: float,
 ) -> str:
     whole = mesh.whole
     angles = 2.0 * np.pi * np.arange(16) / 16
@@ -117,7 +126,7 @@ def _reason(
     rows &= locator.locate(points).is_inside
     means = field(around[rows].reshape(-1, 2)).reshape(-1, len(circle)).mean(axis=1)
     off = np.abs(means - field(points[rows])).max(initial=0.0) / size
-    if off > ACCURACY:
+    if off > accuracy:
         return (
             "is not harmonic: its mean over small circles differs from its value in their centres by "
             f"{off:.1e} of its size, as if there were sources of heat: give a number, or a formula f with "
