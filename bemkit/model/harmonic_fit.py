@@ -10,7 +10,6 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.particular_solutions import HarmonicExpansion, LogarithmicExpansion, Source
-from bemkit.operators.somigliana.locate import Locator
 
 HIGHEST_DEGREE = 16
 """Of the polynomials that are tried."""
@@ -86,6 +85,8 @@ def _fitted(
 
 def _sample_points(mesh: BoundaryMesh) -> FloatArray:
     """Return points on the boundary, just beneath it, and on a grid inside."""
+    from bemkit.operators.somigliana.locate import Locator  # only temperatures given by a formula need it
+
     whole = mesh.whole
     elements = np.unique(np.linspace(0, whole.n_elements - 1, _MOST_ELEMENTS).astype(np.intp))
     boundary, normals = whole.points(elements, _PLACES), whole.normals_at(elements, _PLACES)
@@ -117,6 +118,8 @@ def _reason(
     miss: float,
     accuracy: float,
 ) -> str:
+    from bemkit.operators.somigliana.locate import Locator
+
     whole = mesh.whole
     angles = 2.0 * np.pi * np.arange(16) / 16
     circle = _RADIUS * np.column_stack([np.cos(angles), np.sin(angles)])
