@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.hdf5 import Reader, rows_of, write_table
+from bemkit.hdf5 import Reader, rows_of
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_outcome
+from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
 from bemkit.results.part_forces import ContactForce
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
@@ -33,8 +33,7 @@ def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
     if solution.friction_bound is not None:
         columns[_BOUND] = solution.friction_bound
     write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
-    numbers = {name: np.array([getattr(one, name) for one in solution.contacts]) for name in _CONTACT_NUMBERS}
-    write_table(file.create_group("contacts"), {"name": [one.name for one in solution.contacts], **numbers})
+    write_forces(file, "contacts", solution.contacts)
     for number, body in enumerate(solution.bodies.values()):
         group = file.create_group(f"bodies/{number}")
         group.attrs.update({"name": body.name, "energy": body.energy})
