@@ -250,6 +250,8 @@ def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
         return None
     for _ in range(4 if is_fine else 1):
         share = (field[near] / field[far]) ** (1.0 / power)
+        if share == 1.0:  # alike but for round-off
+            return None
         distance = float((s[far] * share - s[near]) / (1.0 - share))
         if is_fine:
             inner, outermost = (max(s[k] + distance, s[1]) for k in outer)

@@ -75,15 +75,11 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
         name="pin", shape=bk.Ring(radius, 1.0), material=material,
         parts=(core, bk.Part("surface", bk.Free(), quadrants("outer"))),
     )  # fmt: skip
-    solution = bk.run(
-        bk.Assembly(
-            title="Pin",
-            bodies=(sheet, pin),
-            contacts=(bk.ContactPair(("pin.surface", "sheet.hole")),),
-            discretisation=bk.QuadraticGalerkin(),
-            mesh=bk.MeshOptions(accuracy=0.005),
-        )  # fmt: skip
+    pair, options = bk.ContactPair(("pin.surface", "sheet.hole")), bk.MeshOptions(accuracy=0.005)
+    scene = bk.Assembly(
+        title="Pin", bodies=(sheet, pin), contacts=(pair,), discretisation=bk.QuadraticGalerkin(), mesh=options
     )
+    solution = bk.run(scene)
     assert solution.is_converged
     (contact,) = solution.contacts
     assert contact.force_normal > load  # pressures around an arc
