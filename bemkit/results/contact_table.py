@@ -230,7 +230,7 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
         contact.part[last],
     ):
         zone.append(k)
-    if len(zone) < 2:
+    if len(zone) < 2 or contact.s[tighter] == contact.s[last]:  # two rows of one node in a corner
         return middle
     field = contact.clearance if words[last] == "separated" else np.abs(slip)
     distance = _distance_to_zero(np.abs(contact.s[zone] - contact.s[last]), field[zone])
@@ -250,8 +250,6 @@ def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
         return None
     for _ in range(4 if is_fine else 1):
         share = (field[near] / field[far]) ** (1.0 / power)
-        if share == 1.0:  # alike but for round-off
-            return None
         distance = float((s[far] * share - s[near]) / (1.0 - share))
         if is_fine:
             inner, outermost = (max(s[k] + distance, s[1]) for k in outer)
