@@ -225,8 +225,8 @@ def _check_overlap(pair: ContactPair, coupling: MortarCoupling, one: PlacedBody,
     if coupling.overlap > allowed:
         x, y = coupling.deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} m at ({x:.6g}, {y:.6g}), and an "
-            f"interference of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
+            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
+            f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
         )
 
 
