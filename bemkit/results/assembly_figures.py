@@ -18,7 +18,7 @@ from bemkit.results.figures import (
     exaggeration,
     outlines,
 )
-from bemkit.scene.unit_names import UnitNames, with_unit
+from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
