@@ -4,6 +4,7 @@
 /bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
 /contact         with columns direction_x, direction_y and, with friction, friction_bound
 /contacts        table: what each contact transmits
+/rigid           table: how each rigid body moved, and what acts on it
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from bemkit.hdf5 import Reader, rows_of, write_table
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_outcome
 from bemkit.results.part_forces import ContactForce
+from bemkit.results.rigid_result import RigidResult
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     import h5py
 
 _CONTACT_NUMBERS = tuple(entry.name for entry in fields(ContactForce) if entry.name != "name")
+_RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name != "name")
 _DIRECTIONS, _BOUND = ("direction_x", "direction_y"), "friction_bound"
 
 
@@ -35,6 +38,8 @@ def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
     write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
     numbers = {name: np.array([getattr(one, name) for one in solution.contacts]) for name in _CONTACT_NUMBERS}
     write_table(file.create_group("contacts"), {"name": [one.name for one in solution.contacts], **numbers})
+    motions = {name: np.array([getattr(one, name) for one in solution.rigid.values()]) for name in _RIGID_NUMBERS}
+    write_table(file.create_group("rigid"), {"name": list(solution.rigid), **motions})
     for number, body in enumerate(solution.bodies.values()):
         group = file.create_group(f"bodies/{number}")
         group.attrs.update({"name": body.name, "energy": body.energy})
@@ -44,8 +49,10 @@ def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
 def read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
     """Read a solution of an assembly."""
     has_bound = reader.has(f"contact/{_BOUND}")
-    outcome, columns = read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
+    outcome, columns = read_outcome(reader, (*_RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name != "name")
+_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
     contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
+    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS))
     bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
     return AssemblySolution(
         assembly=assembly,
@@ -53,6 +60,7 @@ def read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
         contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
         friction_bound=columns.get(_BOUND),
         contacts=tuple(ContactForce(**row) for row in contacts),
+        rigid={row["name"]: RigidResult(**row) for row in rigid},
         **outcome,
     )
 

@@ -23,6 +23,7 @@ from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces
+from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solution import BoundaryFields
 from bemkit.runs.history import UnsolvableSceneError
 from bemkit.runs.timing import Stage, StageClock
@@ -69,7 +70,7 @@ def run_assembly_history(
     Parameters
     ----------
     assemblies : sequence of Assembly
-        The same bodies and contacts under changing loads, gaps or laws.
+        The same bodies and contacts under changing loads, motions, gaps or laws.
     meshes, callback : optional
         As for `run_assembly`.
 
@@ -143,6 +144,12 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
             traction.reshape(-1, 2),
         )
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
+    rigid = {
+        body.name: RigidResult(body.name, *motion.tolist(), *reaction.tolist())
+        for body, (motion, reaction) in zip(
+            prepared.assembly.rigid, model.rigid_bodies(result.state), strict=True
+        )
+    }
     clock = clock.closed(Stage.RECOVER)
     finite = all(np.isfinite(body.energy) and np.isfinite(body.boundary.displacement).all() for body in bodies.values())
     if result.is_converged and not finite:
@@ -165,6 +172,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         plan=plan,
         work=model.work,
         message=result.message,
+        rigid=rigid,
     )
 
 
