@@ -15,10 +15,10 @@ from bemkit.results.figures import (
     Units,
     contact_figures,
     draw_body,
-    draw_obstacles,
     exaggeration,
     outlines,
 )
+from bemkit.results.obstacle_drawing import draw_obstacles, draw_rigid_bodies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> di
 
 
 def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Figure:
-    """Draw all bodies as they were and deformed, all displacements enlarged by one factor that the picture tells.
+    """Draw all bodies as they were and deformed or moved, all displacements enlarged by one factor that the picture tells.
 
     The factor is so small that no body is drawn inside another one by more than a line is thick.
     """
@@ -60,6 +60,7 @@ def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Fi
     axes.set_aspect("equal")
     axes.margins(0.05)
     conditions = [part.condition for body in bodies for part in body.scene.contact_parts]
+    draw_rigid_bodies(axes, [(body, solution.rigid[body.name]) for body in solution.assembly.rigid], factor)
     draw_obstacles(axes, [getattr(condition, "obstacle", None) for condition in conditions])
     _name_axes(axes, solution.title, units)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
@@ -79,6 +80,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
             axes.plot(*loop.T, color=GREY, linewidth=0.8, zorder=1)
     axes.set_aspect("equal")
     axes.margins(0.05)
+    draw_rigid_bodies(axes, [(body, solution.rigid[body.name]) for body in solution.assembly.rigid], 0.0)
     points = np.stack([table.x, table.y], axis=1)
     largest = float(np.max(-table.sigma_n, initial=0.0))
     size = float(np.hypot(*np.ptp(points, axis=0))) or 1.0
