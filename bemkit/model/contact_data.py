@@ -186,9 +186,7 @@ class _Side:
         return self.nodes[np.where(is_own, position, np.where(is_own[following], following, before))]
 
 
-def _nearest_of_each_part(
-    parts: Sequence[FacingPart], sides: Sequence[_Side]
-) -> tuple[list[FacingPart], list[_Side]]:
+def _nearest_of_each_part(parts: Sequence[FacingPart], sides: Sequence[_Side]) -> tuple[list[FacingPart], list[_Side]]:
     """Leave each node of a part that may touch several obstacles to the nearest of them."""
     found = []
     for one, side in zip(parts, sides, strict=True):

@@ -49,8 +49,7 @@ def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
 def read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
     """Read a solution of an assembly."""
     has_bound = reader.has(f"contact/{_BOUND}")
-    outcome, columns = read_outcome(reader, (*_RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name != "name")
-_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
+    outcome, columns = read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
     contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
     rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS))
     bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]

@@ -146,9 +146,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
     rigid = {
         body.name: RigidResult(body.name, *motion.tolist(), *reaction.tolist())
-        for body, (motion, reaction) in zip(
-            prepared.assembly.rigid, model.rigid_bodies(result.state), strict=True
-        )
+        for body, (motion, reaction) in zip(prepared.assembly.rigid, model.rigid_bodies(result.state), strict=True)
     }
     clock = clock.closed(Stage.RECOVER)
     finite = all(np.isfinite(body.energy) and np.isfinite(body.boundary.displacement).all() for body in bodies.values())

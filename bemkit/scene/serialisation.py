@@ -350,9 +350,7 @@ def _named(converter: Converter, wanted: type, heading: str, value: object, _: A
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
                 role = re.sub(r"(?<!^)(?=[A-Z])", " ", wanted.__name__).lower()
-                raise InputError(
-                    f"unknown key 'name': the name of a {role} stands in its heading [{heading}.NAME]"
-                )
+                raise InputError(f"unknown key 'name': the name of a {role} stands in its heading [{heading}.NAME]")
             found.append(converter.structure({"name": name, **table}, wanted))
     return tuple(found)
 

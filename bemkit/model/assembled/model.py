@@ -96,7 +96,6 @@ class AssembledModel:
             fields.append((body.to_place(displacement) * units.displacement, traction, energy))
         return fields
 
-
     def rigid_bodies(self, state: ContactState) -> list[tuple[FloatArray, FloatArray]]:
         """Return motion (3,) [m, m, rad] and reaction (3,) [N/m, N/m, N m/m] of each rigid body in a contact state.
 
@@ -282,5 +281,7 @@ def _offset(prepared: PreparedAssembly) -> FloatArray:
     given = [values for _, values in _moved(prepared)]
     parts = [np.zeros(0)]
     for rows in prepared.rows:
-        parts.append(np.sum([coupling @ given[number] for number, coupling in _couplings(rows, prepared.units)], axis=0))
+        parts.append(
+            np.sum([coupling @ given[number] for number, coupling in _couplings(rows, prepared.units)], axis=0)
+        )
     return np.concatenate(parts)
