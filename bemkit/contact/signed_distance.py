@@ -18,6 +18,8 @@ _IS_DISTANCE = 1e-8
 """How much the slope of a distance may differ from one."""
 _ON_LEVEL = 1e-10
 """Distance from the surface, in sizes of what is measured, that counts as none."""
+_NEAR = 1e-3
+"""Distance from the surface, in the same sizes, from which on Newton's method finds the nearest point."""
 _LAST_STEP = 1e-10
 """Step, in the same sizes, after which the next one is round-off: the curvature guides it by six digits."""
 _MOST_STEPS = 50
@@ -30,14 +32,15 @@ class SignedDistance:
     Parameters
     ----------
     distance : Expression or callable (x, y) -> (n,) array
-        Best the distance from the obstacle itself [m]. Any other smooth function does that grows away from the obstacle
-        and vanishes on its surface, such as ``x**2 + 4 * y**2 - 1``: the nearest point of the surface is then looked for.
+        Best the distance from the obstacle itself [m]. Any other smooth function that grows away from the obstacle and
+        vanishes on its surface will do, such as ``x**2 + 4 * y**2 - 1``: the nearest point of the surface is then
+        looked for.
 
     Raises
     ------
     InputError
-        If the distance is neither a formula for a number nor a function; when it is measured, if no point of the surface
-        is found.
+        If the distance is neither a formula for a number nor a function; when it is measured, if no nearest point of
+        the surface is found.
 
     Notes
     -----
@@ -80,16 +83,11 @@ class SignedDistance:
 
     def _nearest(self, points: FloatArray, foot: FloatArray, size: float) -> FloatArray:
         """Return the points (n, 2) of the surface nearest to points (n, 2), starting from a first guess."""
-        for _ in range(_MOST_STEPS):  # straight to the surface
-            slope = self._slope(foot, size)
-            step = evaluate_field(self.distance, foot) / _squares(slope, foot)
-            foot = foot - step[:, None] * slope
-            if np.hypot(*(step[:, None] * slope).T).max() <= 1e-3 * size:
-                break
+        foot = self._walked(foot, size)
         slope = self._slope(foot, size)
         factor = np.sum((points - foot) * slope, axis=1) / _squares(slope, foot)
         missing = self._missing(points, foot, factor, size)
-        for _ in range(_MOST_STEPS):  # along it
+        for _ in range(_MOST_STEPS):
             matrix = np.zeros((len(points), 3, 3))
             slope = self._slope(foot, size)
             matrix[:, :2, :2] = np.eye(2) + factor[:, None, None] * self._curvature(foot, size)
@@ -106,16 +104,26 @@ class SignedDistance:
                 if not is_worse.any():
                     break
                 share = np.where(is_worse, 0.5 * share, share)
-            foot, factor = trial, trial_factor
+            foot, factor = np.asarray(trial), np.asarray(trial_factor)
             if np.hypot(*step[:, :2].T).max() <= _LAST_STEP * size:
                 break
         wrong = np.flatnonzero(~(np.abs(missing).max(axis=1) <= _ON_LEVEL * size))
         if wrong.size:
             x, y = points[wrong[0]]
             raise InputError(
-                f"distance {self.distance!r}: no nearest point of its zero level is found from ({x:.6g}, {y:.6g}); give "
-                "a smooth function that grows away from the obstacle, best the distance itself"
+                f"distance {self.distance!r}: no nearest point of its zero level is found from ({x:.6g}, {y:.6g}); "
+                "give a smooth function that grows away from the obstacle, best the distance itself"
             )
+        return foot
+
+    def _walked(self, foot: FloatArray, size: float) -> FloatArray:
+        """Return points (n, 2) near the surface, straight along the slopes from points (n, 2)."""
+        for _ in range(_MOST_STEPS):
+            slope = self._slope(foot, size)
+            step = (evaluate_field(self.distance, foot) / _squares(slope, foot))[:, None] * slope
+            foot = foot - step
+            if np.hypot(*step.T).max() <= _NEAR * size:
+                break
         return foot
 
     def _missing(self, points: FloatArray, foot: FloatArray, factor: FloatArray, size: float) -> FloatArray:

@@ -24,6 +24,9 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 
+_ROUND_OFF = 64.0 * float(np.finfo(float).eps)
+"""Share of coordinates by which fields of them may be wrong."""
+
 
 def stress_of(force: BodyForce, mesh: BoundaryMesh, material: Material) -> float:
     """Return the size [Pa] of the stresses that a body force causes."""
@@ -83,7 +86,7 @@ def _sources(
                 return scale * force.strain_at(mesh.centre + mesh.diameter * points)
 
             try:
-                return harmonic_sources(strain, mesh.unit)
+                return harmonic_sources(strain, mesh.unit, _ROUND_OFF * float(np.abs(mesh.nodes).max()) / mesh.diameter)
             except TemperatureError as error:
                 shown = force.temperature.text if isinstance(force.temperature, Expression) else force.temperature
                 raise TemperatureError(f"temperature is {shown!r}, which {error}") from None

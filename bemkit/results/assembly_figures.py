@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.drawing import GREY, new_figure
@@ -45,15 +46,15 @@ def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> di
 
 
 def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Figure:
-    """Draw all bodies as they were and deformed or moved, all displacements enlarged by one factor that the picture tells.
+    """Draw all bodies before and after, all displacements enlarged by one factor that the picture tells.
 
     The factor is so small that no body is drawn inside another one by more than a line is thick.
     """
     bodies = list(solution.bodies.values())
     moved = np.concatenate([body.boundary.displacement for body in bodies])
-    size = float(np.hypot(*np.ptp(np.concatenate([body.mesh.nodes for body in bodies]), axis=0)))
+    size = float(np.hypot(*_extent(solution)))
     factor = exaggeration(size, moved, solution.contact)
-    figure = new_figure(6.4, 6.4)
+    figure = _figure(solution)
     axes = figure.add_subplot()
     for number, body in enumerate(bodies):
         draw_body(axes, _space(body), body.boundary.displacement, factor, is_labelled=number == 0)
@@ -73,7 +74,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
     from matplotlib.lines import Line2D
 
     table = solution.contact
-    figure = new_figure(6.4, 6.4)
+    figure = _figure(solution)
     axes = figure.add_subplot()
     for body in solution.bodies.values():
         for loop in outlines(_space(body), body.boundary.displacement, 0.0):
@@ -83,8 +84,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
     draw_rigid_bodies(axes, [(body, solution.rigid[body.name]) for body in solution.assembly.rigid], 0.0)
     points = np.stack([table.x, table.y], axis=1)
     largest = float(np.max(-table.sigma_n, initial=0.0))
-    size = float(np.hypot(*np.ptp(points, axis=0))) or 1.0
-    length = 0.1 * size * np.maximum(-table.sigma_n, 0.0) / (largest or 1.0)
+    length = _comb_length(solution) * np.maximum(-table.sigma_n, 0.0) / (largest or 1.0)
     tips = points - length[:, None] * solution.contact_directions
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
@@ -97,6 +97,23 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
     _name_axes(axes, f"Contacts, pressure up to {largest:.4g} {units.stress}\n{solution.title}", units)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def _comb_length(solution: AssemblySolution) -> float:
+    """Return the length of the longest tooth: a tenth of the picture, or a third of a body where there are many."""
+    diameters = [body.mesh.diameter for body in solution.bodies.values() if not body.mesh.is_exterior]
+    return float(min(0.1 * np.hypot(*_extent(solution)), np.median(diameters or [np.inf]) / 3.0))
+
+
+def _extent(solution: AssemblySolution) -> FloatArray:
+    """Return the width and the height of all bodies together."""
+    return np.asarray(np.ptp(np.concatenate([body.mesh.nodes for body in solution.bodies.values()]), axis=0))
+
+
+def _figure(solution: AssemblySolution) -> Figure:
+    """Return an empty figure whose height suits that of the bodies."""
+    width, height = _extent(solution)
+    return new_figure(6.4, float(np.clip(6.0 * height / width + 1.4, 3.0, 9.0)))
 
 
 def _space(body: BodyResult) -> BoundarySpace:

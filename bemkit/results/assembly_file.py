@@ -4,7 +4,7 @@
 /bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
 /contact         with columns direction_x, direction_y and, with friction, friction_bound
 /contacts        table: what each contact transmits
-/rigid           table: how each rigid body moved, and what acts on it
+/rigid           table: how each rigid body moved, and what acts on it; left out without rigid bodies
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.hdf5 import Reader, rows_of, write_table
+from bemkit.hdf5 import Reader, rows_of
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_outcome
+from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.scene.assembly import Assembly
@@ -36,10 +36,9 @@ def write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
     if solution.friction_bound is not None:
         columns[_BOUND] = solution.friction_bound
     write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
-    numbers = {name: np.array([getattr(one, name) for one in solution.contacts]) for name in _CONTACT_NUMBERS}
-    write_table(file.create_group("contacts"), {"name": [one.name for one in solution.contacts], **numbers})
-    motions = {name: np.array([getattr(one, name) for one in solution.rigid.values()]) for name in _RIGID_NUMBERS}
-    write_table(file.create_group("rigid"), {"name": list(solution.rigid), **motions})
+    write_forces(file, "contacts", solution.contacts)
+    if solution.rigid:
+        write_forces(file, "rigid", tuple(solution.rigid.values()))
     for number, body in enumerate(solution.bodies.values()):
         group = file.create_group(f"bodies/{number}")
         group.attrs.update({"name": body.name, "energy": body.energy})
@@ -51,7 +50,7 @@ def read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
     has_bound = reader.has(f"contact/{_BOUND}")
     outcome, columns = read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
     contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
-    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS))
+    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS)) if reader.has("rigid") else []
     bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
     return AssemblySolution(
         assembly=assembly,

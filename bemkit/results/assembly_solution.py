@@ -15,7 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.part_forces import ContactForce, PartForce, part_force
+from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.assembly import Assembly
@@ -49,22 +49,12 @@ class BodyResult(SolvedBody):
         """Return one line."""
         return f"BodyResult({self.name!r}: {self.mesh.n_elements} elements)"
 
-    @cached_property
-    def part_forces(self) -> tuple[PartForce, ...]:
-        """The resultants of the tractions on each part."""
-        space = self.scene.discretisation.traction_space(self.mesh)
-        traction = self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
-        return tuple(
-            part_force(f"{self.name}.{part}", self.mesh, space, traction, elements)
-            for part, elements in self.mesh.parts.items()
-        )
-
     def summary(self) -> dict[str, Any]:
         """Return the result without its fields."""
         return {
             "n_elements": self.mesh.n_elements,
             "energy": self.energy,
-            "parts": {part: force.as_dict() for part, force in zip(self.mesh.parts, self.part_forces, strict=True)},
+            "parts": [force.as_dict() for force in self.part_forces],
         }
 
 

@@ -107,17 +107,15 @@ def _where_negative(distance: Any, frame: FloatArray) -> list[FloatArray]:
     """Return the loops around where a function is negative in a frame; none if it is not defined all over it."""
     from contourpy import FillType, contour_generator
 
-    x, y = (np.linspace(*limits, _POINTS_OF_GRID) for limits in frame.tolist())
+    x, y = (np.linspace(low, high, _POINTS_OF_GRID) for low, high in frame.tolist())
     points = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
     try:
         values = evaluate_field(distance, points).reshape(y.size, x.size)
     except InputError:
         return []
-    polygons, offsets = contour_generator(x, y, values, fill_type=FillType.OuterOffset).filled(-np.inf, 0.0)
+    filled: Any = contour_generator(x, y, values, fill_type=FillType.OuterOffset).filled(-np.inf, 0.0)
     return [
-        np.asarray(loop)
-        for polygon, bounds in zip(polygons, offsets, strict=True)
-        for loop in np.split(polygon, bounds[1:-1])
+        np.asarray(loop) for polygon, bounds in zip(*filled, strict=True) for loop in np.split(polygon, bounds[1:-1])
     ]
 
 

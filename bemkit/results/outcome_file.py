@@ -18,13 +18,14 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.part_forces import PartForce
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
 from bemkit.scene.serialisation import structure, unstructure
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import h5py
 
@@ -97,6 +98,14 @@ def read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[st
         "warnings": reader.texts("warnings"),
     }
     return outcome, further
+
+
+def write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> None:
+    """Write resultants of parts or contacts as a table with their entries as columns."""
+    rows = [force.as_dict() for force in forces]
+    columns = {key: [row[key] for row in rows] for key in (rows[0] if rows else ("name",))}
+    numbers = {key: np.array(column, dtype=float) for key, column in columns.items() if key != "name"}
+    write_table(file.create_group(name), {"name": columns["name"], **numbers})
 
 
 def write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:

@@ -52,7 +52,7 @@ class ContactForce(PartForce):
         Length of boundary in contact, between the places where the status changes.
     peak_pressure : float [Pa]
     largest_slip : float [m]
-        Of nodes in contact.
+        Largest tangential displacement of nodes in contact, relative to the partner and since the first load step.
     """
 
     force_normal: float
@@ -86,42 +86,49 @@ def part_force(
     return PartForce(name, float(force[0]), float(force[1]), moment)
 
 
-def contact_forces(
-    table: ContactTable, frame: FloatArray, transitions: Sequence[Transition], slip: FloatArray | None = None
-) -> tuple[ContactForce, ...]:
-    """Sum up the nodes of each contact.
+def nodal_resultants(table: ContactTable, frame: FloatArray) -> tuple[PartForce, ...]:
+    """Sum up the nodal forces of each contact, on the body with the nodes.
 
     Parameters
     ----------
     table : ContactTable
     frame : (n_contact, 2, 2) array
         Directions of contact and tangents of the nodes.
+    """
+    forces = np.einsum("nk,nkc->nc", table.weight[:, None] * np.stack([table.sigma_n, table.sigma_t], axis=1), frame)
+    moments = table.x * forces[:, 1] - table.y * forces[:, 0]
+    rows = {part: table.rows(part) for part in table.parts}
+    return tuple(
+        PartForce(part, float(forces[own, 0].sum()), float(forces[own, 1].sum()), float(moments[own].sum()))
+        for part, own in rows.items()
+    )
+
+
+def contact_forces(
+    table: ContactTable, resultants: Sequence[PartForce], transitions: Sequence[Transition]
+) -> tuple[ContactForce, ...]:
+    """Say what each contact transmits.
+
+    Parameters
+    ----------
+    table : ContactTable
+    resultants : sequence of PartForce
+        Of each contact part of the table.
     transitions : sequence of Transition
         Of the same table.
-    slip : (n_contact,) array [m], optional
-        ``u_t`` by default.
     """
-    slip = table.u_t if slip is None else slip
-    nodal = table.weight[:, None] * np.stack([table.sigma_n, table.sigma_t], axis=1)
-    forces = np.einsum("nk,nkc->nc", nodal, frame)
-    moments = table.x * forces[:, 1] - table.y * forces[:, 0]
-    is_closed = table.status != NodeStatus.SEPARATED
     found = []
-    for part in table.parts:
-        own = table.rows(part)
-        closed = own & is_closed
-        force_x, force_y = forces[own].sum(axis=0).tolist()
+    for resultant in resultants:
+        own = table.rows(resultant.name)
+        closed = own & (table.status != NodeStatus.SEPARATED)
         found.append(
             ContactForce(
-                name=part,
-                force_x=force_x,
-                force_y=force_y,
-                moment=float(moments[own].sum()),
-                force_normal=-float(nodal[own, 0].sum()),
-                force_tangential=float(nodal[own, 1].sum()),
-                contact_length=_contact_length(table, part, transitions),
+                **vars(resultant),
+                force_normal=-float(table.weight[own] @ table.sigma_n[own]),
+                force_tangential=float(table.weight[own] @ table.sigma_t[own]),
+                contact_length=_contact_length(table, resultant.name, transitions),
                 peak_pressure=float(np.max(-table.sigma_n[own], initial=0.0)),
-                largest_slip=float(np.abs(slip[closed]).max(initial=0.0)),
+                largest_slip=float(np.abs(table.u_t[closed]).max(initial=0.0)),
             )
         )
     return tuple(found)

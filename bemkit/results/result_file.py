@@ -11,6 +11,8 @@ stranger runs no code. The layout, version 2:
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
     /boundary        points, displacement, centres, traction, traction_dofs
+    /parts, /contacts    tables: resultants of the tractions on each part, what each contact part feels; for other
+                     programs, since they follow from the fields
     /contact, /transitions, /history    tables: one dataset per column, all of one length
     /plan, /work     texts: linear solver, sizes and counts as JSON
     /warnings        texts, one sentence each; a file without them has none
@@ -28,7 +30,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_text
 from bemkit.results.assembly_file import read_assembly, write_assembly
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_outcome
+from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
 from bemkit.results.outputs import STDOUT
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
@@ -76,6 +78,8 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
         write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
         if solution.between_nodes is not None:
             file.create_group("between_nodes").attrs.update(solution.between_nodes.as_dict())
+        write_forces(file, "parts", solution.part_forces)
+        write_forces(file, "contacts", solution.contacts)
         write_fields(file, solution.mesh, solution.boundary)
 
 

@@ -23,6 +23,7 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at
+from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.scene import Scene
@@ -153,6 +154,12 @@ class Solution(SolvedBody):
         table = self.contact
         return bound_at(table, self.scene.law_at(table.part, np.stack([table.x, table.y], axis=1)))
 
+    @cached_property
+    def contacts(self) -> tuple[ContactForce, ...]:
+        """What each contact part feels of its obstacle."""
+        parts = {force.name: force for force in self.part_forces}
+        return contact_forces(self.contact, [parts[name] for name in self.contact.parts], self.transitions)
+
     @property
     def contact_elements(self) -> IntArray:
         """The elements of all contact parts."""
@@ -189,6 +196,7 @@ class Solution(SolvedBody):
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
             ``estimated_traction_error`` (None without an estimate),
+            ``parts`` (resultants of the tractions on each part), ``contacts`` (what each contact part feels),
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
             ``work``, ``memory`` [bytes].
         """
@@ -206,6 +214,8 @@ class Solution(SolvedBody):
                 name: getattr(self, name)
                 for name in ("force_tangential", "energy", "estimated_error", "estimated_traction_error")
             },
+            "parts": [force.as_dict() for force in self.part_forces],
+            "contacts": [contact.as_dict() for contact in self.contacts],
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),

@@ -13,6 +13,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.model.particular import ParticularFields
+from bemkit.results.part_forces import PartForce, part_force
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -134,6 +135,16 @@ class SolvedBody:
         make_space = discretisation.displacement_space
         fields = self.map_boundary
         return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
+
+    @cached_property
+    def part_forces(self) -> tuple[PartForce, ...]:
+        """The resultants of the tractions on each part."""
+        space = self.scene.discretisation.traction_space(self.mesh)
+        if len(self.boundary.traction_dofs) != space.element_dofs.size:  # a file of an older version
+            space = ConstantSpace(self.mesh)
+        traction = self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
+        parts = self.mesh.parts.items()
+        return tuple(part_force(part, self.mesh, space, traction, elements) for part, elements in parts)
 
     @property
     def error_unit(self) -> float:

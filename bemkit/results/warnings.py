@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import chain
 
 import numpy as np
@@ -11,6 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
 from bemkit.operators.rigid_modes import without_motion
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, are_neighbours
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
@@ -22,6 +23,8 @@ LARGEST_SHARE_ALONE = 0.2
 LARGEST_TURN = 50.0
 """Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
 the estimate says 3 %; of 45 degrees it says enough."""
+_MOST_ALIKE = 3
+"""Doubts of one kind about several bodies and contacts that are told."""
 FEWEST_NODES = 4
 """Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
 
@@ -36,8 +39,35 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     """
     if not solution.is_certified:
         return solution.plan.warnings
-    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _narrow_zones(solution)
+    laws = solution.scene.laws
+    smooth = {part for part, law in laws.items() if law.is_frictionless}
+    narrow = _narrow_zones(solution.contact, smooth)
+    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), narrow
     return (*solution.plan.warnings, *chain(*doubts))
+
+
+def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
+    """Say what is doubtful about a solution of several bodies; see `find_warnings`. Of many alike doubts, the first."""
+    if not solution.is_certified:
+        return solution.plan.warnings
+    smooth = {pair.name for pair in solution.assembly.contacts if solution.assembly.law_of(pair).is_frictionless}
+    doubts = [
+        _large(solution.estimated_error),
+        (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
+        _narrow_zones(solution.contact, smooth),
+    ]
+    return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
+
+
+def _first(doubts: list[str]) -> list[str]:
+    """Return the first few of doubts of one kind, and how many more there are."""
+    n_more = len(doubts) - _MOST_ALIKE
+    return doubts if n_more <= 0 else [*doubts[:_MOST_ALIKE], f"There are {n_more} more doubts like the last one."]
+
+
+def _large(error: float | None) -> Iterator[str]:
+    if error is not None and error > LARGEST_ERROR:
+        yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
 
 
 def _error(solution: Solution) -> Iterator[str]:
@@ -49,8 +79,7 @@ def _error(solution: Solution) -> Iterator[str]:
     if error is None:
         energy = f"the elastic energy, {solution.energy:.1e} J/m, is not positive"
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
-    elif error > LARGEST_ERROR:
-        yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
+    yield from _large(error)
     if solution.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
     # elements without a neighbour on their piece: their strains meet no others
@@ -106,22 +135,22 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
         )
 
 
-def _narrow_zones(solution: Solution) -> Iterator[str]:
-    """Doubt zones of contact, stick and slip of few nodes; of parts without friction zones of contact alone."""
-    words = np.array(solution.contact.status_words(), dtype=object)
+def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[str]:
+    """Doubt zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
+    words = np.array(contact.status_words(), dtype=object)
     is_closed = words != "separated"
-    for part in solution.contact.parts:
-        own = solution.contact.rows(part)
+    for part in contact.parts:
+        own = contact.rows(part)
         kinds = {"contact": own & is_closed}
-        if not solution.scene.laws[part].is_frictionless:
+        if part not in smooth:
             kinds |= {word: own & (words == word) for word in ("stick", "slip")}
         reported = np.zeros(own.size, bool)
         for kind, chosen in kinds.items():
-            narrow = [zone for zone in _zones(solution.contact, chosen) if zone.size < FEWEST_NODES]
+            narrow = [zone for zone in _zones(contact, chosen) if zone.size < FEWEST_NODES]
             narrow = [zone for zone in narrow if not reported[zone].all()]
             if narrow:
                 reported[np.concatenate(narrow)] = True
-                yield _narrow(part, kind, [solution.contact.s[zone] for zone in narrow])
+                yield _narrow(part, kind, [contact.s[zone] for zone in narrow])
 
 
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:

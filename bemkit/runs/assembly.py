@@ -22,9 +22,10 @@ from bemkit.plan import Plan, check_memory
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
-from bemkit.results.part_forces import contact_forces
+from bemkit.results.part_forces import contact_forces, nodal_resultants
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solution import BoundaryFields
+from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.history import UnsolvableSceneError
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
@@ -145,14 +146,14 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         )
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
     rigid = {
-        body.name: RigidResult(body.name, *motion.tolist(), *reaction.tolist())
+        body.name: RigidResult(body.name, *reaction.tolist(), *motion.tolist())
         for body, (motion, reaction) in zip(prepared.assembly.rigid, model.rigid_bodies(result.state), strict=True)
     }
     clock = clock.closed(Stage.RECOVER)
     finite = all(np.isfinite(body.energy) and np.isfinite(body.boundary.displacement).all() for body in bodies.values())
     if result.is_converged and not finite:
         result = replace(result, status=Status.NOT_FINITE, message=Status.NOT_FINITE.value)
-    return AssemblySolution(
+    solution = AssemblySolution(
         assembly=prepared.assembly,
         bodies=bodies,
         status=result.status,
@@ -160,7 +161,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         contact=table,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, prepared.law),
-        contacts=contact_forces(table, prepared.frame, transitions, slip),
+        contacts=contact_forces(table, nodal_resultants(table, prepared.frame), transitions),
         history=result.history,
         linear_solves=result.linear_solves,
         outer_steps=result.steps,
@@ -172,6 +173,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         message=result.message,
         rigid=rigid,
     )
+    return replace(solution, warnings=find_assembly_warnings(solution))
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

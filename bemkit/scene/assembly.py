@@ -44,7 +44,8 @@ class ContactPair:
     Raises
     ------
     InputError
-        If both names have no dot, a side shall touch itself, a length is not finite, or the multipliers are on neither side.
+        If neither name has a dot, a side shall touch itself, a length is not finite, or the multipliers are on neither
+        side.
     """
 
     sides: tuple[str, str]
@@ -140,7 +141,8 @@ class Assembly:
     ------
     InputError
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
-        listed twice, a rigid body takes part in no contact, or an accuracy is asked of collocation or goes with elements of a body.
+        listed twice, a rigid body takes part in no contact, or an accuracy is asked of collocation or goes with
+        elements of a body.
     """
 
     title: str
@@ -161,7 +163,7 @@ class Assembly:
             raise InputError(f"title is {self.title!r}: give one line of printable text")
         if not self.bodies:
             raise InputError("bodies is empty: give at least one body")
-        names = Counter(body.name for body in (*self.placed_bodies, *self.rigid))
+        names = Counter([*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)])
         repeated = [name for name, count in names.items() if count > 1]
         if repeated:
             raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")

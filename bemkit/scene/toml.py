@@ -196,7 +196,7 @@ def with_overrides(
     ----------
     scene : Scene or Assembly
     elements : int, optional
-        Of an assembly those of each body.
+        Of an assembly those of each body, also where bodies have options of their own.
     accuracy : float, optional
         Instead of a number of elements.
     discretisation, solver : str, optional
@@ -230,6 +230,9 @@ def with_overrides(
             changes["solver"] = structure(solver, cast(Any, ContactSolver))
         if rho is not None:
             changes["solver"] = _with_rho(changes.get("solver", scene.solver), rho)
+        if isinstance(scene, Assembly):
+            own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
+            changes["bodies"] = tuple(replace(body, **own) for body in scene.bodies)
         return replace(scene, **changes)
     except (StructureError, ValueError) as error:
         raise SceneError(printable(str(error))) from error

@@ -79,6 +79,9 @@ def test_json_fields() -> None:
     summary = json.loads(CliRunner().invoke(cli.commands, ["run", "paper-1", "--elements", "40", "--json", "-"]).output)
     assert all_names(text) == list(summary)
     assert all_names(text.partition("Each of the `transitions`")[2]) == list(summary["transitions"][0])
+    assert all_names(text.partition("Each of the `parts`")[2]) == list(summary["parts"][0])
+    of_contact = all_names(text.partition("Each of the `contacts`")[2])
+    assert [*summary["parts"][0], *of_contact] == list(summary["contacts"][0])
     assert all_names(text.partition("The `certificate`")[2]) == list(summary["certificate"])
     assert all_names(text.partition("`between_nodes` says")[2]) == list(summary["between_nodes"])
     rows = {plain(row[0]): row[-1] for row in table(text)}

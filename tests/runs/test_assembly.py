@@ -283,3 +283,32 @@ def test_what_goes_with_one_body_alone_is_refused() -> None:
         bk.run_assembly_history([])
     with pytest.raises(bk.InputError, match="no two bodies are in contact: list contacts"):
         bk.run(replace(patch(1), contacts=()))
+
+
+def test_what_one_side_feels_the_other_gives_back() -> None:
+    """Forces of both sides of a contact, integrated over their own elements, to round-off; so of every block."""
+    solution = bk.run(replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=120)))
+    upper, lower = ({force.name: force for force in body.part_forces}["tip"] for body in solution.bodies.values())
+    (contact,) = solution.contacts
+    assert upper.force_y == pytest.approx(contact.force_y, rel=1e-12)
+    assert lower.force_y == pytest.approx(-contact.force_y, rel=1e-12)
+    wall = bk.Assembly(
+        title="Three blocks",
+        bodies=tuple(
+            bk.Body(
+                name=name, shape=bk.Rectangle(2.0, 1.0), material=STEEL, parts=parts,
+                body_forces=(bk.Gravity(1.0, (0.0, -1.0)),), placement=bk.Placement(place),
+                mesh=bk.MeshOptions(elements=24),
+            )
+            for name, place, parts in (
+                ("left", (0.0, 0.0), (bk.Part("floor", bk.Clamped(), ("bottom",)),)),
+                ("right", (2.0, 0.0), (bk.Part("floor", bk.Clamped(), ("bottom",)),)),
+                ("top", (1.0, 1.0), ()),
+            )
+        ),
+        touching=bk.Touching(1e-6),
+        law=bk.Coulomb(0.5),
+    )  # fmt: skip
+    solution = bk.run(wall)
+    (bottom,) = (force for force in solution.bodies["top"].part_forces if force.name == "bottom")
+    assert bottom.force_y == pytest.approx(2.0, rel=1e-12)  # its weight, on two blocks that share its lower side

@@ -11,7 +11,7 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import nodes_on
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.mortar.coupling import MortarCoupling, couple
+from bemkit.contact.mortar.coupling import couple
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
@@ -57,6 +57,8 @@ class ContactRows:
         The relative displacement of row i is ``frame[i] @ (on_body[i] @ u - on_other[i] @ u_other)``.
     on_other : sparse (n, n_nodes) array, (n, 2, 3) array or None
         Of a rigid body how its motions displace what the nodes may touch.
+    elements, other_elements : int arrays
+        Of both sides; none of a rigid obstacle.
     is_held : (n,) bool array
         Where a support holds the node in one direction: there is no friction of its own.
     """
@@ -74,6 +76,8 @@ class ContactRows:
     gap: FloatArray
     on_body: sparse.csr_array
     on_other: sparse.csr_array | FloatArray | None
+    elements: IntArray
+    other_elements: IntArray
     is_held: BoolArray
 
     @property
@@ -154,6 +158,8 @@ def body_rows(
             coupling.gap + pairs[k].gap,
             sparse.csr_array(coupling.on_non_mortar),
             sparse.csr_array(coupling.on_mortar),
+            side.elements,
+            other_side.elements,
             np.asarray(conditions[first].is_fixed[coupling.nodes].any(axis=1)),
         )
     yield from (found[k] for k in range(len(pairs)))

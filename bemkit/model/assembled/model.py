@@ -14,6 +14,7 @@ from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
+from bemkit.model.assembled.contact_tractions import contact_tractions
 from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
@@ -79,7 +80,9 @@ class AssembledModel:
             (n_nodes, 2) [m]; (n_elements, n_local, 2) [Pa] at the local nodes of the traction space; elastic energy
             1/2 a(u, u) [J/m].
         """
-        units, fields = self.prepared.units, []
+        prepared, units = self.prepared, self.prepared.units
+        of_contacts = contact_tractions(prepared.bodies, prepared.rows, state.traction * units.stress)
+        fields: list[tuple[FloatArray, FloatArray, float]] = []
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
         for body, elastic, condensed, own in zip(
             self.prepared.bodies, self.elastic, self.condensed, unknowns, strict=True
@@ -90,6 +93,8 @@ class AssembledModel:
             )
             traction = np.array(body.to_place(traction))
             traction_space = body.scene.discretisation.traction_space(body.mesh)
+            for elements, values in of_contacts[len(fields)]:
+                traction[elements] = values
             touching = self.prepared.assembly.contact_parts(body.body)
             insert_loads(traction, body.scene, body.mesh, traction_space, touching)
             energy = _energy(body, elastic, displacement, force) * self.prepared.force_unit * units.displacement

@@ -65,6 +65,8 @@ def obstacle_rows(
                 gap,
                 sparse.csr_array((np.ones(nodes.nodes.size), where), shape),
                 on_other,
+                body.part_elements(part),
+                np.zeros(0, np.intp),
                 fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
             )
 

@@ -109,9 +109,9 @@ def condensed_under(
     condensed: CondensedMap, conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None = None
 ) -> CondensedMap:
     """Return a condensed body under other displacements, forces and, if given, forces inside; nothing is factored."""
-    if inside is None or condensed.weightless is None:
+    if inside is None:
         return condensed.under(force, conditions.displacement)
-    return inside.under(condensed.weightless, conditions, force)
+    return inside.under(condensed.weightless or condensed, conditions, force)
 
 
 @dataclass(frozen=True, eq=False)

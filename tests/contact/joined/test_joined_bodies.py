@@ -7,12 +7,13 @@ import pytest
 from scipy import sparse
 
 from bemkit.contact.body import ContactState
-from bemkit.contact.conditions import separated, slip, stick
+from bemkit.contact.conditions import LinearConditions, separated, slip, stick
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, SingularResponse
 from bemkit.errors import InputError
+from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -185,3 +186,26 @@ def test_wrong_input_is_named():
     ):
         with pytest.raises(InputError, match=words):
             replace(JoinedBodies((held,), sparse.csr_array(np.eye(2)), np.zeros(2), np.ones(1)), **change)
+
+
+def test_a_tie_that_others_imply_is_refused():
+    square = rectangle(1.0, 1.0, 2)
+    pairs = [(0, square.node(x, 0.0), -1, -1, 0, -1, 0.5) for x in (0.0, 0.5, 1.0, 1.0)]
+    dense, large = (joined([square.member()], [0.0], pairs, is_dense=is_dense) for is_dense in (True, False))
+    everywhere = stick(np.zeros(4), np.zeros(4))
+    with pytest.raises(SingularMatrixError, match="tied to each other at all contact nodes"):
+        dense.respond(everywhere)
+    with pytest.raises(SingularResponse, match="do not hold the bodies"):
+        large.respond(everywhere)
+    once = everywhere.replaced(np.repeat((np.arange(4) == 3)[:, None], 2, axis=1), separated(4))
+    assert large.respond(once).is_finite
+
+
+def test_conditions_that_say_nothing_are_singular():
+    body = row_of_blocks((1.0, 1.0), is_dense=False)
+    nothing = LinearConditions(np.zeros((15, 2, 2)), np.zeros((15, 2, 2)), np.zeros((15, 2)))
+    first = np.zeros((15, 2), bool)
+    first[0, 1] = True
+    conditions = stick(np.zeros(15), np.zeros(15)).replaced(first, nothing)
+    with pytest.raises(SingularResponse, match="neither displacement nor traction"):
+        body.respond(conditions)

@@ -1,14 +1,16 @@
 """Walls and arches of blocks: what stands, what falls, and which blocks move."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bemkit.contact.laws import Coulomb
+from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
-from tests.contact.joined.blocks import arch, wall
+from tests.contact.joined.blocks import arch, joined, rectangle, wall
 
 # t/R of semicircular arches of N equal voussoirs at collapse by five hinges, block by block in limit analysis
 THICKNESS = {15: 0.106265824, 25: 0.107030497}
@@ -47,6 +49,40 @@ def test_a_push_beyond_what_friction_holds_moves_the_uppermost_course(is_dense):
     assert "'block 16'" in falls.message
 
 
+@pytest.mark.parametrize("is_dense", [True, False])
+@pytest.mark.parametrize("bound", [1e-4, 3e-4])
+def test_friction_of_all_nodes_counts_where_it_needs_no_pressure(bound, is_dense):
+    """A course of length 4 under friction of a given size, pushed on its side of unit height."""
+
+    def escape(share):
+        body = wall(2, 2, 4, gravity=(0.0, -1e-2), push=4.0 * bound * share, is_dense=is_dense)
+        return find_unsolvable_load(ContactProblem(body, np.zeros(body.n_contact), Tresca(bound)))
+
+    assert escape(0.99) is None
+    moves = escape(1.01)
+    assert moves is not None
+    assert "'block 2', 'block 3', 'block 4'" in moves.description
+
+
+@pytest.mark.parametrize("is_dense", [True, False])
+def test_the_order_of_the_contact_nodes_decides_nothing(is_dense):
+    """A square pressed beside the middle of its foot, whose outermost nodes are neither first nor last."""
+    square = rectangle(1.0, 1.0, 4)
+    pairs = [(0, square.node(x, 0.0), -1, -1, 0, -1, 0.25) for x in (0.25, 0.0, 1.0, 0.5, 0.75)]
+
+    def escape(x):
+        load = np.zeros_like(square.points)
+        load[square.node(0.0, 1.0), 1], load[square.node(1.0, 1.0), 1] = x - 1.0, -x
+        return find_unsolvable_load(
+            on_foundation(joined([square.member(load=load.ravel())], [0.0], pairs, is_dense=is_dense))
+        )
+
+    assert escape(0.02) is None
+    assert escape(0.98) is None
+    assert "tips" in escape(-0.02).description
+    assert "tips" in escape(1.02).description
+
+
 def test_the_one_block_that_slips_out_is_named():
     body = wall(2, 2, 4, gravity=(0.0, -1.0))
     loads = [member.load for member in body.members]
@@ -56,6 +92,25 @@ def test_the_one_block_that_slips_out_is_named():
     lifted = find_unsolvable_load(on_foundation(body.under(loads, body.offset), 0.0))
     assert lifted is not None
     assert "'block 4'" in lifted.description
+
+
+def test_a_leaning_wall_stands_in_steps_up_to_its_limit():
+    """On ground that slopes by q the wall slides at q = 0.6; a jump to 98 % of that stalls, four steps get there."""
+    upright, sideways = (wall(5, 4, 4, gravity=gravity, is_dense=False) for gravity in ((0.0, -1e-4), (1e-4, 0.0)))
+
+    def leaning(share):
+        pairs = zip(upright.members, sideways.members, strict=True)
+        return on_foundation(upright.under([a.load + 0.6 * share * b.load for a, b in pairs], upright.offset))
+
+    falls = solve(leaning(1.02), SemismoothNewton(), throw=False)
+    assert falls.status is Status.UNSOLVABLE_LOAD
+    assert "bodies 'block 0'" in falls.message
+    state = None
+    for share in (0.5, 0.74, 0.86, 0.98):
+        slip = None if state is None else state.u_t
+        state = solve(replace(leaning(share), reference_slip=slip), SemismoothNewton(), start=state).state
+    foot = np.diff(upright.owners[0::2].indptr) == 1
+    assert upright.weights[foot] @ state.sigma_t[foot] == pytest.approx(-0.98 * 0.6e-4 * 40, rel=1e-9)
 
 
 @pytest.mark.slow

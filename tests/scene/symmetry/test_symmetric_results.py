@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.cli.console import print_summary
 from bemkit.operators.cache import StaleCacheError, load, save
-from bemkit.results.figures import draw_deformation
+from bemkit.results.figures import at_mesh_nodes, draw_deformation, whole_displacement
 from bemkit.scene.toml import scene_from_toml, scene_to_toml
 from bemkit.scene.transform import AffineMap, transformed_scene
 from bemkit.studies.stability.independent_check import check_solution

@@ -1,0 +1,145 @@
+"""Results of several bodies: files, tables, JSON, pictures, the command line and the plan."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.cli.main import main
+from bemkit.hdf5 import ResultFileError
+from bemkit.plan.assembly_plan import make_assembly_plan
+from bemkit.results.assembly_figures import all_assembly_figures
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.tables import to_csv, to_json
+from bemkit.scene.toml import with_overrides
+
+pytest.importorskip("matplotlib")
+
+CYLINDERS = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(elements=48))
+SMALL = ("--elements", "48")
+
+
+@pytest.fixture(scope="module")
+def solution() -> AssemblySolution:
+    return bk.run(CYLINDERS)
+
+
+@pytest.fixture(scope="module")
+def arch() -> AssemblySolution:
+    """Copies that are turned, and obstacles."""
+    return bk.run(bk.load_scene("masonry-arch"))
+
+
+def call(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(list(arguments))
+    return int(caught.value.code or 0)
+
+
+@pytest.mark.parametrize("name", ["solution", "arch"])
+def test_a_file_gives_everything_back(name: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    solution: AssemblySolution = request.getfixturevalue(name)
+    bk.write_result(tmp_path / "r.h5", solution)
+    copy = bk.read_result(tmp_path / "r.h5")
+    assert isinstance(copy, AssemblySolution)
+    assert copy.assembly == solution.assembly
+    assert copy.summary() == solution.summary()
+    assert copy.contacts == solution.contacts
+    np.testing.assert_array_equal(copy.contact_directions, solution.contact_directions)
+    np.testing.assert_array_equal(copy.friction_bound, solution.friction_bound)
+    for key, body in solution.bodies.items():
+        for field in ("points", "displacement", "traction_dofs"):
+            np.testing.assert_array_equal(getattr(copy.bodies[key].boundary, field), getattr(body.boundary, field))
+        np.testing.assert_array_equal(copy.bodies[key].mesh.points(np.arange(3), np.zeros(1)),
+                                      body.mesh.points(np.arange(3), np.zeros(1)))  # fmt: skip
+        assert copy.bodies[key].part_forces == body.part_forces
+
+
+def test_any_program_reads_the_bodies_by_number(solution: AssemblySolution, tmp_path: Path) -> None:
+    bk.write_result(tmp_path / "r.h5", solution)
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert [file[f"bodies/{k}"].attrs["name"] for k in range(2)] == ["upper", "lower"]
+        assert file["bodies/0/boundary/displacement"].shape == (len(solution.bodies["upper"].boundary.points), 2)
+        assert file["contacts/force_normal"][0] == solution.contacts[0].force_normal
+
+
+def test_a_file_without_a_body_is_damaged(solution: AssemblySolution, tmp_path: Path) -> None:
+    bk.write_result(tmp_path / "r.h5", solution)
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        del file["bodies/1"]
+    with pytest.raises(ResultFileError):
+        bk.read_result(tmp_path / "r.h5")
+
+
+def test_tables_name_the_body(solution: AssemblySolution) -> None:
+    lines = to_csv(solution, "boundary").splitlines()
+    assert lines[0].startswith("body,element,part,")
+    assert len(lines) == 1 + solution.n_elements
+    assert {line.split(",")[0] for line in lines[1:]} == {"upper", "lower"}
+    contact = to_csv(solution, "contact").splitlines()
+    assert contact[1].endswith("upper.tip / lower.tip")
+    summary = json.loads(to_json(solution))
+    assert summary["n_bodies"] == 2
+    assert summary["contacts"][0]["name"] == "upper.tip / lower.tip"
+    assert [force["name"] for force in summary["bodies"]["upper"]["parts"]] == ["pushed", "tip"]
+
+
+def test_pictures_show_all_bodies_and_each_contact_once(solution: AssemblySolution, arch: AssemblySolution) -> None:
+    figures = all_assembly_figures(solution)
+    assert list(figures) == ["deformation", "contacts", "contact-displacement", "contact-traction", "contact-status"]
+    (axes,) = figures["contacts"].axes
+    drawn = sum(len(collection.get_offsets()) for collection in axes.collections if hasattr(collection, "get_sizes"))
+    assert drawn == solution.contact.n_contact
+    many = all_assembly_figures(arch)
+    assert list(many) == ["deformation", "contacts"]  # too many contacts for figures of each
+    assert len(many["deformation"].axes[0].patches) >= len(arch.bodies)
+
+
+def test_fields_inside_are_those_of_a_body(solution: AssemblySolution) -> None:
+    fields = bk.interior_fields(solution.bodies["upper"])
+    stress = fields.stress(np.array([[0.0, 0.9]]))
+    assert stress[0, 1, 1] < 0.0  # pressed
+
+
+def test_the_plan_foresees_the_counts_and_says_what_is_left_out(arch: AssemblySolution) -> None:
+    plan = make_assembly_plan(bk.load_scene("masonry-arch"))
+    assert plan.work == arch.work == arch.plan.work
+    items = {item.name: item for item in plan.items}
+    assert items["copies"].is_needed
+    assert "18 bodies share" in items["copies"].reason
+    assert not items["further meshes"].is_needed
+    assert items["rigid obstacles"].is_needed
+
+
+def test_the_command_line_takes_assemblies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                           capsys: pytest.CaptureFixture[str]) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert call("run", "two-cylinders", *SMALL, "-o", "r.h5", "--json", "r.json", "--csv", "c.csv", "--plot", "p") == 0
+    shown = capsys.readouterr().out
+    assert "2, with 96 elements" in " ".join(shown.split())
+    assert json.loads(Path("r.json").read_text())["converged"]
+    assert sorted(path.name for path in Path("p").iterdir())[:2] == ["contact-displacement.png", "contact-status.png"]
+    assert call("show", "r.h5", "--csv", "boundary") == 0
+    assert capsys.readouterr().out.startswith("body,element")
+    assert call("show", "r.h5", "--scene") == 0
+    assert "[bodies.upper" in capsys.readouterr().out
+    assert call("plan", "two-cylinders") == 0
+    assert "contacts between bodies" in capsys.readouterr().out
+    assert call("run", "two-cylinders", *SMALL, "--explain", "-q") == 0
+    assert call("run", "two-cylinders", *SMALL, "--cascade") == 2
+    assert "there are 2 bodies: only scenes of one body can do this" in capsys.readouterr().err
+    for command in (("study", "errors"), ("stability",)):
+        assert call(*command, "two-cylinders") == 2
+        assert "only scenes of one body can do this" in capsys.readouterr().err
+
+
+def test_words_of_the_command_line_reach_bodies_with_options_of_their_own() -> None:
+    changed = with_overrides(bk.load_scene("masonry-arch"), elements=16, degree=2)
+    assert {changed.scene_of(body).mesh.elements for body in changed.placed_bodies} == {16}
+    assert changed.scene_of(changed.placed_bodies[0]).discretisation == bk.Galerkin(2)
