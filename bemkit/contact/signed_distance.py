@@ -12,17 +12,17 @@ from bemkit.formulas import ScalarField, check_field, evaluate_field
 
 _STEPS = 4.0 ** -np.arange(2.5, 9.0)
 """Steps of differences, in sizes of what is measured: whatever the curvature, one of them suits."""
+_ONE_STEP = _STEPS[3:4]
+"""One that suits well enough where slopes only guide the way."""
 _STENCIL = ((1.0, 0.75), (2.0, -0.15), (3.0, 1.0 / 60.0))
 """Places and weights of the central difference of sixth order."""
 _IS_DISTANCE = 1e-8
 """How much the slope of a distance may differ from one."""
-_ON_LEVEL = 1e-10
-"""Distance from the surface, in sizes of what is measured, that counts as none."""
-_NEAR = 1e-3
-"""Distance from the surface, in the same sizes, from which on Newton's method finds the nearest point."""
-_LAST_STEP = 1e-10
-"""Step, in the same sizes, after which the next one is round-off: the curvature guides it by six digits."""
-_MOST_STEPS = 50
+_ON_LEVEL, _ROUND_OFF = 1e-10, 1e-14
+"""Lengths, in sizes of what is measured, that count as none: of what is looked for, and of what is computed."""
+_FARTHEST_POINT = -1e-3
+"""Second derivative of half the squared distance along the surface below which a point is no nearest one."""
+_MOST_STEPS, _MOST_HALVINGS = 100, 20
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,10 @@ class SignedDistance:
 
     Notes
     -----
-    Slopes are differences of sixth order, of that step for which two orders of magnitude agree best: 1e-11 and better
-    where the function is smooth. The nearest point c of a point p solves ``c + m grad f(c) = p`` and ``f(c) = 0``, by
-    Newton's method; where f is a distance it is ``p - f grad f``.
+    Slopes are differences of sixth order, of the step that agrees best with one four times as long: 1e-11 and better
+    where the function is smooth. Where f is a distance the nearest point of p is ``p - f grad f``; else it is looked
+    for along the surface by Newton's method, with steps that come nearer. Deep inside, where several points are about
+    as near, any of them may be found.
     """
 
     distance: ScalarField
@@ -74,79 +75,81 @@ class SignedDistance:
         is_distance &= np.abs(evaluate_field(self.distance, foot)) <= _ON_LEVEL * size
         other = np.flatnonzero(~is_distance)
         if other.size:
-            nearest = self._nearest(points[other], foot[other], size)
+            nearest = self._nearest(points[other], size)
             slope[other] = self._slope(nearest, size)
         normals = slope / np.hypot(*slope.T)[:, None]
         if other.size:
             value[other] = np.sum((points[other] - nearest) * normals[other], axis=1)
         return value, normals
 
-    def _nearest(self, points: FloatArray, foot: FloatArray, size: float) -> FloatArray:
-        """Return the points (n, 2) of the surface nearest to points (n, 2), starting from a first guess."""
-        foot = self._walked(foot, size)
-        slope = self._slope(foot, size)
-        factor = np.sum((points - foot) * slope, axis=1) / _squares(slope, foot)
-        missing = self._missing(points, foot, factor, size)
+    def _nearest(self, points: FloatArray, size: float) -> FloatArray:
+        """Return the points (n, 2) of the surface nearest to points (n, 2)."""
+        foot = self._on_surface(points, size)
         for _ in range(_MOST_STEPS):
-            matrix = np.zeros((len(points), 3, 3))
             slope = self._slope(foot, size)
-            matrix[:, :2, :2] = np.eye(2) + factor[:, None, None] * self._curvature(foot, size)
-            matrix[:, :2, 2], matrix[:, 2, :2] = slope, slope / np.hypot(*slope.T)[:, None]
-            try:
-                step = np.linalg.solve(matrix, -missing[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:
-                break
-            share, largest = np.ones(len(points)), np.abs(missing).max(axis=1)
-            for _ in range(8):  # shorter where that comes no nearer
-                trial, trial_factor = foot + share[:, None] * step[:, :2], factor + share * step[:, 2]
-                missing = self._missing(points, trial, trial_factor, size)
-                is_worse = np.abs(missing).max(axis=1) > largest
-                if not is_worse.any():
-                    break
-                share = np.where(is_worse, 0.5 * share, share)
-            foot, factor = np.asarray(trial), np.asarray(trial_factor)
-            if np.hypot(*step[:, :2].T).max() <= _LAST_STEP * size:
-                break
-        wrong = np.flatnonzero(~(np.abs(missing).max(axis=1) <= _ON_LEVEL * size))
-        if wrong.size:
-            x, y = points[wrong[0]]
-            raise InputError(
-                f"distance {self.distance!r}: no nearest point of its zero level is found from ({x:.6g}, {y:.6g}); "
-                "give a smooth function that grows away from the obstacle, best the distance itself"
-            )
-        return foot
+            steepness = np.sqrt(_squares(slope, foot))
+            normal = slope / steepness[:, None]
+            along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+            away = foot - points
+            rise = np.sum(away * along, axis=1)  # of half the squared distance along the surface
+            curvature = np.einsum("ni,nik,nk->n", along, self._second_derivatives(foot, size), along) / steepness
+            bend = 1.0 - curvature * np.sum(away * normal, axis=1)
+            if np.all((np.abs(rise) <= _ON_LEVEL * size) & (bend > _FARTHEST_POINT)):
+                return foot
+            farthest = 0.5 / np.maximum(np.abs(curvature), 1.0 / size)
+            downhill = np.where(rise > 0.0, -farthest, farthest)
+            step = np.where(bend > 0.0, -rise / np.where(bend > 0.0, bend, 1.0), downhill)
+            foot = self._descended(points, foot, np.clip(step, -farthest, farthest)[:, None] * along, size)
+        worst = int(np.argmax(np.abs(rise)))
+        raise InputError(self._nothing_near(points[worst]))
 
-    def _walked(self, foot: FloatArray, size: float) -> FloatArray:
-        """Return points (n, 2) near the surface, straight along the slopes from points (n, 2)."""
+    def _descended(self, points: FloatArray, foot: FloatArray, step: FloatArray, size: float) -> FloatArray:
+        """Return points of the surface that are nearer to points than feet are, after steps or parts of them."""
+        distance = np.hypot(*(points - foot).T)
+        for _ in range(_MOST_HALVINGS):
+            trial = self._on_surface(foot + step, size)
+            is_worse = np.hypot(*(points - trial).T) > distance + _ROUND_OFF * size
+            if not is_worse.any():
+                break
+            step = np.where(is_worse[:, None], 0.5 * step, step)
+        return trial
+
+    def _on_surface(self, points: FloatArray, size: float) -> FloatArray:
+        """Return points (n, 2) of the surface, straight along the slopes from points (n, 2)."""
+        foot = points
         for _ in range(_MOST_STEPS):
-            slope = self._slope(foot, size)
+            slope = self._slope(foot, size, _ONE_STEP)
             step = (evaluate_field(self.distance, foot) / _squares(slope, foot))[:, None] * slope
-            foot = foot - step
-            if np.hypot(*step.T).max() <= _NEAR * size:
-                break
-        return foot
+            length = np.hypot(*step.T)
+            if length.max() <= _ROUND_OFF * size:
+                return foot
+            foot = foot - step / np.maximum(length / size, 1.0)[:, None]
+        raise InputError(self._nothing_near(points[int(np.argmax(length))]))
 
-    def _missing(self, points: FloatArray, foot: FloatArray, factor: FloatArray, size: float) -> FloatArray:
-        """Return (n, 3) lengths: how far feet are from the normals through the points, and from the surface."""
-        slope = self._slope(foot, size)
-        off_surface = evaluate_field(self.distance, foot) / np.sqrt(_squares(slope, foot))
-        return np.column_stack([foot - points + factor[:, None] * slope, off_surface])
+    def _nothing_near(self, point: FloatArray) -> str:
+        x, y = point
+        return (
+            f"distance {self.distance!r}: no nearest point of its zero level is found from ({x:.6g}, {y:.6g}); "
+            "give a smooth function that grows away from the obstacle, best the distance itself"
+        )
 
-    def _slope(self, points: FloatArray, size: float) -> FloatArray:
+    def _slope(self, points: FloatArray, size: float, steps: FloatArray = _STEPS) -> FloatArray:
         """Return the gradient (n, 2) by differences."""
-        trials = np.zeros((len(_STEPS), len(points), 2))
-        for trial, step in zip(trials, size * _STEPS, strict=True):
+        trials = np.zeros((len(steps), len(points), 2))
+        for trial, step in zip(trials, size * steps, strict=True):
             for axis, unit in enumerate(np.eye(2)):
                 for place, weight in _STENCIL:
                     shift = place * step * unit
                     ahead, behind = (evaluate_field(self.distance, points + sign * shift) for sign in (1.0, -1.0))
                     trial[:, axis] += weight / step * (ahead - behind)
+        if len(steps) == 1:
+            return np.asarray(trials[0])
         change = np.abs(np.diff(trials, axis=0)).max(axis=2)
         best = np.argmin(change, axis=0) + 1
         return np.asarray(trials[best, np.arange(len(points))])
 
-    def _curvature(self, points: FloatArray, size: float) -> FloatArray:
-        """Return the second derivatives (n, 2, 2), good to six digits: they only guide the way."""
+    def _second_derivatives(self, points: FloatArray, size: float) -> FloatArray:
+        """Return (n, 2, 2) arrays good to six digits: they only guide the way."""
         step = 1e-3 * size
         x, y = step * np.eye(2)
         at = {(i, k): evaluate_field(self.distance, points + i * x + k * y) for i in (-1, 0, 1) for k in (-1, 0, 1)}

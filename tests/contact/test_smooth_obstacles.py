@@ -92,6 +92,16 @@ def test_the_nearest_point_of_an_ellipse_is_found_though_its_formula_is_no_dista
     np.testing.assert_allclose(obstacle.approach(points, UP), -normals, atol=1e-11)
 
 
+def test_points_deep_inside_an_ellipse_find_its_near_sides() -> None:
+    """Also from the long axis, where the way along the slope leads to its far end."""
+    points = np.array([[0.1, 0.0], [1.4, 0.0], [1.5, 0.0], [-1.449, 0.0407], [0.0, 0.2], [1.0, 0.5]])
+    angle = np.linspace(-np.pi, np.pi, 100_001)
+    surface = np.stack([2.0 * np.cos(angle), np.sin(angle)], axis=1)
+    expected = [-float(np.hypot(*(surface - point).T).min()) for point in points]
+    found = SignedDistance(Expression("x**2 / 4 + y**2 - 1")).gap(points, UP[:6])
+    np.testing.assert_allclose(found, expected, atol=1e-8)  # squares of a hundred-thousandth of the outline
+
+
 def test_a_distance_may_have_corners() -> None:
     apart = "hypot(max(abs(x) - 1, 0), max(abs(y) - 1, 0)) + min(max(abs(x) - 1, abs(y) - 1), 0)"
     box = PolygonalObstacle(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))

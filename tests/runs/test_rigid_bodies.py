@@ -213,6 +213,17 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
     np.testing.assert_allclose(moved.bodies["block"].boundary.displacement, expected, atol=1e-10)
 
 
+def test_a_turning_disc_drags_each_node_by_its_radius() -> None:
+    """Whatever the gap: what a node may touch is a point of the disc, at the end of the gap."""
+    disc = bk.RigidBody(name="punch", obstacle=bk.Circle((1.0, 1.6), 0.5), centre=(1.0, 1.6), turn=0.01)
+    (rows,) = prepare_assembly(replace(PRESSED, rigid=(disc,), law=SOME)).rows
+    assert np.ptp(rows.gap) > 0.1
+    assert isinstance(rows.on_other, np.ndarray)
+    dragged = np.einsum("nkc,ncm,m->nk", rows.frame, rows.on_other, disc.motion)
+    # tangents (-d_y, d_x) of directions d towards the centre run the other way round
+    np.testing.assert_allclose(dragged, np.broadcast_to([0.0, -0.01 * 0.5], dragged.shape), atol=1e-16)
+
+
 def test_a_circle_sticks_below_the_friction_and_is_refused_above() -> None:
     """A flat one: its normals at the nodes differ by 0.02, which friction of 0.3 turns into 2 % of its force."""
     middle = bk.Part("middle", bk.Free(), ("top",), bk.Expression("abs(x - 1) < 0.2"))
@@ -303,7 +314,7 @@ def test_a_side_between_an_elastic_and_a_rigid_body_passes_on_both_tractions() -
 
 
 def test_steps_of_motions_and_forces_follow_each_other() -> None:
-    """Down by force, sideways by motion, and back beyond the start: friction remembers, and one factorisation does for all."""
+    """Down by force, sideways by motion, and back beyond the start: friction remembers."""
     steps = [replace(driven(x=x), law=SOME) for x in (0.0, 1e-3, 1e-2, -1e-2)]
     solutions = bk.run_assembly_history(steps)
     assert [one.is_converged for one in solutions] == [True] * 4
@@ -317,9 +328,9 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
     assert pushed[1].rigid["punch"].y == pytest.approx(2.0 * pushed[0].rigid["punch"].y, rel=1e-10)
     with pytest.raises(bk.InputError, match="rigid body 'punch' changes its shape, its place or what is given of it"):
         bk.run_assembly_history([driven(), driven(force_y=None, y=-1e-3)])
+    more, pair = bk.RigidBody(name="more", obstacle=bk.HalfPlane()), bk.ContactPair(("block.left", "more"))
+    longer = replace(PRESSED, rigid=(PUNCH, more), contacts=(*PRESSED.contacts, pair))
     with pytest.raises(bk.InputError, match="rigid body 'more' changes its shape"):
-        more = (bk.RigidBody(name="more", obstacle=bk.HalfPlane()), bk.ContactPair(("block.left", "more")))
-        longer = replace(PRESSED, rigid=(PUNCH, more[0]), contacts=(*PRESSED.contacts, more[1]))
         bk.run_assembly_history([driven(), longer])
 
 
