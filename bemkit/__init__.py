@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
     from bemkit.contact.polygon import PolygonalObstacle as PolygonalObstacle
+    from bemkit.contact.signed_distance import SignedDistance as SignedDistance
+    from bemkit.contact.spline import SplineObstacle as SplineObstacle
     from bemkit.errors import BemkitError as BemkitError
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
@@ -104,6 +106,7 @@ if TYPE_CHECKING:
     from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
     from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
     from bemkit.scene.mesh_options import MeshOptions as MeshOptions
+    from bemkit.scene.rigid_body import RigidBody as RigidBody
     from bemkit.scene.scene import Scene as Scene
     from bemkit.scene.toml import load_scene as load_scene
     from bemkit.scene.toml import scene_from_toml as scene_from_toml
@@ -121,6 +124,8 @@ _HOME = {
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
+    "contact.signed_distance": ("SignedDistance",),
+    "contact.spline": ("SplineObstacle",),
     "errors": ("BemkitError", "InputError", "NoResultError"),
     "formulas": ("Expression",),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
@@ -156,6 +161,7 @@ _HOME = {
     "scene.copies": ("CircleCopies", "GridCopies", "ListedCopies"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
     "scene.mesh_options": ("MeshOptions",),
+    "scene.rigid_body": ("RigidBody",),
     "scene.scene": ("Scene",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),
     "scene.unit_names": ("UnitNames",),

@@ -194,6 +194,14 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
         )
     if len(solution.contacts) > _MANY_CONTACTS:
         yield "", f"and {len(solution.contacts) - _MANY_CONTACTS} contacts more (--json -)"
+    for body in list(solution.rigid.values())[:_MANY_CONTACTS]:
+        yield (
+            body.name,
+            f"moved by ({body.x:.6g}, {body.y:.6g}), turned by {body.turn:.6g}; "
+            f"force ({body.force_x:.8g}, {body.force_y:.8g}), moment {body.moment:.8g} on it",
+        )
+    if len(solution.rigid) > _MANY_CONTACTS:
+        yield "", f"and {len(solution.rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
     yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
     if solution.estimated_error is not None:
         yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"

@@ -67,7 +67,7 @@ class UnsolvableLoad:
         if np.isnan(self.lift).all():
             how = f"moves {self.who} where no obstacle can meet it"
         elif not self.is_sliding:
-            how = "pushes" if np.ptp(self.motion[:, 0]) < 1e-6 else "tips"
+            how = "pushes" if np.ptp(self.motion[~np.isnan(self.lift), 0]) < 1e-6 else "tips"
             how += f" {self.who} away from the obstacle"
         else:
             how = f"slides {self.who} along the obstacle against all the friction there is"

@@ -64,7 +64,28 @@ class ContactData:
         return np.array_equal(own.nodes, others.nodes) and np.allclose(own.frame, others.frame, rtol=0.0, atol=1e-12)
 
 
-def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> ContactData:
+@dataclass(frozen=True)
+class FacingPart:
+    """A part of the boundary and an obstacle that it may touch; a part that may touch several is listed with each.
+
+    Parameters
+    ----------
+    name : str
+        Of the contact.
+    part : str
+    obstacle : Obstacle
+    is_frictionless : bool
+    """
+
+    name: str
+    part: str
+    obstacle: Obstacle
+    is_frictionless: bool
+
+
+def find_contact(
+    scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, further: Sequence[FacingPart] = ()
+) -> ContactData:
     """Find the nodes that may touch an obstacle, whatever supports hold them.
 
     Parameters
@@ -74,31 +95,36 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
         In physical units.
     space : BoundarySpace
         The displacement space, on the dimensionless mesh.
+    further : sequence of FacingPart, optional
+        Obstacles that the scene does not know of.
 
     Notes
     -----
-    A node of several contact parts belongs to the one whose obstacle is nearest, and to the first of those that are
-    equally near. Where their directions are alike, it stands for its share of all of them. In a corner between two
-    obstacles without friction it touches both, and stands in two rows. With friction two displacements cannot tell four
-    tractions: the share of the other obstacle goes to its next node, as at crosspoints of mortar methods
-    [Wohlmuth2000].
+    A node that may touch several obstacles, of one part or of several, belongs to the nearest, and to the first of
+    those that are equally near. Where the directions of several parts are alike, it stands for its share of all of
+    them. In a corner between two obstacles without friction it touches both, and stands in two rows. With friction two
+    displacements cannot tell four tractions: the share of the other obstacle goes to its next node, as at crosspoints
+    of mortar methods [Wohlmuth2000].
     """
-    obstacles = {
-        part.name: part.condition.obstacle
+    parts = [
+        FacingPart(part.name, part.name, part.condition.obstacle, scene.laws[part.name].is_frictionless)
         for part in scene.parts
         if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
-    }
-    if not obstacles:
+    ]
+    parts += further
+    if not parts:
         none, nowhere = np.zeros(0), np.zeros((0, 2))
         nodes = ContactNodes(none.astype(np.intp), nowhere, contact_frame(nowhere), none, none.astype(bool))
         return ContactData(nodes, (), none, none, none, nowhere)
-    sides = [_Side.of(obstacle, mesh.part(name), mesh, space) for name, obstacle in obstacles.items()]
+    parts, sides = _nearest_of_each_part(
+        parts, [_Side.of(one.obstacle, mesh.part(one.part), mesh, space) for one in parts]
+    )
     owner = _owners(sides, space.n_dofs // 2, GAP_TOLERANCE * mesh.diameter)
     directions = np.zeros((owner.size, 2))
     for number, side in enumerate(sides):
         own = owner[side.nodes] == number
         directions[side.nodes[own]] = side.directions[own]
-    is_smooth = np.array([scene.laws[name].is_frictionless for name in obstacles])
+    is_smooth = np.array([one.is_frictionless for one in parts])
     seconds = [
         is_smooth[number] & is_smooth[owner[side.nodes]] & side.crosses(directions) & (owner[side.nodes] != number)
         for number, side in enumerate(sides)
@@ -112,7 +138,7 @@ def find_contact(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace) -> Cont
         )
         for number, (side, is_second) in enumerate(zip(sides, seconds, strict=True))
     ]
-    return _joined(scene, list(obstacles), kept, space)
+    return _joined(parts, kept, space)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +186,18 @@ class _Side:
         return self.nodes[np.where(is_own, position, np.where(is_own[following], following, before))]
 
 
+def _nearest_of_each_part(parts: Sequence[FacingPart], sides: Sequence[_Side]) -> tuple[list[FacingPart], list[_Side]]:
+    """Leave each node of a part that may touch several obstacles to the nearest of them."""
+    found = []
+    for one, side in zip(parts, sides, strict=True):
+        rivals = [number for number, other in enumerate(parts) if other.part == one.part]
+        nearest = np.argmin([sides[number].gap for number in rivals], axis=0)
+        own = side.take(np.array([parts[rivals[k]] is one for k in nearest.tolist()]))
+        if own.nodes.size:
+            found.append((one, own))
+    return [one for one, _ in found], [side for _, side in found]
+
+
 def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
     """Return (n_nodes,): the side of each node whose obstacle is nearest, -1 for nodes of none."""
     owner, nearest = np.full(n_nodes, -1), np.full(n_nodes, np.inf)
@@ -170,11 +208,10 @@ def _owners(sides: Sequence[_Side], n_nodes: int, same: float) -> IntArray:
     return owner
 
 
-def _joined(scene: Scene, names: Sequence[str], sides: Sequence[_Side], space: BoundarySpace) -> ContactData:
+def _joined(parts: Sequence[FacingPart], sides: Sequence[_Side], space: BoundarySpace) -> ContactData:
     columns = (np.concatenate(column) for column in zip(*(vars(side).values() for side in sides), strict=True))
     nodes, directions, weights, arc_length, gap, facing, points = columns
-    parts = tuple(name for name, side in zip(names, sides, strict=True) for _ in range(side.nodes.size))
-    smooth = {name for name, law in scene.laws.items() if law.is_frictionless}
-    is_frictionless = np.array([part in smooth for part in parts], bool)
+    of_node = [part for part, side in zip(parts, sides, strict=True) for _ in range(side.nodes.size)]
+    is_frictionless = np.array([part.is_frictionless for part in of_node], bool)
     found = ContactNodes(nodes, dof_points(space)[nodes], contact_frame(directions), weights, is_frictionless)
-    return ContactData(found, parts, arc_length, gap, facing, points)
+    return ContactData(found, tuple(part.name for part in of_node), arc_length, gap, facing, points)

@@ -91,10 +91,9 @@ def _sizes(prepared: PreparedAssembly) -> Sizes:
         n_open=sum(int(np.count_nonzero(each.is_retained)) for each in conditions),
         n_contact=prepared.n_contact,
         n_contact_unknowns=2 * prepared.n_contact - int(np.count_nonzero(prepared.tangent_is_eliminated)),
-        n_motions=sum(len(admissible_modes(body.mesh)) for body in bodies),
-        n_free_motions=sum(
-            len(free_modes(body.own_space, each)) for body, each in zip(bodies, conditions, strict=True)
-        ),
+        n_motions=sum(len(admissible_modes(body.mesh)) for body in bodies) + 3 * len(prepared.assembly.rigid),
+        n_free_motions=_n_driven(prepared.assembly)
+        + sum(len(free_modes(body.own_space, each)) for body, each in zip(bodies, conditions, strict=True)),
     )
 
 
@@ -115,9 +114,13 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     if accuracy is not None:
         further = f"until the estimated error is below {accuracy:g}; this plan is for the first meshes"
     yield PlanItem("further meshes", accuracy is not None, further)
-    n_pairs, n_rigid = len(assembly.contacts), sum(rows.other < 0 for rows in prepared.rows)
+    n_pairs = sum(pair.rigid_body is None for pair in assembly.contacts)
+    n_fixed = sum(rows.other < 0 for rows in prepared.rows)
     yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
-    yield PlanItem("rigid obstacles", n_rigid > 0, f"{n_rigid} parts face them" if n_rigid else "no part faces one")
+    yield PlanItem("rigid obstacles", n_fixed > 0, f"{n_fixed} parts face them" if n_fixed else "no part faces one")
+    n_rigid = len(assembly.rigid)
+    moving = f"{n_rigid} in {len(assembly.contacts) - n_pairs} contacts, {_n_driven(assembly)} motions driven by loads"
+    yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
     names = ", ".join(dict.fromkeys(type(rows.law).__name__ for rows in prepared.rows if not rows.law.is_frictionless))
     yield PlanItem("friction", bool(names), f"law {names}" if names else "the law allows no tangential traction")
     form = "one dense matrix of relative displacements" if is_dense else "a sparse system, factored in every step"
@@ -132,6 +135,11 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     yield PlanItem("fields inside the bodies", False, "not asked for; see interior_fields")
     yield PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for")
     yield PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for")
+
+
+def _n_driven(assembly: Assembly) -> int:
+    """Return how many motions of rigid bodies are unknown."""
+    return sum(int(np.count_nonzero(body.is_driven)) for body in assembly.rigid)
 
 
 def _names(bodies: Sequence[PlacedBody]) -> str:

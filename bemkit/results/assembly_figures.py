@@ -14,10 +14,10 @@ from bemkit.results.figures import (
     STATUS_COLOURS,
     contact_figures,
     draw_body,
-    draw_obstacles,
     exaggeration,
     outlines,
 )
+from bemkit.results.obstacle_drawing import draw_obstacles, draw_rigid_bodies
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def all_assembly_figures(solution: AssemblySolution, *, units: UnitNames | None 
 
 
 def draw_deformed_bodies(solution: AssemblySolution, *, units: UnitNames | None = None) -> Figure:
-    """Draw all bodies as they were and deformed, all displacements enlarged by one factor that the picture tells.
+    """Draw all bodies before and after, all displacements enlarged by one factor that the picture tells.
 
     The factor is so small that no body is drawn inside another one by more than a line is thick.
     """
@@ -61,6 +61,7 @@ def draw_deformed_bodies(solution: AssemblySolution, *, units: UnitNames | None 
     axes.set_aspect("equal")
     axes.margins(0.05)
     conditions = [part.condition for body in bodies for part in body.scene.contact_parts]
+    draw_rigid_bodies(axes, [(body, solution.rigid[body.name]) for body in solution.assembly.rigid], factor)
     draw_obstacles(axes, [getattr(condition, "obstacle", None) for condition in conditions])
     _name_axes(axes, solution.title, units)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
@@ -81,6 +82,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: UnitNames | None = No
             axes.plot(*loop.T, color=GREY, linewidth=0.8, zorder=1)
     axes.set_aspect("equal")
     axes.margins(0.05)
+    draw_rigid_bodies(axes, [(body, solution.rigid[body.name]) for body in solution.assembly.rigid], 0.0)
     points = np.stack([table.x, table.y], axis=1)
     largest = float(np.max(-table.sigma_n, initial=0.0))
     length = _comb_length(solution) * np.maximum(-table.sigma_n, 0.0) / (largest or 1.0)

@@ -16,6 +16,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.part_forces import ContactForce
+from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
@@ -88,6 +89,8 @@ class AssemblySolution:
         What was computed; equal to ``plan.work``.
     message : str
     memory : mapping of str to int [bytes]
+    rigid : mapping of str to RigidResult
+        How each rigid body moved and what acts on it, by name.
     warnings : tuple of str
     """
 
@@ -108,6 +111,7 @@ class AssemblySolution:
     work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
+    rigid: Mapping[str, RigidResult] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -182,7 +186,7 @@ class AssemblySolution:
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies."""
         mesh = self.bodies[body].mesh
-        sides = [side.split(".", 1) for pair in self.assembly.contacts for side in pair.sides]
+        sides = [side.split(".", 1) for pair in self.assembly.contacts for side in pair.elastic_sides]
         parts = dict.fromkeys(part for owner, part in sides if owner == body)
         return np.concatenate([np.zeros(0, np.intp), *(mesh.part(part) for part in parts)])
 
@@ -203,6 +207,7 @@ class AssemblySolution:
             **{name: getattr(self, name) for name in ("force_tangential", "energy", "estimated_error")},
             "contacts": [contact.as_dict() for contact in self.contacts],
             "bodies": {name: body.summary() for name, body in self.bodies.items()},
+            "rigid": {name: body.as_dict() for name, body in self.rigid.items()},
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
             "timings": dict(self.timings),

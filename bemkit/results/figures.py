@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, new_figure, panel_above_strip
+from bemkit.results.obstacle_drawing import draw_obstacles
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, with_unit
@@ -316,37 +316,6 @@ def _draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
         axes.axvline(symmetry.x, **style)
     if symmetry is not None and symmetry.y is not None:
         axes.axhline(symmetry.y, **style)
-
-
-def draw_obstacles(axes: Axes, obstacles: Sequence[object]) -> None:
-    """Draw the rigid obstacles whose shape is known, within the frame that the body has set."""
-    from matplotlib.patches import Circle as Disc
-    from matplotlib.patches import Polygon
-
-    frame = np.array([axes.get_xlim(), axes.get_ylim()])
-    reach = 4.0 * float(np.hypot(*(frame[:, 1] - frame[:, 0])))
-    edge: dict[str, Any] = {"edgecolor": "#555555", "linewidth": 1.0}
-    style = {**edge, "facecolor": "#EDEDED", "hatch": "////", "zorder": 0}
-    is_labelled = False
-    for obstacle in obstacles:
-        label = None if is_labelled else "obstacle"
-        match obstacle:
-            case HalfPlane(point=point, normal=normal):
-                inward = -np.array(normal) / np.hypot(*normal)
-                along = np.array([-inward[1], inward[0]])
-                centre = np.array(point) + ((frame.mean(axis=1) - np.array(point)) @ along) * along
-                corners = [centre - reach * along, centre + reach * along]
-                corners += [corner + reach * inward for corner in reversed(corners)]
-                axes.add_patch(Polygon(corners, label=label, **style))
-            case Circle(centre=centre, radius=radius):
-                axes.add_patch(Disc(centre, radius, label=label, **style))
-            case Cavity(centre=centre, radius=radius):
-                axes.add_patch(Disc(centre, radius, label=label, fill=False, **edge))
-            case _:
-                continue
-        is_labelled = True
-    axes.set_xlim(*frame[0])
-    axes.set_ylim(*frame[1])
 
 
 def draw_boundary_traction(solution: Solution, *, units: UnitNames | None = None) -> Figure:

@@ -23,6 +23,7 @@ from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces, nodal_resultants
+from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solution import BoundaryFields
 from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.history import UnsolvableSceneError
@@ -70,7 +71,7 @@ def run_assembly_history(
     Parameters
     ----------
     assemblies : sequence of Assembly
-        The same bodies and contacts under changing loads, gaps or laws.
+        The same bodies and contacts under changing loads, motions, gaps or laws.
     meshes, callback : optional
         As for `run_assembly`.
 
@@ -144,6 +145,10 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
             traction.reshape(-1, 2),
         )
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
+    rigid = {
+        body.name: RigidResult(body.name, *reaction.tolist(), *motion.tolist())
+        for body, (motion, reaction) in zip(prepared.assembly.rigid, model.rigid_bodies(result.state), strict=True)
+    }
     clock = clock.closed(Stage.RECOVER)
     finite = all(np.isfinite(body.energy) and np.isfinite(body.boundary.displacement).all() for body in bodies.values())
     if result.is_converged and not finite:
@@ -166,6 +171,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         plan=plan,
         work=model.work,
         message=result.message,
+        rigid=rigid,
     )
     return replace(solution, warnings=find_assembly_warnings(solution))
 

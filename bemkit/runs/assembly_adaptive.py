@@ -145,7 +145,7 @@ def zone_ends(solution: AssemblySolution) -> list[tuple[str, int, float]]:
     A zone that a single node stands for is not resolved yet: its ends are left alone.
     """
     table = solution.contact
-    sides = {pair.name: pair.sides for pair in solution.assembly.contacts}
+    sides = {pair.name: pair.elastic_sides for pair in solution.assembly.contacts}
     found = []
     for contact in table.parts:
         nodes = table.s[table.rows(contact)]

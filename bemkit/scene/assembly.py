@@ -17,6 +17,7 @@ from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
@@ -30,8 +31,8 @@ class ContactPair:
     Parameters
     ----------
     sides : (str, str)
-        Each ``"body.part"``, or ``"body.side"`` by the name of a side of its shape. Two sides of one body may touch,
-        too, as in a split ring.
+        Each ``"body.part"``, or ``"body.side"`` by the name of a side of its shape; one of them may be the name of a
+        `RigidBody`. Two sides of one body may touch, too, as in a split ring.
     law : FrictionLaw, optional
         That of the assembly if left out.
     gap : float [m]
@@ -39,12 +40,13 @@ class ContactPair:
     interference : float [m]
         Largest overlap of the shapes as they are drawn that is meant; more is an error.
     multipliers_on : str, optional
-        The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`.
+        The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`. Never a rigid body.
 
     Raises
     ------
     InputError
-        If a name has no dot, a side shall touch itself, a length is not finite, or the multipliers are on neither side.
+        If neither name has a dot, a side shall touch itself, a length is not finite, or the multipliers are on neither
+        side.
     """
 
     sides: tuple[str, str]
@@ -55,23 +57,36 @@ class ContactPair:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sides", tuple(self.sides))
-        if len(self.sides) != 2 or any(side.count(".") < 1 for side in self.sides):
-            raise InputError(f"contact sides are {self.sides}: give two, each as 'body.side'")
+        if len(self.sides) != 2 or not self.elastic_sides:
+            raise InputError(
+                f"contact sides are {self.sides}: give two, each as 'body.side', or one as the name of a rigid body"
+            )
         if self.sides[0] == self.sides[1]:
             raise InputError(f"the contact of {self.sides[0]!r} is with itself: give two sides")
         if not np.isfinite(self.gap):
             raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
         if not 0.0 <= self.interference < np.inf:
             raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
-        if self.multipliers_on is not None and self.multipliers_on not in self.sides:
+        if self.multipliers_on is not None and self.multipliers_on not in self.elastic_sides:
             raise InputError(
-                f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides"
+                f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides, "
+                "and not a rigid body"
             )
 
     @property
     def name(self) -> str:
         """What the contact is called in results."""
         return " / ".join(self.sides)
+
+    @property
+    def elastic_sides(self) -> tuple[str, ...]:
+        """The sides of elastic bodies: two, or the one that faces a rigid body."""
+        return tuple(side for side in self.sides if "." in side)
+
+    @property
+    def rigid_body(self) -> str | None:
+        """The name of the rigid body, None between elastic ones."""
+        return next((side for side in self.sides if "." not in side), None)
 
 
 @dataclass(frozen=True)
@@ -107,6 +122,8 @@ class Assembly:
     ----------
     title : str
     bodies : tuple of Body
+    rigid : tuple of RigidBody
+        Obstacles that move; each takes part in a contact.
     contacts : tuple of ContactPair
     touching : Touching, optional
         Finds contacts where bodies face each other, besides those that are listed.
@@ -127,11 +144,13 @@ class Assembly:
     ------
     InputError
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
-        listed twice, or an accuracy is asked of collocation or goes with elements of a body.
+        listed twice, a rigid body takes part in no contact, or an accuracy is asked of collocation or goes with
+        elements of a body.
     """
 
     title: str
     bodies: tuple[Body, ...]
+    rigid: tuple[RigidBody, ...] = ()
     contacts: tuple[ContactPair, ...] = ()
     touching: Touching | None = None
     law: FrictionLaw = field(default_factory=Frictionless)
@@ -148,15 +167,17 @@ class Assembly:
             raise InputError(f"title is {self.title!r}: give one line of printable text")
         if not self.bodies:
             raise InputError("bodies is empty: give at least one body")
-        repeated = [name for name, count in Counter(body.name for body in self.placed_bodies).items() if count > 1]
+        names = Counter([*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)])
+        repeated = [name for name, count in names.items() if count > 1]
         if repeated:
             raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
                 raise InputError(f"contact {pair.name!r} is listed twice: leave one out")
-            for side in pair.sides:
+            for side in pair.elastic_sides:
                 self._check_side(side)
+        self._check_rigid()
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         for body in self.placed_bodies:
@@ -180,6 +201,20 @@ class Assembly:
                     f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
                 )
 
+    def _check_rigid(self) -> None:
+        known = [body.name for body in self.rigid]
+        named = [pair.rigid_body for pair in self.contacts if pair.rigid_body is not None]
+        for name in named:
+            if name not in known:
+                listed = f"the rigid bodies are {', '.join(known)}" if known else "there is no rigid body"
+                raise InputError(
+                    f"a contact names {name!r}: {listed}{closest(name, known)}; write a side of an elastic body as "
+                    "'body.side'"
+                )
+        for name in known:
+            if name not in named:
+                raise InputError(f"rigid body {name!r} touches nothing: list a contact with it, or leave it out")
+
     def _check_side(self, side: str) -> None:
         body, part = side.split(".", 1)
         if body not in self._by_name:
@@ -202,7 +237,7 @@ class Assembly:
         """The parts in contact of each body that is listed as such."""
         named: dict[str, list[str]] = {}
         for pair in self.contacts:
-            for side in pair.sides:
+            for side in pair.elastic_sides:
                 body, part = side.split(".", 1)
                 named.setdefault(body, []).append(part)
         return {body: tuple(dict.fromkeys(parts)) for body, parts in named.items()}

@@ -161,6 +161,8 @@ OBSTACLES = Registry(
         "circle": "bemkit.contact.obstacle:Circle",
         "cavity": "bemkit.contact.obstacle:Cavity",
         "polygon": "bemkit.contact.polygon:PolygonalObstacle",
+        "spline": "bemkit.contact.spline:SplineObstacle",
+        "signed-distance": "bemkit.contact.signed_distance:SignedDistance",
         "gap": "bemkit.contact.obstacle:Gap",
     },
     "bemkit.obstacles",

@@ -7,6 +7,7 @@ alone (``solver = "semismooth-newton"``) or a table with its options (``{ kind =
 from __future__ import annotations
 
 import math
+import re
 import types
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -47,6 +48,7 @@ from bemkit.scene.registry import (
     SOLVERS,
     Registry,
 )
+from bemkit.scene.rigid_body import RigidBody
 from bemkit.solvers.base import ContactSolver
 
 T = TypeVar("T")
@@ -68,6 +70,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
 _NAMED: tuple[tuple[Any, type, str], ...] = (
     (tuple[Part, ...], Part, "parts"),
     (tuple[Body, ...], Body, "bodies"),
+    (tuple[RigidBody, ...], RigidBody, "rigid"),
 )
 """Tuples whose entries stand in tables headed by their names."""
 
@@ -346,8 +349,8 @@ def _named(converter: Converter, wanted: type, heading: str, value: object, _: A
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
-                word = wanted.__name__.lower()
-                raise InputError(f"unknown key 'name': the name of a {word} stands in its heading [{heading}.NAME]")
+                role = re.sub(r"(?<!^)(?=[A-Z])", " ", wanted.__name__).lower()
+                raise InputError(f"unknown key 'name': the name of a {role} stands in its heading [{heading}.NAME]")
             found.append(converter.structure({"name": name, **table}, wanted))
     return tuple(found)
 

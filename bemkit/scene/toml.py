@@ -31,9 +31,10 @@ _SCENE_KEYS = (
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("law", "touching", "mesh", "bodies", "contacts"),
+    *("law", "touching", "mesh", "bodies", "rigid", "contacts"),
 )
 _BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
+_RIGID_KEYS = ("obstacle", "centre", "x", "y", "turn", "force_x", "force_y", "moment")
 _PART_KEYS = ("sides", "where", "condition")
 
 
@@ -166,6 +167,7 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
         for body in table["bodies"]:
             body["parts"] = _named(body.get("parts", []), _PART_KEYS)
         table["bodies"] = _named(table["bodies"], _BODY_KEYS)
+        table["rigid"] = _named(table["rigid"], _RIGID_KEYS)
         return tomli_w.dumps(_ordered(table, _ASSEMBLY_KEYS), multiline_strings=True)
     if not scene.contact_parts:  # nothing to be said about friction, and nothing to iterate
         del table["law"], table["solver"]

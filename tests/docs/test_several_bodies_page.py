@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bemkit import Assembly, Body, ContactPair, Placement, Touching, scene_from_toml
+from bemkit import Assembly, Body, ContactPair, Placement, RigidBody, Touching, scene_from_toml
 from bemkit.model.assembled.prepared import prepare_assembly
 from bemkit.scene import registry as kinds
 from bemkit.scene.toml import SceneError
@@ -23,6 +23,7 @@ TABLES = {
     "Bodies": Body,
     "Placement": Placement,
     "Contacts": ContactPair,
+    "Rigid bodies": RigidBody,
     "Touching": Touching,
 }
 
@@ -46,6 +47,8 @@ def test_every_table_stands_on_the_page_with_its_keys_and_defaults(heading: str)
     rows = table(section(PAGE, heading))
     if heading == "Bodies":
         rows.append(["`name`", "text", "required", "stands in the heading [bodies.NAME]"])
+    if heading == "Rigid bodies":
+        rows.append(["`name`", "text", "required", "stands in the heading [rigid.NAME]"])
     check_keys(TABLES[heading], rows)
 
 

@@ -26,6 +26,9 @@ from bemkit import (
     Placement,
     Pressure,
     Rectangle,
+    RigidBody,
+    SignedDistance,
+    SplineObstacle,
     Touching,
     load_scene,
     scene_from_toml,
@@ -44,6 +47,7 @@ UPPER = Body(
     placement=Placement((0.0, 1.0)),
 )
 PAIR = ContactPair(("upper.bottom", "lower.top"))
+PUNCH = RigidBody(name="punch", obstacle=HalfPlane((0.0, 2.0), (0.0, -1.0)), force_y=-2.0, turn=0.01)
 SMALL = replace(UPPER, parts=UPPER.parts[:1])
 BLOCKS = Assembly(title="Two blocks", bodies=(LOWER, SMALL), contacts=(PAIR,))
 
@@ -95,6 +99,19 @@ def test_every_key_survives_its_text() -> None:
         contacts=(
             ContactPair(("upper-1.tip", "lower-1-1.top"), Coulomb(0.3), 1e-6, 1e-5, "lower-1-1.top"),
             ContactPair(("upper-2.tip", "lower-2-1.top")),
+            ContactPair(("curve", "lower-2-1.right")),
+            ContactPair(("upper-2.tip", "level")),
+        ),
+        rigid=(
+            RigidBody(
+                name="curve",
+                obstacle=SplineObstacle(((0.0, 0.0), (1.0, 0.5), (0.0, 1.0)), is_closed=False),
+                centre=(1.0, 2.0),
+                x=0.0,
+                force_y=-3.0,
+                moment=0.5,
+            ),
+            RigidBody(name="level", obstacle=SignedDistance(Expression("y - x")), force_x=1.0, y=2.0, turn=-0.1),
         ),
         touching=Touching(0.01, Coulomb(0.1)),
         law=Coulomb(0.5),
@@ -125,6 +142,16 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
             "body 'upper' has no part or side 'botom': there are load, bottom, right, top, left; did you mean 'bottom'",
         ),
         ({"contacts": (ContactPair(("upper.load", "lower.top")),)}, "part upper.load is Pressure: a part in contact"),
+        (
+            {"contacts": (PAIR, ContactPair(("punch", "lower.top")))},
+            "a contact names 'punch': there is no rigid body; write",
+        ),
+        (
+            {"rigid": (PUNCH,), "contacts": (ContactPair(("punsh", "lower.top")),)},
+            "a contact names 'punsh': the rigid bodies are punch; did you mean 'punch'?; write a side of",
+        ),
+        ({"rigid": (PUNCH,)}, "rigid body 'punch' touches nothing: list a contact with it, or leave it out"),
+        ({"rigid": (replace(PUNCH, name="lower"),)}, "'lower' is the name of two bodies: give each its own name"),
         ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": ConstantCollocation()}, "has no error estimate"),
         ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": HpGalerkin()}, "degrees rise in scenes of one body"),
         (
@@ -150,11 +177,36 @@ def test_what_does_not_fit_together_is_named(change: dict[str, object], message:
         (lambda: replace(LOWER, name="a.b"), "the body name 'a.b' does not do"),
         (lambda: replace(LOWER, parts=LOWER.parts * 2), "body 'lower': 'base' is the name of two parts"),
         (lambda: replace(LOWER, mesh=MeshOptions(accuracy=1e-3)), "body 'lower': an accuracy is that of all bodies"),
-        (lambda: ContactPair(("upper", "lower.top")), "contact sides are ('upper', 'lower.top'): give two, each as"),
+        (
+            lambda: ContactPair(("upper", "lower")),
+            "contact sides are ('upper', 'lower'): give two, each as 'body.side'",
+        ),
+        (
+            lambda: ContactPair(("upper.top",)),
+            "contact sides are ('upper.top',): give two, each as 'body.side', or one",
+        ),
         (lambda: ContactPair(("upper.top", "upper.top")), "the contact of 'upper.top' is with itself: give two sides"),
         (lambda: ContactPair(PAIR.sides, gap=float("inf")), "gap is inf: give a finite length"),
         (lambda: ContactPair(PAIR.sides, interference=-1.0), "interference is -1.0: give a length, not negative"),
         (lambda: ContactPair(PAIR.sides, multipliers_on="x.y"), "multipliers_on is 'x.y': give one of the two sides"),
+        (
+            lambda: ContactPair(("punch", "lower.top"), multipliers_on="punch"),
+            "contact 'punch / lower.top': multipliers_on is 'punch': give one of the two sides, and not a rigid body",
+        ),
+        (lambda: replace(PUNCH, name=""), "the rigid body name '' does not do: give printable text without a dot"),
+        (lambda: replace(PUNCH, name="a.b"), "the rigid body name 'a.b' does not do"),
+        (
+            lambda: replace(PUNCH, centre=(0.0, float("nan"))),
+            "rigid body 'punch': centre is (0.0, nan): give two finite",
+        ),
+        (lambda: replace(PUNCH, turn=float("inf")), "rigid body 'punch': turn is inf: give a finite number"),
+        (lambda: replace(PUNCH, moment=float("nan"), turn=None), "rigid body 'punch': moment is nan: give a finite"),
+        (lambda: replace(PUNCH, y=-1e-3), "rigid body 'punch': y is -0.001 and force_y is -2.0: give one of them"),
+        (
+            lambda: replace(PUNCH, force_x=0.0, x=0.0),
+            "rigid body 'punch': x is 0.0 and force_x is 0.0: give one of them",
+        ),
+        (lambda: replace(PUNCH, moment=1.0), "rigid body 'punch': turn is 0.01 and moment is 1.0: give one of them"),
         (lambda: Touching(-1.0), "touching.within is -1.0: give a length, zero or positive"),
         (lambda: GridCopies(0), "columns is 0: give a number from 1 to 100000"),
         (lambda: GridCopies(1000, 1000), "columns times rows is 1000000: give a number"),
@@ -176,6 +228,11 @@ def test_bad_values_are_named(make: object, message: str) -> None:
             "bodies.one.shape: missing",
         ),
         ("title = 'a'\n[bodies]", "bodies is empty"),
+        ("title = 'a'\n[bodies]\n[rigid.one]\nx = 1.0", "rigid.one.obstacle: missing"),
+        (
+            "title = 'a'\n[bodies]\n[rigid.one]\nname = 'x'",
+            "rigid.one: unknown key 'name': the name of a rigid body stands",
+        ),
         ("title = 'a'\n[bodies.one]\nname = 'x'", "bodies.one: unknown key 'name': the name of a body stands in its"),
     ],
 )

@@ -33,7 +33,9 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
     """
     contact = joined.contact_forces(state)
     displacement, missed = joined.recover(state)
-    sizes, eps = np.abs(contact) + np.abs(joined.load), float(np.finfo(float).eps)
+    # of forces before they cancel: contact may press a rigid body from all sides, without a resultant
+    nodal = np.abs(joined.weights[:, None] * state.traction).ravel()
+    sizes, eps = abs(joined.relative).T @ nodal + np.abs(joined.load), float(np.finfo(float).eps)
     first = np.cumsum([0, *(member.n_components for member in joined.members)])[:-1]
     largest, total = np.maximum.reduceat(sizes, first), np.add.reduceat(sizes, first)
     # the terms whose differences the forces and the relative displacements are

@@ -45,12 +45,14 @@ def contact_tractions(
         own = traction[first : first + rows.n_contact]
         first += rows.n_contact
         vectors = np.einsum("n,nk,nkc->nc", rows.weights, own, rows.frame)
+        # what is rigid faces a side as a whole, also where another body touches it
+        counts = isinstance(rows.on_other, sparse.csr_array) | np.any(own != 0.0, axis=1)
         for number, coupling, elements, sign in _sides(rows):
             n_nodes = bodies[number].space.n_dofs // 2
             nothing = elements, np.zeros((n_nodes, 2)), np.zeros(n_nodes)
             _, forces, integrals = sides.setdefault((number, elements.tobytes()), nothing)
             forces += sign * (coupling.T @ vectors)
-            integrals += coupling.T @ rows.weights
+            integrals += coupling.T @ np.where(counts, rows.weights, 0.0)
     found: list[list[tuple[IntArray, FloatArray]]] = [[] for _ in bodies]
     for (number, _), (elements, forces, integrals) in sides.items():
         is_reached = integrals > 1e-12 * integrals.max(initial=0.0)
@@ -65,7 +67,7 @@ def contact_tractions(
 def _sides(rows: ContactRows) -> list[tuple[int, sparse.csr_array, IntArray, float]]:
     """Return body, coupling (n, n_nodes), elements and sign of each side that a contact has."""
     sides = [(rows.body, rows.on_body, rows.elements, 1.0)]
-    if rows.on_other is not None:
+    if isinstance(rows.on_other, sparse.csr_array):
         sides.append((rows.other, rows.on_other, rows.other_elements, -1.0))
     return sides
 

@@ -1,4 +1,4 @@
-"""The contacts of an assembly, node by node: between bodies by mortar integrals, and with rigid obstacles."""
+"""The contacts between elastic bodies of an assembly, node by node, by mortar integrals."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import nodes_on
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.mortar.coupling import MortarCoupling, couple
+from bemkit.contact.mortar.coupling import couple
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody
-from bemkit.model.contact_data import find_contact
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.assembly import Assembly, ContactPair
-from bemkit.scene.conditions import Contact
 
 OVERLAP_TOLERANCE = 1e-6
 """Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
@@ -40,10 +38,13 @@ class ContactRows:
     Parameters
     ----------
     name : str
-        Of the contact; of a rigid obstacle ``"body.part"``.
+        Of the contact; of a fixed obstacle ``"body.part"``.
     law : FrictionLaw
+    part : str
+        Of the body, where the nodes are.
     body, other : int
-        The body whose nodes these are (the non-mortar side), and its partner; -1 for a rigid obstacle.
+        The body whose nodes these are (the non-mortar side), and its partner: rigid bodies count on after the elastic
+        ones, and a fixed obstacle is -1.
     nodes : (n,) array
         Scalar dofs of the body.
     points : (n, 2) array [m]
@@ -52,8 +53,10 @@ class ContactRows:
     frame : (n, 2, 2) array
         Direction of contact, out of the body, and tangent.
     weights, gap : (n,) arrays [m]
-    on_body, on_other : sparse (n, n_nodes) arrays
+    on_body : sparse (n, n_nodes) array
         The relative displacement of row i is ``frame[i] @ (on_body[i] @ u - on_other[i] @ u_other)``.
+    on_other : sparse (n, n_nodes) array, (n, 2, 3) array or None
+        Of a rigid body how its motions displace what the nodes may touch.
     elements, other_elements : int arrays
         Of both sides; none of a rigid obstacle.
     is_held : (n,) bool array
@@ -62,6 +65,7 @@ class ContactRows:
 
     name: str
     law: FrictionLaw
+    part: str
     body: int
     other: int
     nodes: IntArray
@@ -71,7 +75,7 @@ class ContactRows:
     weights: FloatArray
     gap: FloatArray
     on_body: sparse.csr_array
-    on_other: sparse.csr_array | None
+    on_other: sparse.csr_array | FloatArray | None
     elements: IntArray
     other_elements: IntArray
     is_held: BoolArray
@@ -102,50 +106,13 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     return (*assembly.contacts, *found)
 
 
-def obstacle_rows(bodies: Sequence[PlacedBody], conditions: Sequence[NodalConditions]) -> Iterator[ContactRows]:
-    """Yield the contacts with rigid obstacles, part by part."""
-    for number, body in enumerate(bodies):
-        if not body.scene.contact_parts:
-            continue
-        found = find_contact(body.scene, body.mesh, body.own_space)
-        frames, fixed = conditions[number].frame, conditions[number].is_fixed
-        parts = np.array(found.parts)
-        for part in body.scene.contact_parts:
-            rows = (parts == part.name) & _approaches(found.nodes.nodes, found.nodes.directions, frames, fixed)
-            nodes = found.nodes.take(rows)
-            if not nodes.nodes.size or not isinstance(part.condition, Contact):
-                continue
-            n_nodes = body.space.n_dofs // 2
-            pick = sparse.csr_array(
-                (np.ones(nodes.nodes.size), (np.arange(nodes.nodes.size), nodes.nodes)), (nodes.nodes.size, n_nodes)
-            )
-            yield ContactRows(
-                f"{body.name}.{part.name}",
-                body.scene.laws[part.name],
-                number,
-                -1,
-                nodes.nodes,
-                found.points[rows],
-                found.arc_length[rows],
-                nodes.frame,
-                nodes.weights * body.mesh.diameter,
-                found.gap[rows],
-                pick,
-                None,
-                body.part_elements(part.name),
-                np.zeros(0, np.intp),
-                fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
-            )
-
-
 def body_rows(
     assembly: Assembly,
-    pairs: Sequence[ContactPair],
     bodies: Sequence[PlacedBody],
     conditions: Sequence[NodalConditions],
     with_obstacles: Sequence[ContactRows],
 ) -> Iterator[ContactRows]:
-    """Yield the contacts between bodies; those with obstacles are known.
+    """Yield the contacts between elastic bodies; those with obstacles and rigid bodies are known.
 
     Notes
     -----
@@ -155,29 +122,32 @@ def body_rows(
     at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
+    pairs = [pair for pair in assembly.contacts if pair.rigid_body is None]
     ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
     lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
     for rows in with_obstacles:
-        taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.name.split(".", 1)[1]))
+        taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.part))
     found: dict[int, ContactRows] = {}
     for k in sorted(range(len(pairs)), key=lambda k: -lengths[k]):
         (first, part, side), (second, _, other_side) = ordered[k]
         own_nodes, normals = nodes_on(side.space, side.elements)
-        held = ~_approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)
+        held = ~approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:
             coupling = couple(side, other_side, without=without, reach=_reach(bodies[first], bodies[second]))
         except ValueError as error:
             raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
-        _check_overlap(pairs[k], coupling, bodies[first], bodies[second])
+        size = min(bodies[number].mesh.diameter for number in (first, second))
+        check_overlap(pairs[k], coupling.overlap, coupling.deepest, size)
         for number, name, one in ordered[k]:
             for node in nodes_on(one.space, one.elements)[0].tolist():
                 taken[number].setdefault(node, name)
         found[k] = ContactRows(
             pairs[k].name,
             assembly.law_of(pairs[k]),
+            part,
             first,
             second,
             coupling.nodes,
@@ -210,7 +180,7 @@ def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str,
     return (one, two) if is_first else (two, one)
 
 
-def _approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
+def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
     """Return (n,) bool: nodes that their supports let move along directions (n, 2)."""
     free = np.where(is_fixed[nodes][:, :, None], 0.0, frame[nodes])
     return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
@@ -220,12 +190,17 @@ def _reach(one: PlacedBody, two: PlacedBody) -> float:
     return 0.5 * min(one.mesh.diameter, two.mesh.diameter)
 
 
-def _check_overlap(pair: ContactPair, coupling: MortarCoupling, one: PlacedBody, two: PlacedBody) -> None:
-    allowed = pair.interference + OVERLAP_TOLERANCE * min(one.mesh.diameter, two.mesh.diameter)
-    if coupling.overlap > allowed:
-        x, y = coupling.deepest
+def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:
+    """Refuse bodies that overlap, at the point `deepest`, by more than the interference of their contact.
+
+    Raises
+    ------
+    OverlapError
+    """
+    if overlap > pair.interference + OVERLAP_TOLERANCE * size:
+        x, y = deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {coupling.overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
+            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
             f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
         )
 

@@ -18,7 +18,9 @@ from bemkit.model.assembled.contact_tractions import contact_tractions
 from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
+from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
 from bemkit.model.boundary_tractions import insert_loads
+from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -63,7 +65,8 @@ class AssembledModel:
             for each, inside in zip(self.elastic, prepared.insides, strict=True)
         )
         offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
-        body = self.body.under([each.load for each in condensed], offset)
+        loads = [*(each.load for each in condensed), *(member.load for member in rigid_members(prepared))]
+        body = self.body.under(loads, offset)
         if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
             body = replace(body, tangent_is_eliminated=is_eliminated)
         return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work)
@@ -80,7 +83,7 @@ class AssembledModel:
         prepared, units = self.prepared, self.prepared.units
         of_contacts = contact_tractions(prepared.bodies, prepared.rows, state.traction * units.stress)
         fields: list[tuple[FloatArray, FloatArray, float]] = []
-        unknowns = self.body.member_displacements(state)
+        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
         for body, elastic, condensed, own in zip(
             self.prepared.bodies, self.elastic, self.condensed, unknowns, strict=True
         ):
@@ -97,6 +100,30 @@ class AssembledModel:
             energy = _energy(body, elastic, displacement, force) * self.prepared.force_unit * units.displacement
             fields.append((body.to_place(displacement) * units.displacement, traction, energy))
         return fields
+
+    def rigid_bodies(self, state: ContactState) -> list[tuple[FloatArray, FloatArray]]:
+        """Return motion (3,) [m, m, rad] and reaction (3,) [N/m, N/m, N m/m] of each rigid body in a contact state.
+
+        The reaction is what acts on it besides its contacts, about its centre: the load that is given, or what it takes
+        to move it as it is told.
+        """
+        prepared, units = self.prepared, self.prepared.units
+        unknowns = iter(self.body.member_displacements(state)[len(prepared.bodies) :])
+        traction, begin = state.traction * units.stress, 0
+        reactions = np.zeros((len(prepared.assembly.rigid), 3))
+        for rows in prepared.rows:
+            if isinstance(rows.on_other, np.ndarray):
+                own = traction[begin : begin + rows.n_contact]
+                forces = rows.weights[:, None] * np.einsum("nk,nkc->nc", own, rows.frame)
+                reactions[rows.other - len(prepared.bodies)] += np.einsum("nc,ncm->m", forces, rows.on_other)
+            begin += rows.n_contact
+        found = []
+        for body, reaction in zip(prepared.assembly.rigid, reactions, strict=True):
+            motion, is_driven = body.motion, body.is_driven
+            if is_driven.any():
+                motion[is_driven] = next(unknowns) * units.displacement / motion_units(units)[is_driven]
+            found.append((motion, reaction))
+        return found
 
 
 def _energy(body: PlacedBody, elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> float:
@@ -145,7 +172,7 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
         for each, body, first in zip(maps, bodies, _firsts(bodies), strict=True)
     )
     joined = JoinedBodies(
-        members=members,
+        members=(*members, *rigid_members(prepared)),
         relative=_relative(prepared),
         offset=_offset(prepared),
         weights=prepared.column("weights") / prepared.units.length,
@@ -208,29 +235,38 @@ def _nodal(body: PlacedBody, conditions: NodalConditions) -> tuple[sparse.csr_ar
     return matrix, given.ravel()
 
 
-def _in_frames(rows: ContactRows, on_nodes: sparse.csr_array) -> sparse.csr_array:
-    """Return the (n, t) components (2 n, 2 n_nodes) of what a coupling (n, n_nodes) makes of nodal displacements."""
+def _couplings(rows: ContactRows, units: Units) -> list[tuple[int, sparse.csr_array]]:
+    """Return the bodies that a contact involves, and how their nodes, or a rigid body's motions, enter it."""
     n = rows.n_contact
-    blocks = sparse.bsr_array((rows.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n))
-    return sparse.csr_array(blocks @ sparse.kron(on_nodes, sparse.eye_array(2), format="csr"))
-
-
-def _couplings(rows: ContactRows) -> list[tuple[int, sparse.csr_array]]:
-    """Return the bodies that a contact involves, and how their nodes enter it."""
-    found = [(rows.body, _in_frames(rows, rows.on_body))]
-    if rows.on_other is not None:
-        found.append((rows.other, -_in_frames(rows, rows.on_other)))
+    to_frames = sparse.bsr_array((rows.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n))
+    found = [(rows.body, sparse.csr_array(to_frames @ _of_nodes(rows.on_body)))]
+    if isinstance(rows.on_other, np.ndarray):
+        by_motions = sparse.csr_array((rows.on_other / motion_units(units)).reshape(2 * n, 3))
+        found.append((rows.other, sparse.csr_array(-(to_frames @ by_motions))))
+    elif rows.on_other is not None:
+        found.append((rows.other, sparse.csr_array(-(to_frames @ _of_nodes(rows.on_other)))))
     return found
+
+
+def _of_nodes(coupling: sparse.csr_array) -> sparse.csr_array:
+    """Return what a coupling (n, n_nodes) makes of nodal displacements in x and y, (2 n, 2 n_nodes)."""
+    return sparse.csr_array(sparse.kron(coupling, sparse.eye_array(2), format="csr"))
+
+
+def _moved(prepared: PreparedAssembly) -> list[tuple[sparse.csr_array, FloatArray]]:
+    """Return `_nodal` of all bodies, and the like of the rigid ones and their motions."""
+    elastic = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    return [*elastic, *(rigid_motions(body, prepared.units) for body in prepared.assembly.rigid)]
 
 
 def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
-    nodal = [_nodal(*pair)[0] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    nodal = [matrix for matrix, _ in _moved(prepared)]
     sizes = [matrix.shape[1] for matrix in nodal]
     first = np.concatenate([[0], np.cumsum(sizes)])
     data, row, column, begin = [], [], [], 0
     for rows in prepared.rows:
-        for number, coupling in _couplings(rows):
+        for number, coupling in _couplings(rows, prepared.units):
             block = sparse.coo_array(coupling @ nodal[number])
             data.append(block.data)
             row.append(block.row + begin)
@@ -246,9 +282,11 @@ def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
 
 
 def _offset(prepared: PreparedAssembly) -> FloatArray:
-    """Return the relative displacements (2 n_contact,) that supports prescribe."""
-    given = [_nodal(*pair)[1] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    """Return the relative displacements (2 n_contact,) that supports and motions of rigid bodies prescribe."""
+    given = [values for _, values in _moved(prepared)]
     parts = [np.zeros(0)]
     for rows in prepared.rows:
-        parts.append(np.sum([coupling @ given[number] for number, coupling in _couplings(rows)], axis=0))
+        parts.append(
+            np.sum([coupling @ given[number] for number, coupling in _couplings(rows, prepared.units)], axis=0)
+        )
     return np.concatenate(parts)

@@ -67,6 +67,12 @@ class PlacedBody:
         """The space of the displacements on the dimensionless own mesh; its nodes have the same numbers."""
         return self.scene.discretisation.displacement_space(self.own_mesh.unit)
 
+    @cached_property
+    def space_in_place(self) -> BoundarySpace:
+        """The space of the displacements on the dimensionless mesh in place."""
+        is_own = self.own_mesh is self.mesh
+        return self.own_space if is_own else self.scene.discretisation.displacement_space(self.mesh.unit)
+
     def part_elements(self, part: str) -> IntArray:
         """Return the elements of a part."""
         return self.mesh.part(part)

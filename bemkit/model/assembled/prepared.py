@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 
 import numpy as np
+from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
+from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
+from bemkit.model.assembled.obstacles import obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
@@ -24,6 +28,7 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
+from bemkit.scene.rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +128,18 @@ class PreparedAssembly:
         ----------
         assembly : Assembly
             Differs in numbers of conditions and contacts alone.
+
+        Raises
+        ------
+        InputError
+            If a rigid body becomes another one, or a load drives another of its motions.
         """
+        for body, other in zip_longest(self.assembly.rigid, assembly.rigid):
+            if body is None or other is None or _layout(body) != _layout(other):
+                raise InputError(
+                    f"rigid body {(body or other).name!r} changes its shape, its place or what is given of it: change "
+                    "numbers only, or run the assembly on its own"
+                )
         bodies = tuple(
             replace(body, body=other, scene=assembly.scene_of(other))
             for body, other in zip(self.bodies, assembly.placed_bodies, strict=True)
@@ -159,15 +175,17 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     numbers = {body.name: body for body in bodies}
     length = max(body.mesh.diameter for body in bodies)
     moduli = [
-        1.0 / sum(1.0 / numbers[side.split(".", 1)[0]].material.plane_modulus for side in pair.sides)
+        1.0 / sum(1.0 / numbers[side.split(".", 1)[0]].material.plane_modulus for side in pair.elastic_sides)
         for pair in assembly.contacts
     ]
     modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))
     sizes = [largest_sizes(body.scene, body.mesh, length) for body in bodies]
-    overlap = max((max(-pair.gap, pair.interference) for pair in assembly.contacts), default=0.0)
-    stress = max(
-        *(load for load, _, _ in sizes), max([overlap, *(motion for _, motion, _ in sizes)]) / length * modulus
-    )
+    motions = [motion for _, motion, _ in sizes]
+    motions += [max(-pair.gap, pair.interference) for pair in assembly.contacts]
+    motions += [float(np.abs(body.motion / [1.0, 1.0, 1.0 / length]).max()) for body in assembly.rigid]
+    loads = [load for load, _, _ in sizes]
+    loads += [float(np.abs(body.load / [length, length, length**2]).max()) for body in assembly.rigid]
+    stress = max(*loads, max(motions) / length * modulus)
     stress = stress or max(gap for _, _, gap in sizes) / length * modulus or modulus
     units = Units(np.mean([body.mesh.centre for body in bodies], axis=0), length, modulus, stress)
     units.check_range()
@@ -182,16 +200,15 @@ def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) 
         supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
         conditions.append(supported(body.own_space, supports))
         in_place = body.units(units.modulus, force_unit, body.mesh)
-        space = (
-            body.own_space
-            if body.own_mesh is body.mesh
-            else body.scene.discretisation.displacement_space(body.mesh.unit)
-        )
-        forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, space, in_place)))
-    with_obstacles = tuple(obstacle_rows(bodies, conditions))
-    rows = (*body_rows(assembly, assembly.contacts, bodies, conditions, with_obstacles), *with_obstacles)
+        forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
+    with_obstacles = tuple(obstacle_rows(assembly, bodies, conditions))
+    rows = (*body_rows(assembly, bodies, conditions, with_obstacles), *with_obstacles)
     retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units)
     return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
+
+
+def _layout(body: RigidBody) -> tuple[object, ...]:
+    return body.name, body.obstacle, body.centre, body.is_driven.tolist()
 
 
 def _insides(bodies: Sequence[PlacedBody], units: Units) -> tuple[ForcesInside | None, ...]:
@@ -217,7 +234,7 @@ def _retained(
     touched = [np.zeros(body.space.n_dofs // 2, bool) for body in bodies]
     for one in rows:
         touched[one.body][one.on_body.indices] = True
-        if one.on_other is not None:
+        if isinstance(one.on_other, sparse.csr_array):
             touched[one.other][one.on_other.indices] = True
     for group in groups(bodies):
         union = np.any([touched[number] for number in group], axis=0)

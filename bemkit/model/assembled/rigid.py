@@ -1,0 +1,46 @@
+"""Rigid bodies as members without stiffness, whose unknowns are the motions that loads drive."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.joined.member import Member
+from bemkit.model.assembled.prepared import PreparedAssembly
+from bemkit.model.prepared import Units
+from bemkit.scene.rigid_body import RigidBody
+
+
+def motion_units(units: Units) -> FloatArray:
+    """Return (3,) the lengths [-, -, m] by which motions x, y, turn become displacements."""
+    return np.array([1.0, 1.0, units.length])
+
+
+def rigid_motions(body: RigidBody, units: Units) -> tuple[sparse.csr_array, FloatArray]:
+    """Return how the unknown motions (n_driven,) move a rigid body.
+
+    Returns
+    -------
+    sparse (3, n_driven) array, (3,) array
+        Dimensionless motions x, y, turn are the product, and the array what is given.
+    """
+    chosen = sparse.csr_array(np.eye(3)[:, body.is_driven])
+    return chosen, body.motion * motion_units(units) / units.displacement
+
+
+def rigid_members(prepared: PreparedAssembly) -> tuple[Member, ...]:
+    """Return a member for each rigid body that loads drive.
+
+    What is rigid yields less than anything: its modulus is the largest of all bodies, so that its partners decide.
+    """
+    units = prepared.units
+    modulus = max(body.material.plane_modulus for body in prepared.bodies) / units.modulus
+    members = []
+    for body in prepared.assembly.rigid:
+        is_driven = body.is_driven
+        n_driven = int(np.count_nonzero(is_driven))
+        if n_driven:
+            load = (body.load / motion_units(units) / prepared.force_unit)[is_driven]
+            members.append(Member(np.zeros((n_driven, n_driven)), load, np.eye(n_driven), modulus, body.name))
+    return tuple(members)

@@ -1,0 +1,148 @@
+"""Rigid obstacles in figures: where they stand, and those that move where they are in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
+from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.signed_distance import SignedDistance
+from bemkit.contact.spline import SplineObstacle
+from bemkit.errors import InputError
+from bemkit.formulas import evaluate_field
+from bemkit.results.drawing import GREY
+from bemkit.results.rigid_result import RigidResult
+from bemkit.scene.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_EDGE = "#555555"
+_FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
+_EMPTY: dict[str, Any] = {"fill": False, "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
+_BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
+_POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID = 181, 12, 301
+
+
+def draw_obstacles(axes: Axes, obstacles: Sequence[object]) -> None:
+    """Draw the fixed obstacles whose shape is known, within the frame that the body has set."""
+    frame = _frame(axes)
+    is_labelled = False
+    for obstacle in obstacles:
+        loops = outline_of(obstacle, frame)
+        if loops:
+            _draw(axes, loops, _EMPTY if _is_hollow(obstacle) else _FILLED, None if is_labelled else "obstacle")
+            is_labelled = True
+    _set_frame(axes, frame)
+
+
+def draw_rigid_bodies(axes: Axes, bodies: Iterable[tuple[RigidBody, RigidResult]], factor: float) -> None:
+    """Draw rigid bodies whose shape is known, before they move and after it, their motions times a factor.
+
+    The frame grows to hold them, by half its size at most.
+    """
+    frame = _frame(axes)
+    farthest = 0.5 * float(np.ptp(frame, axis=1).max())
+    widest = np.stack([frame[:, 0] - farthest, frame[:, 1] + farthest], axis=1)
+    is_labelled = False
+    for body, result in bodies:
+        loops = outline_of(body.obstacle, widest)
+        if not loops:
+            continue
+        motion = factor * np.array([result.x, result.y, result.turn])
+        moved = [loop + body.motions_at(loop) @ motion for loop in loops]
+        _draw(axes, loops, _BEFORE, None)
+        _draw(axes, moved, _EMPTY if _is_hollow(body.obstacle) else _FILLED, None if is_labelled else "rigid body")
+        is_labelled = True
+        if not _is_endless(body.obstacle):
+            places = np.clip(np.concatenate([*loops, *moved]), widest[:, 0], widest[:, 1])
+            frame = np.stack(
+                [np.minimum(frame[:, 0], places.min(axis=0)), np.maximum(frame[:, 1], places.max(axis=0))], axis=1
+            )
+    _set_frame(axes, frame)
+
+
+def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
+    """Return the closed loops (n, 2) [m] of an obstacle, as far as they are near a frame; none if they are not known.
+
+    Parameters
+    ----------
+    obstacle : object
+    frame : (2, 2) array [m]
+        Least and largest x, least and largest y. What has no end is cut where it is far beyond.
+    """
+    reach = 4.0 * float(np.hypot(*np.ptp(frame, axis=1)))
+    match obstacle:
+        case HalfPlane(point=point, normal=normal):
+            inward = -np.array(normal) / np.hypot(*normal)
+            along = np.array([-inward[1], inward[0]])
+            centre = np.array(point) + ((frame.mean(axis=1) - np.array(point)) @ along) * along
+            surface = np.array([centre - reach * along, centre + reach * along])
+            return [np.concatenate([surface, surface[::-1] + reach * inward])]
+        case Circle(centre=centre, radius=radius) | Cavity(centre=centre, radius=radius):
+            angle = np.linspace(0.0, 2.0 * np.pi, _POINTS_OF_CIRCLE)
+            return [np.array(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)]
+        case PolygonalObstacle(vertices=vertices):
+            return [np.array(vertices, dtype=float)]
+        case SplineObstacle(is_closed=True):
+            return [obstacle.curve(_POINTS_OF_SPAN)]
+        case SplineObstacle():
+            curve = obstacle.curve(_POINTS_OF_SPAN)
+            first, last = curve[0] - curve[1], curve[-1] - curve[-2]
+            begin = curve[0] + reach * first / np.hypot(*first)
+            end = curve[-1] + reach * last / np.hypot(*last)
+            chord = (end - begin) / np.hypot(*(end - begin))
+            left = reach * np.array([-chord[1], chord[0]])
+            return [np.concatenate([[begin], curve, [end], [end + left], [begin + left]])]
+        case SignedDistance(distance=distance):
+            return _where_negative(distance, frame)
+    return []
+
+
+def _where_negative(distance: Any, frame: FloatArray) -> list[FloatArray]:
+    """Return the loops around where a function is negative in a frame; none if it is not defined all over it."""
+    from contourpy import FillType, contour_generator
+
+    x, y = (np.linspace(low, high, _POINTS_OF_GRID) for low, high in frame.tolist())
+    points = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    try:
+        values = evaluate_field(distance, points).reshape(y.size, x.size)
+    except InputError:
+        return []
+    filled: Any = contour_generator(x, y, values, fill_type=FillType.OuterOffset).filled(-np.inf, 0.0)
+    return [
+        np.asarray(loop) for polygon, bounds in zip(*filled, strict=True) for loop in np.split(polygon, bounds[1:-1])
+    ]
+
+
+def _is_hollow(obstacle: object) -> bool:
+    """Whether an obstacle fills the outside of its outline."""
+    if isinstance(obstacle, SplineObstacle) and obstacle.is_closed:
+        x, y = obstacle.curve().T
+        return bool(np.sum(x[:-1] * np.diff(y) - y[:-1] * np.diff(x)) < 0.0)
+    return isinstance(obstacle, Cavity)
+
+
+def _is_endless(obstacle: object) -> bool:
+    return isinstance(obstacle, HalfPlane) or (isinstance(obstacle, SplineObstacle) and not obstacle.is_closed)
+
+
+def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str | None) -> None:
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    outline = Path.make_compound_path(*(Path(np.vstack([loop, loop[:1]]), closed=True) for loop in loops))
+    axes.add_patch(PathPatch(outline, label=label, **style))
+
+
+def _frame(axes: Axes) -> FloatArray:
+    return np.array([axes.get_xlim(), axes.get_ylim()])
+
+
+def _set_frame(axes: Axes, frame: FloatArray) -> None:
+    axes.set_xlim(*frame[0])
+    axes.set_ylim(*frame[1])

@@ -1,0 +1,91 @@
+"""Rigid bodies among the elastic ones of an assembly: obstacles that move as they are told, or as forces drive them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.obstacle import Obstacle, check_pair
+from bemkit.errors import InputError
+
+COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
+"""The three motions of a plane rigid body, each with the load that does work on it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidBody:
+    """A rigid obstacle that moves.
+
+    Of each motion and its load one is given, and the other follows; what is given of neither does not move.
+
+    Parameters
+    ----------
+    name : str
+        Without a dot: contacts name the body by it, ``("plate.top", "punch")``.
+    obstacle : Obstacle
+        Its shape, where it stands before it moves.
+    centre : (float, float) [m]
+        The point whose motion is `x`, `y`, about which it turns, and where its forces act.
+    x, y : float, optional [m]
+    turn : float, optional [rad]
+        Anticlockwise; small, as all motions are: a point at r from the centre moves by ``turn`` times r turned by 90
+        degrees.
+    force_x, force_y : float, optional [N/m]
+    moment : float, optional [N m/m]
+        About the centre, anticlockwise.
+
+    Raises
+    ------
+    InputError
+        If the name is empty or has a dot, a number is not finite, or a motion is given together with its load.
+    """
+
+    name: str
+    obstacle: Obstacle
+    centre: tuple[float, float] = (0.0, 0.0)
+    x: float | None = None
+    y: float | None = None
+    turn: float | None = None
+    force_x: float | None = None
+    force_y: float | None = None
+    moment: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name or not self.name.isprintable() or "." in self.name:
+            raise InputError(f"the rigid body name {self.name!r} does not do: give printable text without a dot")
+        object.__setattr__(self, "centre", tuple(self.centre))
+        check_pair(f"rigid body {self.name!r}: centre", self.centre)
+        for motion, load in COMPONENTS:
+            for key in (motion, load):
+                value = getattr(self, key)
+                if value is not None and not math.isfinite(value):
+                    raise InputError(f"rigid body {self.name!r}: {key} is {value}: give a finite number")
+            if getattr(self, motion) is not None and getattr(self, load) is not None:
+                raise InputError(
+                    f"rigid body {self.name!r}: {motion} is {getattr(self, motion)} and {load} is "
+                    f"{getattr(self, load)}: give one of them, the other follows"
+                )
+
+    @property
+    def is_driven(self) -> BoolArray:
+        """(3,) bool array: the motions x, y, turn that a load drives, and that are unknown."""
+        return np.array([getattr(self, load) is not None for _, load in COMPONENTS])
+
+    @property
+    def motion(self) -> FloatArray:
+        """(3,) array [m, m, rad]: the given motions, zero where a load is given."""
+        return np.array([getattr(self, motion) or 0.0 for motion, _ in COMPONENTS])
+
+    @property
+    def load(self) -> FloatArray:
+        """(3,) array [N/m, N/m, N m/m]: the given loads, zero where a motion is given."""
+        return np.array([getattr(self, load) or 0.0 for _, load in COMPONENTS])
+
+    def motions_at(self, points: FloatArray) -> FloatArray:
+        """Return (n, 2, 3): how the motions x, y, turn displace points (n, 2) [m] of the body."""
+        x, y = (points - np.array(self.centre)).T
+        one, zero = np.ones_like(x), np.zeros_like(x)
+        return np.stack([np.stack([one, zero, -y], axis=1), np.stack([zero, one, x], axis=1)], axis=1)

@@ -1,0 +1,125 @@
+"""Every obstacle whose outline is known is drawn where it stands, of one body and of several."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import bemkit as bk
+from bemkit.results.figures import draw_deformation
+from bemkit.results.obstacle_drawing import draw_obstacles, draw_rigid_bodies, outline_of
+from bemkit.results.rigid_result import RigidResult
+
+FRAME = np.array([[-3.0, 3.0], [-2.0, 2.0]])
+ROUND = tuple((float(np.cos(angle)), float(np.sin(angle))) for angle in np.linspace(0.0, 2.0 * np.pi, 64)[:-1])
+OUTLINES = [
+    (bk.HalfPlane((0.0, -0.5), (0.1, 1.0)), 1e-12),
+    (bk.Circle((0.2, 0.3), 1.0), 1e-12),
+    (bk.Cavity((0.2, 0.3), 1.5), 1e-12),
+    (bk.PolygonalObstacle(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))), 1e-12),
+    (bk.SplineObstacle(ROUND), 1e-12),
+    (bk.SplineObstacle(((2.0, 0.0), (1.0, 0.3), (-1.0, 0.3), (-2.0, 0.0)), is_closed=False), 1e-12),
+    (bk.SignedDistance(bk.Expression("x**2 / 4 + y**2 - 1")), 1e-3),  # found on a grid
+]
+"""With the accuracy of their outlines."""
+
+
+@pytest.mark.parametrize(("obstacle", "accuracy"), OUTLINES)
+def test_outlines_lie_on_the_surface(obstacle: bk.Obstacle, accuracy: float) -> None:
+    (loop,) = outline_of(obstacle, FRAME)
+    inside = loop[(np.abs(loop) <= 1.05 * FRAME[:, 1]).all(axis=1)] if len(loop) > 4 else loop[:2]
+    assert len(inside) >= 2
+    np.testing.assert_allclose(obstacle.gap(inside, np.zeros_like(inside)), 0.0, atol=accuracy)
+
+
+@pytest.mark.parametrize("obstacle", [bk.Gap(0.1), bk.SignedDistance(bk.Expression("y - sqrt(x)"))])
+def test_what_has_no_outline_in_the_frame_is_left_out(obstacle: bk.Obstacle) -> None:
+    assert outline_of(obstacle, FRAME) == []
+    axes = Figure().add_subplot()
+    axes.set_xlim(-1.0, 1.0)
+    draw_obstacles(axes, [obstacle, None])
+    assert not axes.patches
+
+
+@pytest.mark.parametrize("obstacle", [obstacle for obstacle, _ in OUTLINES])
+def test_obstacles_are_drawn_and_filled_on_their_side(obstacle: bk.Obstacle) -> None:
+    axes = Figure().add_subplot()
+    axes.set_xlim(*FRAME[0])
+    axes.set_ylim(*FRAME[1])
+    draw_obstacles(axes, [obstacle, obstacle])
+    first, second = axes.patches
+    assert (first.get_label(), second.get_label()) == ("obstacle", "_nolegend_") or second.get_label() != "obstacle"
+    assert first.get_fill() is not isinstance(obstacle, bk.Cavity)
+    assert (axes.get_xlim(), axes.get_ylim()) == ((-3.0, 3.0), (-2.0, 2.0))
+    if first.get_fill():
+        points = np.random.default_rng(0).uniform(-1.9, 1.9, (300, 2))
+        gap = obstacle.gap(points, np.zeros_like(points))
+        is_clear = np.abs(gap) > 2e-3
+        np.testing.assert_array_equal(first.get_path().contains_points(points[is_clear]), gap[is_clear] < 0.0)
+
+
+def test_a_clockwise_spline_is_empty() -> None:
+    axes = Figure().add_subplot()
+    draw_obstacles(axes, [bk.SplineObstacle(ROUND[::-1])])
+    assert not axes.patches[0].get_fill()
+
+
+def test_rigid_bodies_are_drawn_before_and_after_and_widen_the_frame() -> None:
+    axes = Figure().add_subplot()
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.0)
+    body = bk.RigidBody(name="disc", obstacle=bk.Circle((0.5, 1.2), 0.2), centre=(0.5, 1.2))
+    result = RigidResult("disc", 0.0, 0.0, 0.0, 0.01, -0.02, 0.0)
+    draw_rigid_bodies(axes, [(body, result)], 10.0)
+    before, after = (patch.get_path().vertices for patch in axes.patches)
+    np.testing.assert_allclose(after - before, np.broadcast_to([0.1, -0.2], after.shape), atol=1e-12)
+    assert axes.get_xlim() == (0.0, 1.0)
+    assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
+    draw_rigid_bodies(axes, [(replace(body, obstacle=bk.HalfPlane((0.0, 3.0))), result)], 10.0)
+    assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
+
+
+def test_a_turn_is_drawn_about_the_centre() -> None:
+    axes = Figure().add_subplot()
+    body = bk.RigidBody(name="bar", obstacle=bk.PolygonalObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 0.1))))
+    draw_rigid_bodies(axes, [(body, RigidResult("bar", 0.0, 0.0, 0.0, 0.0, 0.0, 0.01))], 5.0)
+    np.testing.assert_allclose(axes.patches[1].get_path().vertices[1], [2.0, 0.1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        bk.SplineObstacle(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+        bk.SignedDistance(bk.Expression("hypot(x - 0.5, y + 1) - 1")),
+        bk.PolygonalObstacle(tuple((0.5 + x, y - 1.0) for x, y in ROUND)),
+    ],
+)
+def test_scenes_of_one_body_take_and_draw_them(obstacle: bk.Obstacle) -> None:
+    """Instead of a circle, whose force they have to their accuracy."""
+
+    def pressed(obstacle: bk.Obstacle) -> bk.Solution:
+        return bk.run(
+            bk.Scene(
+                title="Pressed",
+                shape=bk.Rectangle(1.0, 1.0),
+                material=bk.Material(1.0, 0.3),
+                parts=(
+                    bk.Part("top", bk.PrescribedDisplacement(y=-0.01), ("top",)),
+                    bk.Part("left", bk.Roller(), ("left",)),
+                    bk.Part("bottom", bk.Contact(obstacle), ("bottom",)),
+                ),
+                mesh=bk.MeshOptions(elements=40),
+                discretisation=bk.QuadraticGalerkin(),
+            )
+        )
+
+    solution = pressed(obstacle)
+    assert solution.is_converged
+    # 63 corners reach within 1.2e-3 of the circle, an eighth of the motion
+    accuracy = 0.2 if isinstance(obstacle, bk.PolygonalObstacle) else 1e-4
+    assert solution.force_normal == pytest.approx(pressed(bk.Circle((0.5, -1.0), 1.0)).force_normal, rel=accuracy)
+    figure = draw_deformation(solution)
+    assert "obstacle" in [text.get_text() for text in figure.legends[0].get_texts()]
