@@ -11,6 +11,7 @@ from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import LARGEST_KRYLOV_ERROR
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
@@ -51,19 +52,24 @@ def random_assembly(seed: int, index: int) -> RandomAssembly:
     draw = Draw(np.random.PCG64([seed, index, _STREAM]))
     members = Members.drawn(draw)
     layout = random_layout(draw, members)
+    discretisation = members.discretisation()
+    spaces = [discretisation if body.discretisation is None else body.discretisation for body in layout.bodies]
+    symmetric = all(space.is_symmetric for space in spaces) and not any(
+        Krylov().error_at(body.material) > LARGEST_KRYLOV_ERROR for body in layout.bodies
+    )
     assembly = Assembly(
         title=f"random assembly {index} of seed {seed}",
         bodies=layout.bodies,
         contacts=layout.contacts,
         touching=layout.touching,
         law=members.law(),
-        discretisation=members.discretisation(),
-        linear_solver=draw.one_of((Automatic(), Automatic(), Automatic(), DenseCholesky(), Krylov())),
+        discretisation=discretisation,
+        linear_solver=draw.one_of((Automatic(), Automatic(), DenseCholesky(), Krylov() if symmetric else Automatic())),
         solver=_solver(draw),
     )
-    if draw.chance(0.04):
+    if all(space.estimates_error for space in spaces) and draw.chance(0.05):
         bodies = tuple(replace(body, mesh=None) for body in assembly.bodies)
-        mesh = MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(20, 60)))
+        mesh = MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 80)))
         assembly = replace(assembly, bodies=bodies, mesh=mesh)
     elsewhere = _similarity(draw).apply(assembly)
     return RandomAssembly(seed, index, _history(draw, elsewhere))

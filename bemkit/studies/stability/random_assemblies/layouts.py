@@ -47,7 +47,7 @@ def random_layout(draw: Draw, members: Members) -> Layout:
 
 def _base(draw: Draw, side: str) -> tuple[Part, ...]:
     """Draw what holds a body from below: now and then nothing."""
-    weights = {"clamped": 6.0, "given": 1.0, "rollers": 0.7, "obstacle": 1.0, "none": 0.4}
+    weights = {"clamped": 6.0, "given": 1.0, "rollers": 0.4, "obstacle": 0.7, "none": 0.2}
     match draw.one_by_weight(weights):
         case "clamped":
             return (Part("base", Clamped(), (side,)),)

@@ -73,7 +73,7 @@ class Members:
             placement=placement,
             copies=copies,
             discretisation=self._discretisation() if self.has_mixed_spaces else None,
-            mesh=self._mesh(),
+            mesh=self._mesh(sum(len(loop) for loop in shape.outline().loops)),
         )
 
     def _material(self) -> Material:
@@ -96,16 +96,16 @@ class Members:
         """Draw the discretisation of bodies that have none of their own."""
         return self._discretisation()
 
-    def _mesh(self) -> MeshOptions:
+    def _mesh(self, least: int) -> MeshOptions:
         low, high = self.draw.one_by_weight({(4, 12): 0.15, (12, 40): 0.75, (40, 70): 0.1})
         grading = Uniform() if self.draw.chance(0.7) else Algebraic(self.draw.between(1.2, 2.5))
-        return MeshOptions(int(self.draw.integers(low, high + 1)), grading)
+        return MeshOptions(max(least, int(self.draw.integers(low, high + 1))), grading)
 
     def loads(self, pressed: Sequence[str], pushed: Sequence[str]) -> tuple[Part, ...]:
         """Press sides downwards, push others, each with some tangential load."""
         draw, parts = self.draw, []
         for side in pressed:
-            shear = draw.one_of((0.0, 0.0, draw.between(-0.6, 0.6)))
+            shear = draw.one_of((0.0, 0.0, 0.0, draw.between(-0.3, 0.3)))
             condition = Traction(shear * self.stress, -self.stress)
             parts.append(Part(f"press {side}", condition, (side,)))
         for side in pushed:
