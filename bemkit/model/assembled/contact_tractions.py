@@ -70,7 +70,7 @@ def contact_tractions(
 def _spread(forces: FloatArray, is_reached: BoolArray, elements: IntArray, space: BoundarySpace) -> FloatArray:
     """Return tractions (m, n_local, 2) at the nodes of elements (m,) that stand for nodal forces (n_nodes, 2)."""
     dofs = space.element_dofs[elements]
-    is_covered = is_reached[dofs].all(axis=1)
+    is_covered = np.asarray(is_reached[dofs].all(axis=1))
     # nodes that are alone: on a sliver, or beside nodes that a support holds
     alone = np.setdiff1d(np.flatnonzero(is_reached), dofs[is_covered])
     is_covered |= np.isin(dofs, alone).any(axis=1)

@@ -68,7 +68,8 @@ class AssembledModel:
         body = self.body.under([each.load for each in condensed], offset)
         if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
             body = replace(body, tangent_is_eliminated=is_eliminated)
-        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work)
+        spent = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
+        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + spent)
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.

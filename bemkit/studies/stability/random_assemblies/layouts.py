@@ -1,9 +1,10 @@
-"""Random arrangements of bodies of about unit size and stiffness: stacks, pins, wedges, walls, rings, notches, cracks."""
+"""Random arrangements of bodies of about unit size and stiffness: stacks, pins, walls, rings, notches, cracks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,7 +13,17 @@ from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring
 from bemkit.scene.assembly import ContactPair, Touching
 from bemkit.scene.body import Body
-from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import (
+    Clamped,
+    Condition,
+    Contact,
+    Free,
+    Part,
+    PrescribedDisplacement,
+    Pressure,
+    Roller,
+    Traction,
+)
 from bemkit.scene.copies import CircleCopies, GridCopies
 from bemkit.studies.stability.random_assemblies.members import Members
 from bemkit.studies.stability.random_scenes.draw import Draw
@@ -61,7 +72,7 @@ def _base(draw: Draw, side: str) -> tuple[Part, ...]:
 
 
 def _stack(draw: Draw, members: Members) -> Layout:
-    """Blocks of any width on each other, the topmost pressed; contacts are listed or found."""
+    """Draw blocks of any width on each other, the topmost pressed; contacts are listed or found."""
     n = int(draw.integers(2, 6))
     widths = [draw.one_of((1.0, 1.0, draw.between(0.3, 2.0))) for _ in range(n)]
     gap, interference = members.gap()
@@ -79,12 +90,12 @@ def _stack(draw: Draw, members: Members) -> Layout:
         names.append(name)
     if interference == 0.0 and draw.chance(0.3):
         return Layout(tuple(bodies), touching=Touching(1.5 * gap + 1e-9))
-    pairs = [members.pair(f"{b}.bottom", f"{a}.top", interference) for a, b in zip(names, names[1:], strict=False)]
+    pairs = [members.pair(f"{b}.bottom", f"{a}.top", interference) for a, b in pairwise(names)]
     return Layout(tuple(bodies), tuple(pairs))
 
 
 def _discs(draw: Draw, members: Members) -> Layout:
-    """One disc or two side by side, between two plates."""
+    """Draw one disc or two side by side, between two plates."""
     n = int(draw.integers(1, 3))
     gap, interference = members.gap()
     radius = 0.5 if draw.chance(0.6) else draw.between(0.2, 1.0)
@@ -108,7 +119,7 @@ def _discs(draw: Draw, members: Members) -> Layout:
 
 
 def _pin(draw: Draw, members: Members) -> Layout:
-    """A pin in the hole of a plate, with play, fitting or too large."""
+    """Draw a pin in the hole of a plate, with play, fitting or too large."""
     radius = draw.between(0.1, 0.4)
     gap, interference = members.gap()
     play = 0.5 * (gap - interference)
@@ -124,14 +135,15 @@ def _pin(draw: Draw, members: Members) -> Layout:
     if draw.chance(0.4):
         shape, rim = Ring(0.5 * radius, radius - play), tuple(f"outer-{k}" for k in range(1, 5))
         core = tuple(f"inner-{k}" for k in range(1, 5))
-        condition = draw.one_of((Clamped(), Pressure(members.stress), Traction(y=-members.stress)))
+        kinds: tuple[Condition, ...] = (Clamped(), Pressure(members.stress), Traction(y=-members.stress))
+        condition = draw.one_of(kinds)
         parts = (Part("core", condition, core),)
     pin = members.body("pin", shape, (Part("rim", Free(), rim), *parts), below)
     return Layout((plate, pin), (members.pair("pin.rim", "plate.hole", max(interference, 0.0)),))
 
 
 def _wedge(draw: Draw, members: Members) -> Layout:
-    """A wedge in a notch of the same or nearly the same angle: two contact sides meet at the tip of both bodies."""
+    """Draw a wedge in a notch of nearly the same angle: two contact sides meet at the tip of both bodies."""
     depth, half = draw.between(0.3, 0.7), draw.between(0.1, 0.45)
     block = Polygon(
         ((-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (half, 0.0), (0.0, -depth), (-half, 0.0), (-1.0, 0.0)),
@@ -150,7 +162,7 @@ def _wedge(draw: Draw, members: Members) -> Layout:
 
 
 def _wall(draw: Draw, members: Members) -> Layout:
-    """Two or three courses of bricks in running bond on a floor, all copies of one: T-junctions everywhere."""
+    """Draw two or three courses of bricks in running bond on a floor, all copies of one: T-junctions everywhere."""
     columns, rows = int(draw.integers(1, 3)), int(draw.integers(1, 3))
     gap, _ = members.gap()
     pitch = (2.0 + gap, 2.0 * (1.0 + gap))
@@ -169,13 +181,14 @@ def _wall(draw: Draw, members: Members) -> Layout:
 
 
 def _crossing(draw: Draw, members: Members) -> Layout:
-    """Four blocks that meet in a point, between rollers or walls, pressed from two sides."""
+    """Draw four blocks that meet in a point, between rollers or walls, pressed from two sides."""
     gap, _ = members.gap()
     step = 1.0 + gap
     bodies = []
     for name, x, y in (("sw", 0, 0), ("se", 1, 0), ("nw", 0, 1), ("ne", 1, 1)):
         parts: list[Part] = []
-        support = draw.one_of((Roller(), Roller(), Clamped()))
+        supports: tuple[Condition, ...] = (Roller(), Roller(), Clamped())
+        support = draw.one_of(supports)
         if y == 0:
             parts.append(Part("base", support, ("bottom",)))
         if x == 0 and draw.chance(0.9):
@@ -188,15 +201,17 @@ def _crossing(draw: Draw, members: Members) -> Layout:
 
 
 def _rings(draw: Draw, members: Members) -> Layout:
-    """Rings around each other, shrunk on or loose, pressed from outside."""
+    """Draw rings around each other, shrunk on or loose, pressed from outside."""
     n = int(draw.integers(2, 4))
     gap, interference = members.gap()
     radius, bodies, pairs = 0.4, [], []
     for k in range(n):
         inner, outer = (tuple(f"{side}-{j}" for j in range(1, 5)) for side in ("inner", "outer"))
         wide = radius * draw.between(1.2, 2.0)
-        parts = [Part("in", Free() if k else draw.one_of((Clamped(), Free(), Roller())), inner)]
-        last = draw.one_of((Pressure(members.stress), Free(), Pressure(members.stress, 0.1 * members.stress)))
+        cores: tuple[Condition, ...] = (Clamped(), Clamped(), Free(), Roller())
+        parts = [Part("in", Free() if k else draw.one_of(cores), inner)]
+        rims: tuple[Condition, ...] = (Pressure(members.stress), Free(), Pressure(members.stress, 0.1 * members.stress))
+        last = draw.one_of(rims)
         parts.append(Part("out", Free() if k < n - 1 else last, outer))
         bodies.append(members.body(f"ring {k + 1}", Ring(radius, wide), tuple(parts), Placement(turn=13.0 * k)))
         if k:
@@ -206,12 +221,15 @@ def _rings(draw: Draw, members: Members) -> Layout:
 
 
 def _notch(draw: Draw, members: Members) -> Layout:
-    """A block in a corner or a groove: two or three of its sides touch one body, at corners of both."""
+    """Draw a block in a corner or a groove: two or three of its sides touch one body, at corners of both."""
     gap, _ = members.gap()
     wall = draw.one_of((0.5, draw.between(0.2, 1.0)))
     height = draw.one_of((1.0, draw.between(0.3, 1.5)))
     if draw.chance(0.5):
-        vertices = ((0, 0), (2, 0), (2, 0.5), (0.5, 0.5), (0.5, 0.5 + wall), (0, 0.5 + wall))
+        vertices: tuple[tuple[float, float], ...] = (
+            *((0, 0), (2, 0), (2, 0.5), (0.5, 0.5), (0.5, 0.5 + wall)),
+            (0, 0.5 + wall),
+        )
         names: tuple[str, ...] = ("bottom", "end", "floor", "left wall", "rim", "left")
         width = draw.one_of((1.0, 1.5, 0.7))
     else:
@@ -235,7 +253,7 @@ def _notch(draw: Draw, members: Members) -> Layout:
 
 
 def _split(draw: Draw, members: Members) -> Layout:
-    """A body with a slit whose lips may touch, and sometimes a block on top."""
+    """Draw a body with a slit whose lips may touch, and sometimes a block on top."""
     opening = draw.decades(-4.0, -1.0)
     low, high = 0.5 - 0.5 * opening, 0.5 + 0.5 * opening
     shape = Polygon(
@@ -255,7 +273,7 @@ def _split(draw: Draw, members: Members) -> Layout:
 
 
 def _tunnel(draw: Draw, members: Members) -> Layout:
-    """A lining or a full disc in a hole of the infinite plane."""
+    """Draw a lining or a full disc in a hole of the infinite plane."""
     gap, interference = members.gap()
     rock = members.body("rock", ExteriorOf(Disk(1.0)), (Part("wall", Free(), tuple(f"arc-{k}" for k in range(1, 5))),))
     outer = 1.0 - gap + interference
@@ -270,7 +288,7 @@ def _tunnel(draw: Draw, members: Members) -> Layout:
 
 
 def _arch(draw: Draw, members: Members) -> Layout:
-    """A semicircle of wedges under their weight on a rigid floor, thick enough or not."""
+    """Draw a semicircle of wedges under their weight on a rigid floor, thick enough or not."""
     n, thickness = int(draw.integers(4, 8)), draw.between(0.05, 0.5)
     angle, inner, outer = 180.0 / n, 1.0 - thickness / 2.0, 1.0 + thickness / 2.0
     end = Placement(turn=angle)

@@ -63,7 +63,8 @@ class Members:
         if (self.weight or is_heavy) and not shape.outline().is_exterior:
             forces.append(Gravity(self.weight or self.stress, (0.0, -1.0)))
         if self.draw.chance(0.05) and not shape.outline().is_exterior:
-            forces.append(self.draw.one_of((Heating(self.stress, 1.0), Rotation(self.stress, 1.0, (0.0, 0.0)))))
+            kinds: tuple[BodyForce, ...] = (Heating(self.stress, 1.0), Rotation(self.stress, 1.0, (0.0, 0.0)))
+            forces.append(self.draw.one_of(kinds))
         return Body(
             name=name,
             shape=shape,
@@ -78,7 +79,7 @@ class Members:
 
     def _material(self) -> Material:
         draw = self.draw
-        modulus = draw.decades(-6.0, 6.0) if self.has_mixed_materials and draw.chance(0.5) else 1.0
+        modulus = draw.decades(-3.0, 3.0) if self.has_mixed_materials and draw.chance(0.5) else 1.0
         plane = Plane.STRESS if draw.chance(0.1) else Plane.STRAIN
         return Material(modulus, draw.one_of(_RATIOS) if draw.chance(0.7) else 0.3, plane)
 

@@ -18,6 +18,7 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 
+
 @dataclass(frozen=True)
 class AssemblySimilarity:
     """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
@@ -170,9 +171,7 @@ class AssemblySimilarity:
     def _force(self, force: BodyForce) -> BodyForce:
         match force:
             case Gravity(density, (x, y)):
-                return replace(
-                    force, density=self.stress * density, acceleration=self._vector(x, y, 1.0 / self.length)
-                )
+                return replace(force, density=self.stress * density, acceleration=self._vector(x, y, 1.0 / self.length))
             case Rotation(density, rate, centre):
                 return replace(
                     force,
@@ -181,6 +180,7 @@ class AssemblySimilarity:
                     centre=self._point(centre),
                 )
         return force  # heat by a number: the same everywhere
+
 
 def _number(field: object) -> float:
     """Return a field that is a number."""
