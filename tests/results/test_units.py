@@ -69,3 +69,13 @@ def test_the_summary_and_the_pictures_show_them(solution: bk.Solution, capsys: p
 def test_names_that_are_none_are_refused(name: str) -> None:
     with pytest.raises(bk.InputError, match=r"units\.stress is .*: give a short name"):
         bk.UnitNames("m", name)
+
+
+def test_messages_name_them() -> None:
+    lifted = replace(
+        SCENE,
+        units=NAMES,
+        parts=(SCENE.parts[0], bk.Part("lift", bk.Traction(y=1.0), sides=("top",))),
+    )
+    with pytest.raises(bk.BemkitError, match="pushes the body upward with 1 N/mm; nothing holds it"):
+        bk.run(lifted)

@@ -235,7 +235,7 @@ def test_steps_follow_each_other_and_slip_is_remembered() -> None:
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"shift": (0.0, 0.9)}, OverlapError, "the bodies overlap by 0.1 m at"),
+        ({"shift": (0.0, 0.9)}, OverlapError, "the bodies overlap by 0.1 at"),
         ({"shift": (0.0, 5.0)}, ValueError, "contact 'upper.bottom / lower.top': the sides at"),
         ({"side": "upper.left"}, ValueError, "body 'upper': discretise: parts 'load left' and 'left' overlap on side"),
         ({"side": "upper.top", "parts": ()}, ValueError, "choose sides whose outward normals point at each other"),
