@@ -108,7 +108,7 @@ def commands() -> None:
 
 @commands.command()
 @click.argument("scene")
-@click.option("-o", "--output", metavar="FILE", help="Write the result (HDF5).")
+@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
@@ -162,9 +162,9 @@ def run(
             tracemalloc.stop()
     begin = time.perf_counter()
     if output is not None:
-        from bemkit.results.result_file import write_result
+        from bemkit.results.export import export_result
 
-        write_result(output, solution)
+        export_result(output, solution)
     outputs.write(solution)
     output_seconds = time.perf_counter() - begin
     if not quiet and not outputs.uses_stdout:
@@ -186,7 +186,10 @@ def run(
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
-def show(result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool) -> None:
+@click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
+def show(
+    result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool, output: str | None
+) -> None:
     """Show RESULT, a file written by bemkit run -o."""
     from bemkit.results.result_file import read_result
     from bemkit.scene.toml import scene_to_toml
@@ -194,12 +197,16 @@ def show(result: str, table: str | None, json_file: str | None, folder: str | No
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
     outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact")
-    outputs.check()
+    outputs.check(_result_target(output))
     solution = read_result(result)
+    if output is not None:
+        from bemkit.results.export import export_result
+
+        export_result(output, solution)
     outputs.write(solution)
     if shows_scene:
         print_data(scene_to_toml(solution.stated))
-    elif not (table or json_file or folder):
+    elif not (table or json_file or folder or output):
         from bemkit.cli.console import print_summary
 
         print_summary(solution)
@@ -300,9 +307,9 @@ def _outputs(
 def _result_target(output: str | None) -> list[Path]:
     if output is None:
         return []
-    from bemkit.results.result_file import check_result_target
+    from bemkit.results.export import format_of
 
-    return [check_result_target(output)]
+    return [format_of(output).check(Path(output))]
 
 
 def _solve(scene: Scene | Assembly, *, cascade: bool, is_live: bool) -> Solution | AssemblySolution:

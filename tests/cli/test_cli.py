@@ -220,14 +220,14 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run"], "Missing argument"),
         (["bogus"], "No such command"),
         (["run", "paper-1", "-o", "no/r.h5"], "the folder .* does not exist"),
-        (["run", "paper-1", "-o", "."], "exists and is not a file"),
-        (["run", "paper-1", "-o", "thesis.txt"], "exists and is not a bemkit result"),
+        (["run", "paper-1", "-o", "folder.h5"], "exists and is not a file"),
+        (["run", "paper-1", "-o", "thesis.h5"], "exists and is not a bemkit result"),
         (["run", "paper-1", "--json", "thesis.txt"], "exists and is not a JSON file"),
         (["run", "paper-1", "--csv", "thesis.txt"], "exists and is not a CSV file"),
         (["run", "paper-1", "--plot", "thesis.txt"], "exists and is not a folder"),
         (["run", "paper-1", "--json", "-", "--csv", "-"], "two outputs go to the same place"),
-        (["run", "paper-1", "-o", "r", "--json", "r"], "two outputs go to the same place"),
-        (["run", "paper-1", "-o", "r", "--json", "./r"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r.h5", "--json", "r.h5"], "two outputs go to the same place"),
+        (["run", "paper-1", "-o", "r.h5", "--json", "./r.h5"], "two outputs go to the same place"),
         (["run", "paper-1", "-o", "-"], "- is standard output.*give a file name"),
         (["run", ""], "'': cannot be read .*give the path of a TOML file"),
         (["show", "."], "not a file: give a file"),
@@ -240,7 +240,9 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_bad_input_is_one_line_and_exit_code_2(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("thesis.txt").write_text("my thesis", "utf-8")
+    for name in ("thesis.txt", "thesis.h5"):
+        Path(name).write_text("my thesis", "utf-8")
+    Path("folder.h5").mkdir()
     assert re.search(message, one_line_error(capsys, *arguments))
     assert Path("thesis.txt").read_text("utf-8") == "my thesis"
 
