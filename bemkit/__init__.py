@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from bemkit.scene.toml import load_scene as load_scene
     from bemkit.scene.toml import scene_from_toml as scene_from_toml
     from bemkit.scene.toml import scene_to_toml as scene_to_toml
+    from bemkit.scene.unit_names import UnitNames as UnitNames
     from bemkit.solvers.alm import AugmentedLagrangian as AugmentedLagrangian
     from bemkit.solvers.base import ContactSolver as ContactSolver
     from bemkit.solvers.base import Status as Status
@@ -163,6 +164,7 @@ _HOME = {
     "scene.rigid_body": ("RigidBody",),
     "scene.scene": ("Scene",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),
+    "scene.unit_names": ("UnitNames",),
     "solvers.alm": ("AugmentedLagrangian",),
     "solvers.base": ("ContactSolver", "Status", "solve"),
     "solvers.fixed_point": ("FixedPoint",),

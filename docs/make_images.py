@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import bemkit as bk
-from bemkit.results.figures import Units, draw_contact_displacement, draw_contact_traction, draw_deformation
+from bemkit.results.assembly_figures import draw_contact_map, draw_deformed_bodies
+from bemkit.results.figures import draw_contact_displacement, draw_contact_traction, draw_deformation
 from bemkit.scene.toml import with_overrides
 
 IMAGES = Path(__file__).parent / "images"
@@ -13,13 +14,16 @@ DOTS_PER_INCH = 110  # sharp at the width of a page, and each file below 100 kB
 
 
 def main() -> None:
-    """Solve Example 1 of the paper with linear elements and draw it."""
+    """Solve Example 1 of the paper with linear elements, an arch and a pin, and draw them."""
     solution = bk.run(with_overrides(bk.load_scene("paper-1"), discretisation="linear"))
-    units = Units(length="-", stress="-")  # the paper gives none
+    arch, pin = bk.run(bk.load_scene("masonry-arch")), bk.run(bk.load_scene("pin-in-plate"))
     figures = {
-        "paper-1-deformed": draw_deformation(solution, units=units),
-        "paper-1-displacement": draw_contact_displacement(solution, "foundation", units=units),
-        "paper-1-traction": draw_contact_traction(solution, "foundation", units=units),
+        "paper-1-deformed": draw_deformation(solution),
+        "paper-1-displacement": draw_contact_displacement(solution, "foundation"),
+        "paper-1-traction": draw_contact_traction(solution, "foundation"),
+        "masonry-arch-deformed": draw_deformed_bodies(arch),
+        "masonry-arch-contacts": draw_contact_map(arch),
+        "pin-in-plate-contacts": draw_contact_map(pin),
     }
     IMAGES.mkdir(exist_ok=True)
     for name, figure in figures.items():

@@ -18,6 +18,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
+from bemkit.scene.unit_names import unit_of
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS, _MANY_CONTACTS = 12, 8
@@ -156,11 +157,12 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
         yield "symmetry", f"about {mesh.symmetry}: {values}"
     if contact.n_contact:
         yield "contact nodes", _node_counts(solution)
-        yield "normal force", f"{solution.force_normal:.8g}  pressing, per unit thickness"
-        yield "friction force", f"{solution.force_tangential:.8g}  on the body, along the boundary"
+        force = unit_of("force", solution.units)
+        yield "normal force", f"{_amount(solution.force_normal, force)}  pressing, per unit thickness"
+        yield "friction force", f"{_amount(solution.force_tangential, force)}  on the body, along the boundary"
     else:
         yield "contact", "none"
-    yield "elastic energy", f"{solution.energy:.8g}  per unit thickness"
+    yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
     if solution.estimated_error is not None:
         tractions = solution.estimated_traction_error
         of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
@@ -180,12 +182,15 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
     yield "status", _status(solution)
     yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
     yield "contact nodes", _node_counts(solution)
+    units = {quantity: unit_of(quantity, solution.units) for quantity in ("length", "stress", "force")}
     for contact in solution.contacts[:_MANY_CONTACTS]:
         yield (
             contact.name,
-            f"normal force {contact.force_normal:.8g}, friction {contact.force_tangential:.8g}, "
-            f"length {contact.contact_length:.6g}, peak pressure {contact.peak_pressure:.6g}, "
-            f"slip up to {contact.largest_slip:.3g}",
+            f"normal force {_amount(contact.force_normal, units['force'])}, "
+            f"friction {_amount(contact.force_tangential, units['force'])}, "
+            f"length {contact.contact_length:.6g} {units['length']}".rstrip()
+            + f", peak pressure {contact.peak_pressure:.6g} {units['stress']}".rstrip()
+            + f", slip up to {contact.largest_slip:.3g} {units['length']}".rstrip(),
         )
     if len(solution.contacts) > _MANY_CONTACTS:
         yield "", f"and {len(solution.contacts) - _MANY_CONTACTS} contacts more (--json -)"
@@ -197,7 +202,7 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
         )
     if len(solution.rigid) > _MANY_CONTACTS:
         yield "", f"and {len(solution.rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
-    yield "elastic energy", f"{solution.energy:.8g}  per unit thickness"
+    yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
     if solution.estimated_error is not None:
         yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"
     yield "transitions", "\n".join(_transition_lines(solution))
@@ -226,6 +231,10 @@ def _time(solution: Solution | AssemblySolution) -> str:
     timings = solution.timings
     stages = ", ".join(f"{name} {value:.2f}" for name, value in timings.items() if name != "total")
     return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
+
+
+def _amount(value: float, unit: str) -> str:
+    return f"{value:.8g} {unit}".rstrip()
 
 
 def _worst_entry(measured: Certificate | BetweenNodes) -> str:

@@ -12,6 +12,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.prepared import Prepared, Units
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
+from bemkit.scene.unit_names import amount
 
 _DIRECTIONS = (
     *("to the right", "up and to the right", "upward", "up and to the left"),
@@ -94,22 +95,22 @@ def describe(prepared: Prepared, load: UnsolvableLoad) -> str:
     Returns
     -------
     str
-        With the resultant force [N/m] for a translation, or the moment [N m/m] and the fixed point for a rotation.
+        With the resultant force for a translation, or the moment and the fixed point for a rotation.
     """
     units = prepared.units
     mode = _rigid_mode(prepared, load)
     size, turn = float(np.hypot(*mode[:2])), float(mode[2])
     if abs(turn) <= _STRAIGHT * size:
-        net = load.work / size * units.stress * units.length
+        net = amount(load.work / size * units.stress * units.length, "force", prepared.scene.units)
         if load.is_sliding:
             return (
-                f"the load slides the body {_direction(mode[:2])} with {net:.4g} N/m more than friction can hold; "
+                f"the load slides the body {_direction(mode[:2])} with {net} more than friction can hold; "
                 "change the load, raise the friction or hold the body"
             )
-        return f"the load pushes the body {_direction(mode[:2])} with {net:.4g} N/m; nothing holds it{_REMEDY}"
-    moment = load.work / abs(turn) * units.stress * units.length**2
+        return f"the load pushes the body {_direction(mode[:2])} with {net}; nothing holds it{_REMEDY}"
+    moment = amount(load.work / abs(turn) * units.stress * units.length**2, "energy", prepared.scene.units)
     sense = "anticlockwise" if turn > 0.0 else "clockwise"
-    words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment:.4g} N m/m"
+    words = f"the load turns the body {sense} {_pivot(mode, units)} with {moment}"
     return f"{words}; contact cannot hold it{_REMEDY}"
 
 

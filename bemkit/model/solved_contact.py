@@ -15,6 +15,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.model.contact_model import Model
+from bemkit.scene.unit_names import amount
 from bemkit.solvers.active_sets import NodeStatus
 
 SLIP_TOLERANCE = 1e-9
@@ -99,8 +100,9 @@ def _pushed_in(model: Model, displacement: FloatArray) -> list[str]:
         node = int(np.argmax(np.where(np.equal(candidates.parts, part), overlap, -math.inf)))
         if overlap[node] > SMALLEST_OVERLAP * np.abs(displacement).max():
             x, y = candidates.points[node]
+            depth = amount(overlap[node], "length", model.scene.units, 3)
             found.append(
-                f"Supports push part {part!r} {overlap[node]:.3g} m into its obstacle at ({x:.6g}, {y:.6g}), where "
+                f"Supports push part {part!r} {depth} into its obstacle at ({x:.6g}, {y:.6g}), where "
                 "contact cannot act: let them move with the obstacle, or leave a free element between them."
             )
     return found

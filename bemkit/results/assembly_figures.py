@@ -11,15 +11,14 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.drawing import GREY, new_figure
 from bemkit.results.figures import (
-    SI,
     STATUS_COLOURS,
-    Units,
     contact_figures,
     draw_body,
     exaggeration,
     outlines,
 )
 from bemkit.results.obstacle_drawing import draw_obstacles, draw_rigid_bodies
+from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +28,7 @@ MOST_CONTACTS = 6
 """Contacts up to which each has figures of its own."""
 
 
-def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> dict[str, Figure]:
+def all_assembly_figures(solution: AssemblySolution, *, units: UnitNames | None = None) -> dict[str, Figure]:
     """Draw everything there is to show.
 
     Returns
@@ -45,11 +44,12 @@ def all_assembly_figures(solution: AssemblySolution, *, units: Units = SI) -> di
     return figures | (contact_figures(solution, units=units) if len(solution.contact.parts) <= MOST_CONTACTS else {})
 
 
-def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Figure:
+def draw_deformed_bodies(solution: AssemblySolution, *, units: UnitNames | None = None) -> Figure:
     """Draw all bodies before and after, all displacements enlarged by one factor that the picture tells.
 
     The factor is so small that no body is drawn inside another one by more than a line is thick.
     """
+    units = units or solution.units
     bodies = list(solution.bodies.values())
     moved = np.concatenate([body.boundary.displacement for body in bodies])
     size = float(np.hypot(*_extent(solution)))
@@ -68,8 +68,9 @@ def draw_deformed_bodies(solution: AssemblySolution, *, units: Units = SI) -> Fi
     return figure
 
 
-def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure:
+def draw_contact_map(solution: AssemblySolution, *, units: UnitNames | None = None) -> Figure:
     """Draw all bodies, and each contact once: its status by colour, its pressure by the length of a comb."""
+    units = units or solution.units
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
 
@@ -94,7 +95,7 @@ def draw_contact_map(solution: AssemblySolution, *, units: Units = SI) -> Figure
             axes.scatter(points[own, 0], points[own, 1], s=7.0, color=colour, zorder=3, linewidths=0.0)
     present = [word for word in STATUS_COLOURS if np.any(words == word)]
     handles = [Line2D([], [], color=STATUS_COLOURS[word], marker="o", label=word) for word in present]
-    _name_axes(axes, f"Contacts, pressure up to {largest:.4g} {units.stress}\n{solution.title}", units)
+    _name_axes(axes, f"Contacts, pressure up to {amount(largest, 'stress', units)}\n{solution.title}", units)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
@@ -120,7 +121,7 @@ def _space(body: BodyResult) -> BoundarySpace:
     return body.scene.discretisation.displacement_space(body.mesh)
 
 
-def _name_axes(axes: Axes, title: str, units: Units) -> None:
-    axes.set_xlabel(f"$x$ [{units.length}]")
-    axes.set_ylabel(f"$y$ [{units.length}]")
+def _name_axes(axes: Axes, title: str, units: UnitNames | None) -> None:
+    axes.set_xlabel(with_unit("$x$", "length", units))
+    axes.set_ylabel(with_unit("$y$", "length", units))
     axes.set_title(title, parse_math=False, fontsize=11)

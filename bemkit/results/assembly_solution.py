@@ -20,6 +20,7 @@ from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
 
 
@@ -125,6 +126,11 @@ class AssemblySolution:
         return self.assembly
 
     @property
+    def units(self) -> UnitNames | None:
+        """Names of units, if the assembly has them."""
+        return self.assembly.units
+
+    @property
     def title(self) -> str:
         """The title of the assembly."""
         return self.assembly.title
@@ -188,6 +194,7 @@ class AssemblySolution:
         """Return the result without its fields, under the names of the JSON output; see `Solution.summary`."""
         return {
             "title": self.assembly.title,
+            "units": None if self.units is None else self.units.as_dict(),
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,

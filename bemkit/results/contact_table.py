@@ -230,7 +230,7 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
         contact.part[last],
     ):
         zone.append(k)
-    if len(zone) < 2:
+    if len(zone) < 2 or contact.s[tighter] == contact.s[last]:  # two rows of one node in a corner
         return middle
     field = contact.clearance if words[last] == "separated" else np.abs(slip)
     distance = _distance_to_zero(np.abs(contact.s[zone] - contact.s[last]), field[zone])

@@ -6,7 +6,6 @@ Without contact, the tractions along the whole boundary instead.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 from math import floor, log10
 from pathlib import Path
@@ -24,6 +23,7 @@ from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, label_values, 
 from bemkit.results.obstacle_drawing import draw_obstacles
 from bemkit.results.outputs import write_figures
 from bemkit.results.solution import Solution
+from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,6 +54,10 @@ class SolvedContact(Protocol):
         """The title."""
 
     @property
+    def units(self) -> UnitNames | None:
+        """Names of units, if the scene has them."""
+
+    @property
     def contact(self) -> ContactTable:
         """One row for each contact node."""
 
@@ -69,18 +73,7 @@ class SolvedContact(Protocol):
         """Return the length of a contact part [m]."""
 
 
-@dataclass(frozen=True)
-class Units:
-    """Names of units on the axes."""
-
-    length: str = "m"
-    stress: str = "Pa"
-
-
-SI = Units()
-
-
-def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -> tuple[Path, ...]:
+def save_figures(solution: Solution, folder: str | Path, *, units: UnitNames | None = None) -> tuple[Path, ...]:
     """Draw all figures into a folder, which is made if need be, and return their paths; see `all_figures`.
 
     Raises
@@ -91,7 +84,7 @@ def save_figures(solution: Solution, folder: str | Path, *, units: Units = SI) -
     return write_figures(all_figures(solution, units=units), Path(folder))
 
 
-def all_figures(solution: Solution, *, units: Units = SI) -> dict[str, Figure]:
+def all_figures(solution: Solution, *, units: UnitNames | None = None) -> dict[str, Figure]:
     """Draw everything there is to show.
 
     Returns
@@ -107,7 +100,7 @@ def all_figures(solution: Solution, *, units: Units = SI) -> dict[str, Figure]:
     return figures | contact_figures(solution, units=units)
 
 
-def contact_figures(solution: SolvedContact, *, units: Units = SI) -> dict[str, Figure]:
+def contact_figures(solution: SolvedContact, *, units: UnitNames | None = None) -> dict[str, Figure]:
     """Draw displacements, tractions and status of each contact; see `all_figures`."""
     figures, parts = {}, solution.contact.parts
     for number, part in enumerate(parts, start=1):
@@ -118,11 +111,12 @@ def contact_figures(solution: SolvedContact, *, units: Units = SI) -> dict[str, 
     return figures
 
 
-def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
+def draw_deformation(solution: Solution, *, units: UnitNames | None = None) -> Figure:
     """Draw the initial and the deformed body, the displacements enlarged by a factor that the picture tells.
 
     The factor is so small that no contact node is drawn inside its obstacle by more than a line is thick.
     """
+    units = units or solution.units
     space, displacement = whole_displacement(solution)
     factor = exaggeration(space.mesh.diameter, displacement, solution.contact)
     figure = new_figure(5.6, 5.6)
@@ -132,8 +126,8 @@ def draw_deformation(solution: Solution, *, units: Units = SI) -> Figure:
     axes.set_aspect("equal")
     axes.margins(0.08)
     draw_obstacles(axes, [getattr(part.condition, "obstacle", None) for part in solution.scene.contact_parts])
-    axes.set_xlabel(f"$x$ [{units.length}]")
-    axes.set_ylabel(f"$y$ [{units.length}]")
+    axes.set_xlabel(with_unit("$x$", "length", units))
+    axes.set_ylabel(with_unit("$y$", "length", units))
     axes.set_title(solution.title, parse_math=False, fontsize=11)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -177,8 +171,9 @@ def outlines(space: BoundarySpace, displacement: FloatArray, factor: float) -> l
     return [np.concatenate([loop, loop[:1]]) for loop in loops]
 
 
-def draw_contact_displacement(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_displacement(solution: SolvedContact, part: str, *, units: UnitNames | None = None) -> Figure:
     """Draw normal and tangential displacement and the gap along one contact part, above its status."""
+    units = units or solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
     figure, axes = _contact_axes(solution, part, units, "Displacements on the contact boundary")
@@ -186,12 +181,13 @@ def draw_contact_displacement(solution: SolvedContact, part: str, *, units: Unit
     axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **_SECOND)
     if np.any(np.isfinite(gap) & (gap != 0.0)):
         axes.plot(s, _near(gap, solution, chosen), label="gap $g$", **_LIMIT)
-    label_values(axes, f"displacement [{units.length}]")
+    label_values(axes, with_unit("displacement", "length", units))
     return figure
 
 
-def draw_contact_traction(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_traction(solution: SolvedContact, part: str, *, units: UnitNames | None = None) -> Figure:
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`."""
+    units = units or solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Tractions on the contact boundary")
@@ -200,22 +196,23 @@ def draw_contact_traction(solution: SolvedContact, part: str, *, units: Units = 
     if solution.friction_bound is not None:
         axes.plot(s, solution.friction_bound[chosen], label="friction bound", **_LIMIT)
         axes.plot(s, -solution.friction_bound[chosen], **_LIMIT)
-    label_values(axes, f"traction [{units.stress}]")
+    label_values(axes, with_unit("traction", "stress", units))
     return figure
 
 
-def draw_contact_status(solution: SolvedContact, part: str, *, units: Units = SI) -> Figure:
+def draw_contact_status(solution: SolvedContact, part: str, *, units: UnitNames | None = None) -> Figure:
     """Draw contact pressure and clearance; see `draw_contact_displacement`."""
+    units = units or solution.units
     contact, chosen = solution.contact, solution.contact.rows(part)
     s = contact.s[chosen]
     figure, axes = _contact_axes(solution, part, units, "Contact pressure and clearance")
     pressure = axes.plot(s, -contact.sigma_n[chosen], label=r"pressure $-\sigma_n$ (left)", **_FIRST)
-    axes.set_ylabel(f"pressure [{units.stress}]")
+    axes.set_ylabel(with_unit("pressure", "stress", units))
     right = axes.twinx()
     right.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
     clearance = _near(contact.clearance[chosen], solution, chosen)
     opening = right.plot(s, clearance, label="clearance $g - u_n$ (right)", **_SECOND)
-    right.set_ylabel(f"clearance [{units.length}]")
+    right.set_ylabel(with_unit("clearance", "length", units))
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)  # a uniform pressure is not scaled to its round-off
     for each in (axes, right):
         bottom, top = each.get_ylim()
@@ -270,9 +267,9 @@ def _near(distance: FloatArray, solution: SolvedContact, chosen: BoolArray) -> F
     return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
 
 
-def _contact_axes(solution: SolvedContact, part: str, units: Units, subject: str) -> tuple[Figure, Axes]:
+def _contact_axes(solution: SolvedContact, part: str, units: UnitNames | None, subject: str) -> tuple[Figure, Axes]:
     """Return a figure with a large panel above a strip that shows the status along the part."""
-    abscissa = f"arc length $s$ along '{part}' [{units.length}]"
+    abscissa = with_unit(f"arc length $s$ along '{part}'", "length", units)
     figure, axes, strip = panel_above_strip(f"{subject}\n{solution.title}", abscissa, parse_math="$" not in part)
     _draw_status(strip, solution, part)
     for transition in solution.transitions:
@@ -321,24 +318,25 @@ def _draw_symmetry_lines(axes: Axes, symmetry: Symmetry | None) -> None:
         axes.axhline(symmetry.y, **style)
 
 
-def draw_boundary_traction(solution: Solution, *, units: Units = SI) -> Figure:
+def draw_boundary_traction(solution: Solution, *, units: UnitNames | None = None) -> Figure:
     """Draw the normal and the tangential traction of each element along the boundary, above the parts it belongs to.
 
     Closed curves of the boundary follow each other; a line marks where each of them begins.
     """
+    units = units or solution.units
     mesh, traction = solution.mesh, solution.boundary.traction
     order = np.concatenate(mesh.loops)
     s = np.append(0.0, np.cumsum(mesh.lengths[order]))
     normals = mesh.normals[order]
     tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
     title = f"Tractions on the boundary\n{solution.scene.title}"
-    figure, axes, strip = panel_above_strip(title, f"arc length $s$ [{units.length}]")
+    figure, axes, strip = panel_above_strip(title, with_unit("arc length $s$", "length", units))
     for directions, colour, label in ((normals, BLUE, r"normal $t_n$"), (tangents, VERMILION, r"tangential $t_t$")):
         axes.stairs(np.einsum("ec,ec->e", traction[order], directions), s, color=colour, label=label, linewidth=1.4)
     starts = np.cumsum([0, *(len(loop) for loop in mesh.loops)])[1:-1]
     for place in s[starts]:
         axes.axvline(place, color="black", linewidth=0.8)
-    label_values(axes, f"traction [{units.stress}]")
+    label_values(axes, with_unit("traction", "stress", units))
     _draw_parts(strip, solution, order.tolist(), s.tolist())
     return figure
 

@@ -86,7 +86,7 @@ def part_force(
     return PartForce(name, float(force[0]), float(force[1]), moment)
 
 
-def nodal_resultants(table: ContactTable, frame: FloatArray) -> tuple[PartForce, ...]:
+def nodal_resultants(table: ContactTable, frame: FloatArray, acting_at: FloatArray) -> tuple[PartForce, ...]:
     """Sum up the nodal forces of each contact, on the body with the nodes.
 
     Parameters
@@ -94,9 +94,11 @@ def nodal_resultants(table: ContactTable, frame: FloatArray) -> tuple[PartForce,
     table : ContactTable
     frame : (n_contact, 2, 2) array
         Directions of contact and tangents of the nodes.
+    acting_at : (n_contact, 2) array [m]
+        Where the forces act: beside the node if it takes a share of others.
     """
     forces = np.einsum("nk,nkc->nc", table.weight[:, None] * np.stack([table.sigma_n, table.sigma_t], axis=1), frame)
-    moments = table.x * forces[:, 1] - table.y * forces[:, 0]
+    moments = acting_at[:, 0] * forces[:, 1] - acting_at[:, 1] * forces[:, 0]
     rows = {part: table.rows(part) for part in table.parts}
     return tuple(
         PartForce(part, float(forces[own, 0].sum()), float(forces[own, 1].sum()), float(moments[own].sum()))

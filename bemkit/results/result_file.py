@@ -17,6 +17,8 @@ stranger runs no code. The layout, version 2:
     /plan, /work     texts: linear solver, sizes and counts as JSON
     /warnings        texts, one sentence each; a file without them has none
 
+Every array has an attribute `meaning` and, where the scene names its units, `unit`; see `bemkit.results.file_meanings`.
+
 Of an assembly /assembly, /bodies and /contacts take the place of /scene, /mesh and /boundary; see
 `bemkit.results.assembly_file`.
 """
@@ -30,6 +32,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_text
 from bemkit.results.assembly_file import read_assembly, write_assembly
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.file_meanings import annotate
 from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
 from bemkit.results.outputs import STDOUT
 from bemkit.results.solution import Solution
@@ -71,6 +74,7 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
         with FORMAT.created(path) as file:
             write_text(file, "assembly", text)
             write_assembly(file, solution)
+            annotate(file, solution.units)
         return
     text = scene_to_toml(solution.scene)
     with FORMAT.created(path) as file:
@@ -81,6 +85,7 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
         write_forces(file, "parts", solution.part_forces)
         write_forces(file, "contacts", solution.contacts)
         write_fields(file, solution.mesh, solution.boundary)
+        annotate(file, solution.units)
 
 
 def read_result(path: str | Path) -> Solution | AssemblySolution:

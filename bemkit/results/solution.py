@@ -27,6 +27,7 @@ from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.scene import Scene
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
@@ -140,6 +141,11 @@ class Solution(SolvedBody):
         return self.scene
 
     @property
+    def units(self) -> UnitNames | None:
+        """Names of units, if the scene has them."""
+        return self.scene.units
+
+    @property
     def title(self) -> str:
         """The title of the scene."""
         return self.scene.title
@@ -192,7 +198,8 @@ class Solution(SolvedBody):
         Returns
         -------
         dict
-            ``status`` (a word), ``message`` (how the solver ended), ``converged``, ``certified``, ``warnings``,
+            ``title``, ``units`` (names, None without), ``status`` (a word), ``message`` (how the solver ended),
+            ``converged``, ``certified``, ``warnings``,
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
             ``estimated_traction_error`` (None without an estimate),
@@ -202,6 +209,7 @@ class Solution(SolvedBody):
         """
         return {
             "title": self.scene.title,
+            "units": None if self.units is None else self.units.as_dict(),
             "status": self.status.name.lower(),
             "message": self.message or self.status.value,
             "converged": self.is_converged,

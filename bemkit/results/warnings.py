@@ -15,6 +15,7 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, are_neighbours
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
+from bemkit.scene.unit_names import amount
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
@@ -77,7 +78,7 @@ def _error(solution: Solution) -> Iterator[str]:
         return
     error = solution.estimated_error
     if error is None:
-        energy = f"the elastic energy, {solution.energy:.1e} J/m, is not positive"
+        energy = f"the elastic energy, {amount(solution.energy, 'energy', solution.units, 2)}, is not positive"
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
     yield from _large(error)
     if solution.coefficient_errors is not None:

@@ -161,7 +161,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         contact=table,
         contact_directions=prepared.frame[:, 0].copy(),
         friction_bound=bound_at(table, prepared.law),
-        contacts=contact_forces(table, nodal_resultants(table, prepared.frame), transitions),
+        contacts=contact_forces(table, nodal_resultants(table, prepared.frame, prepared.acting_at), transitions),
         history=result.history,
         linear_solves=result.linear_solves,
         outer_steps=result.steps,

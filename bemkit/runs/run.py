@@ -153,12 +153,12 @@ class FailedRun:
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or Assembly
     error : BemkitError
         What `run` raised; its message names the remedy.
     """
 
-    scene: Scene
+    scene: Scene | Assembly
     error: BemkitError
 
     @property
@@ -167,25 +167,27 @@ class FailedRun:
         return False
 
 
-def run_all(scenes: Iterable[Scene], executor: Executor | None = None) -> list[Solution | FailedRun]:
+def run_all(
+    scenes: Iterable[Scene | Assembly], executor: Executor | None = None
+) -> list[Solution | AssemblySolution | FailedRun]:
     """Solve several scenes, on any `concurrent.futures.Executor` if one is given.
 
     Parameters
     ----------
-    scenes : iterable of Scene
+    scenes : iterable of Scene or Assembly
     executor : Executor, optional
         For example a `ProcessPoolExecutor`, or the executor of a `distributed` client. Without one the scenes are
         solved in turn.
 
     Returns
     -------
-    list of Solution or FailedRun
+    list of Solution, AssemblySolution or FailedRun
         In the order of the scenes. A scene that is refused, such as one that nothing holds, is a `FailedRun`.
     """
     return list(map(_attempt, scenes)) if executor is None else list(executor.map(_attempt, scenes))
 
 
-def _attempt(scene: Scene) -> Solution | FailedRun:
+def _attempt(scene: Scene | Assembly) -> Solution | AssemblySolution | FailedRun:
     try:
         return run(scene)
     except BemkitError as error:

@@ -19,6 +19,7 @@ from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 
@@ -134,6 +135,8 @@ class Assembly:
     mesh : MeshOptions
         Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
     solver : ContactSolver
+    units : UnitNames, optional
+        Names of the units that everything is stated in; they label results.
     description, reference : str
         For the reader.
 
@@ -155,6 +158,7 @@ class Assembly:
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
+    units: UnitNames | None = None
     description: str = ""
     reference: str = ""
 

@@ -29,6 +29,7 @@ from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.symmetry import check_symmetry
+from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 
@@ -69,6 +70,8 @@ class Scene:
         How the displacements of the body away from the contact boundary are solved for.
     mesh : MeshOptions
     solver : ContactSolver
+    units : UnitNames, optional
+        Names of the units that everything is stated in; they label results.
     description, reference : str
         For the reader: what the scene shows and where it comes from.
 
@@ -94,6 +97,7 @@ class Scene:
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
+    units: UnitNames | None = None
     description: str = ""
     reference: str = ""
 

@@ -26,11 +26,11 @@ MAX_BYTES = 1_000_000
 
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
-    *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
+    *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
     *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "mesh", "parts"),
 )
 _ASSEMBLY_KEYS = (
-    *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
+    *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
     *("law", "touching", "mesh", "bodies", "rigid", "contacts"),
 )
 _BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")

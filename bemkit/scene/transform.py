@@ -167,7 +167,7 @@ def transformed_scene(
     factor = affine.factor[0] if displacement is None else displacement
     material = replace(scene.material, youngs_modulus=scene.material.youngs_modulus * modulus)
     parts = tuple(_transformed_part(part, affine, stress, factor) for part in scene.parts)
-    law = TransformedLaw(scene.law, 1.0 / stress, affine)
+    law = TransformedLaw(scene.law, 1.0 / stress, affine) if scene.contact_parts else scene.law
     symmetry = None if scene.symmetry is None else affine.transformed(scene.symmetry)
     forces = tuple(_transformed_body_force(force, affine, stress, modulus) for force in scene.body_forces)
     return replace(

@@ -20,6 +20,7 @@ from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml
+from bemkit.scene.unit_names import UnitNames
 from tests.docs.pages import Row, blocks, plain, read, section, table
 
 PAGE = read("scene-files.md")
@@ -35,7 +36,14 @@ FAMILIES = {
     "Linear solvers": kinds.LINEAR_SOLVERS,
     "Solvers": kinds.SOLVERS,
 }
-TABLES = {"The scene": Scene, "Material": Material, "Parts": Part, "Symmetry": Symmetry, "Mesh": MeshOptions}
+TABLES = {
+    "The scene": Scene,
+    "Units": UnitNames,
+    "Material": Material,
+    "Parts": Part,
+    "Symmetry": Symmetry,
+    "Mesh": MeshOptions,
+}
 
 
 def as_text(fragment: str) -> str:

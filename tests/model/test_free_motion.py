@@ -42,16 +42,16 @@ def test_a_lifted_body(law: bk.FrictionLaw) -> None:
     lift = dataclasses.replace(scene.parts[2], condition=bk.Traction(y=0.1))
     lifted = dataclasses.replace(scene, law=law, parts=(*scene.parts[:2], lift, *scene.parts[3:]))
     # 0.1 on half of the top of length 1
-    sentence = "the load pushes the body upward with 0.05 N/m; nothing holds it: change the load or hold the body"
+    sentence = "the load pushes the body upward with 0.05; nothing holds it: change the load or hold the body"
     assert complaint(lifted) == sentence
 
 
 @pytest.mark.parametrize(
     ("load", "floor", "side", "opposite", "words"),
     [
-        (bk.Traction(y=-5.0), bk.HalfPlane((0.0, 2.0), (0.0, -1.0)), "top", "bottom", "downward with 10 N/m"),
-        (bk.Traction(x=-5.0), bk.HalfPlane((2.0, 0.0), (-1.0, 0.0)), "right", "left", "to the left with 10 N/m"),
-        (bk.Traction(x=5.0), bk.HalfPlane((0.0, 0.0), (1.0, 0.0)), "left", "right", "to the right with 10 N/m"),
+        (bk.Traction(y=-5.0), bk.HalfPlane((0.0, 2.0), (0.0, -1.0)), "top", "bottom", "downward with 10"),
+        (bk.Traction(x=-5.0), bk.HalfPlane((2.0, 0.0), (-1.0, 0.0)), "right", "left", "to the left with 10"),
+        (bk.Traction(x=5.0), bk.HalfPlane((0.0, 0.0), (1.0, 0.0)), "left", "right", "to the right with 10"),
     ],
 )
 def test_directions(load: bk.Traction, floor: bk.HalfPlane, side: str, opposite: str, words: str) -> None:
@@ -62,7 +62,7 @@ def test_directions(load: bk.Traction, floor: bk.HalfPlane, side: str, opposite:
 def test_a_sliding_body(push: float, direction: str) -> None:
     # 0.6 against 0.4 times the pressing force 1.0
     text = complaint(block(push=push, press=-0.5))
-    assert text.startswith(f"the load slides the body {direction} with 0.2 N/m more than friction can hold")
+    assert text.startswith(f"the load slides the body {direction} with 0.2 more than friction can hold")
 
 
 @pytest.mark.parametrize(
@@ -71,14 +71,14 @@ def test_a_sliding_body(push: float, direction: str) -> None:
 def test_a_tipping_body(push: float, pivot: str, sense: str, moment: float) -> None:
     # pushed by 3 at the height 1 and pressed by 2 at the distance 1 from the corner; a stop keeps it from sliding
     text = complaint(block(push=push, press=-1.0, law=bk.Coulomb(1e3)))
-    assert text.startswith(f"the load turns the body {sense} about {pivot} with {moment:.4g} N m/m")
+    assert text.startswith(f"the load turns the body {sense} about {pivot} with {moment:.4g}")
 
 
 def test_forces_do_not_depend_on_the_size_of_the_body_or_its_stiffness() -> None:
     for factor in (1e-6, 1e6):
         scene = floating(bk.Traction(y=1.0), bk.HalfPlane(), "bottom", "top")
         scene = dataclasses.replace(scene, shape=bk.Rectangle(2.0 * factor, 2.0 * factor))
-        assert f"upward with {2.0 * factor:.4g} N/m" in complaint(scene)
+        assert f"upward with {2.0 * factor:.4g}" in complaint(scene)
 
 
 def test_a_free_disc_finds_its_rest_on_friction_alone() -> None:
@@ -130,7 +130,7 @@ def test_a_column_on_a_round_obstacle_stands_or_has_a_named_escape(push: float, 
         bk.run(column(push, law, bk.Circle((x, -0.4), 0.4)))
     except UnsolvableSceneError as error:
         text = str(error)
-    assert re.match(r"the load (turns|pushes|slides) the body .* with \S+ N|$", text)
+    assert re.match(r"the load (turns|pushes|slides) the body .* with \S+|$", text)
 
 
 @pytest.mark.parametrize("node", [0, 3])

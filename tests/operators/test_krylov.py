@@ -310,3 +310,16 @@ def test_pyamg_is_loaded_by_a_hierarchy_alone() -> None:
     root = Path(__file__).parents[2]
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=root)
     assert run.stdout.split() == ["False", "False", "True"]
+
+
+def test_more_columns_than_unknowns_are_solved_for() -> None:
+    """A small body all of whose sides but one are contact sides: few free unknowns, many that are retained."""
+    random = np.random.default_rng(3)
+    factor = random.normal(size=(10, 10))
+    matrix = factor @ factor.T + 0.1 * np.eye(10)
+    preconditioner = np.linalg.inv(matrix + 0.3 * np.diag(np.diag(matrix)))
+    right = random.normal(size=(10, 27)) * np.geomspace(1e-6, 1.0, 27)
+    solution, _ = block_cg(
+        lambda x: matrix @ x, lambda r: preconditioner @ r, right, rtol=1e-10, max_steps=50, name="a full matrix"
+    )
+    np.testing.assert_allclose(matrix @ solution, right, atol=1e-8)

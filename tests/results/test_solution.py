@@ -168,3 +168,10 @@ def test_a_failed_solution_says_so(solution: Solution) -> None:
     assert not failed.is_converged
     assert failed.summary()["status"] == "max_steps"
     assert "raise max_steps" in failed.summary()["message"]
+
+
+def test_two_rows_of_one_node_change_where_they_are() -> None:
+    s = np.array([0.5, 1.5, 2.5, 2.5, 3.5])
+    columns = {"s": s, "x": s - 0.5, "clearance": np.array([3.0, 2.0, 1.0, 0.0, 0.0])}
+    (found,) = find_transitions(table([SEPARATED] * 3 + [STICK] * 2, **columns))
+    assert found.s == 2.5

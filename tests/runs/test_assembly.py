@@ -235,7 +235,7 @@ def test_steps_follow_each_other_and_slip_is_remembered() -> None:
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"shift": (0.0, 0.9)}, OverlapError, "the bodies overlap by 0.1 m at"),
+        ({"shift": (0.0, 0.9)}, OverlapError, "the bodies overlap by 0.1 at"),
         ({"shift": (0.0, 5.0)}, ValueError, "contact 'upper.bottom / lower.top': the sides at"),
         ({"side": "upper.left"}, ValueError, "body 'upper': discretise: parts 'load left' and 'left' overlap on side"),
         ({"side": "upper.top", "parts": ()}, ValueError, "choose sides whose outward normals point at each other"),
@@ -312,3 +312,37 @@ def test_what_one_side_feels_the_other_gives_back() -> None:
     solution = bk.run(wall)
     (bottom,) = (force for force in solution.bodies["top"].part_forces if force.name == "bottom")
     assert bottom.force_y == pytest.approx(2.0, rel=1e-12)  # its weight, on two blocks that share its lower side
+
+
+@pytest.mark.parametrize("degree", [1, 2, 4])
+@pytest.mark.parametrize("multipliers_on", ["upper.bottom", "lower.top"])
+def test_forces_are_passed_on_whole_where_a_partner_ends_inside_an_element(degree: int, multipliers_on: str) -> None:
+    """On the elements of both sides as at the nodes; the moment is that of the load, 1 at the middle x = 0.83."""
+    lower, upper = (
+        bk.Body(
+            name=name,
+            shape=bk.Rectangle(width, 1.0),
+            material=STEEL,
+            parts=(part,),
+            placement=bk.Placement(place),
+            mesh=bk.MeshOptions(elements=26),
+        )
+        for name, width, part, place in (
+            ("lower", 2.0, bk.Part("base", bk.Clamped(), ("bottom",)), (0.0, 0.0)),
+            ("upper", 1.0, bk.Part("load", bk.Traction(0.0, -1.0), ("top",)), (0.33, 1.0)),
+        )
+    )
+    pair = bk.ContactPair(("upper.bottom", "lower.top"), multipliers_on=multipliers_on)
+    solution = bk.run(
+        bk.Assembly(title="Offset", bodies=(lower, upper), contacts=(pair,), discretisation=bk.Galerkin(degree))
+    )
+    sides = {"upper.bottom": 1.0, "lower.top": -1.0}
+    (contact,) = solution.contacts
+    assert contact.force_y == pytest.approx(sides[multipliers_on], rel=1e-12)
+    assert contact.moment == pytest.approx(0.83 * sides[multipliers_on], rel=1e-10)
+    for name, expected in sides.items():
+        body, side = name.split(".")
+        (force,) = (force for force in solution.bodies[body].part_forces if force.name == side)
+        assert force.force_y == pytest.approx(expected, rel=1e-12)  # sums of fifty numbers
+        # constant tractions on linear elements know the moment to the square of the length of one
+        assert force.moment == pytest.approx(0.83 * expected, rel=0.05 if degree == 1 else 1e-10)

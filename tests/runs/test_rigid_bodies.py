@@ -371,7 +371,7 @@ def test_a_body_that_hangs_above_comes_down_and_one_without_force_stays() -> Non
 
 def test_what_overlaps_unmeant_is_refused_and_an_interference_presses() -> None:
     deep = replace(PUNCH, obstacle=bk.Circle((1.0, 1.499), 0.5), force_y=None)
-    with pytest.raises(OverlapError, match=r"contact 'block.top / punch': the bodies overlap by 0.001 m at \(1, 1\)"):
+    with pytest.raises(OverlapError, match=r"contact 'block.top / punch': the bodies overlap by 0.001 at \(1, 1\)"):
         bk.run(replace(PRESSED, rigid=(deep,)))
     meant = replace(PRESSED, rigid=(deep,), contacts=(bk.ContactPair(("block.top", "punch"), interference=2e-3),))
     apart = replace(deep, obstacle=bk.Circle((1.0, 1.5), 0.5))

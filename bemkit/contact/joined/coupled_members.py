@@ -11,9 +11,13 @@ from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
+from bemkit.contact.condensation.nodes import retained_tangents
 from bemkit.contact.joined.member import Member, Shape, deformation, shapes_of
 from bemkit.contact.rigid_motions import null_space
 from bemkit.errors import InputError
+
+_FEW_MOTIONS = 60
+"""Rigid motions up to which their shares in what is kept are weighed; of more, those that nothing holds are found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +184,10 @@ class CoupledMembers:
         if not is_eliminated.any():
             return is_eliminated
         felt = sparse.csr_array(self.felt_motions.T)
+        if felt.shape[1] <= _FEW_MOTIONS:  # a round pin turns nearly unfelt, by the round-off of its normals
+            motions = felt.toarray().T.reshape(-1, self.n_contact, 2)
+            is_bound = ~np.any(motions[:, :, 1], axis=0)
+            return is_eliminated & ~retained_tangents(motions, is_eliminated, is_bound)
         is_kept = np.ones((self.n_contact, 2), bool)
         is_kept[is_eliminated, 1] = False
         free = null_space(sparse.csr_array(felt[is_kept.ravel()]))

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.model.boundary_tractions import projector
+
+_REACHED = 1e-12
+"""Share of the largest coupling from which on a node takes part; less is round-off of places where meshes meet."""
 
 
 def contact_tractions(
@@ -36,8 +39,9 @@ def contact_tractions(
     Notes
     -----
     The nodal forces of a side over the integrals of its basis functions: with Gauss-Lobatto nodes that is exact for
-    tractions of a degree less than the displacements, whatever the meshes. Forces and integrals of all contacts of a
-    side are added up first.
+    tractions of a degree less than the displacements, whatever the meshes. The integrals are those over all elements
+    that the partner covers at least in part: an element where a partner ends carries its whole force, spread over its
+    length. Forces of all contacts of a side are added up first.
     """
     sides: dict[tuple[int, bytes], tuple[IntArray, FloatArray, FloatArray]] = {}
     first = 0
@@ -45,23 +49,37 @@ def contact_tractions(
         own = traction[first : first + rows.n_contact]
         first += rows.n_contact
         vectors = np.einsum("n,nk,nkc->nc", rows.weights, own, rows.frame)
-        # what is rigid faces a side as a whole, also where another body touches it
-        counts = isinstance(rows.on_other, sparse.csr_array) | np.any(own != 0.0, axis=1)
         for number, coupling, elements, sign in _sides(rows):
             n_nodes = bodies[number].space.n_dofs // 2
             nothing = elements, np.zeros((n_nodes, 2)), np.zeros(n_nodes)
-            _, forces, integrals = sides.setdefault((number, elements.tobytes()), nothing)
+            _, forces, reached = sides.setdefault((number, elements.tobytes()), nothing)
             forces += sign * (coupling.T @ vectors)
-            integrals += coupling.T @ np.where(counts, rows.weights, 0.0)
+            reached += abs(coupling).T @ rows.weights
+            if not isinstance(rows.on_other, sparse.csr_array):  # an obstacle ends nowhere
+                reached[bodies[number].space.element_dofs[elements]] = 1.0 + reached.max()
     found: list[list[tuple[IntArray, FloatArray]]] = [[] for _ in bodies]
-    for (number, _), (elements, forces, integrals) in sides.items():
-        is_reached = integrals > 1e-12 * integrals.max(initial=0.0)
-        at_nodes = np.zeros_like(forces)
-        at_nodes[is_reached] = forces[is_reached] / integrals[is_reached, None]
+    for (number, _), (elements, forces, reached) in sides.items():
         body = bodies[number]
         of_tractions = body.scene.discretisation.traction_space(body.mesh)
-        found[number].append((elements, _projected(at_nodes, elements, body.space, of_tractions)))
+        is_reached = reached > _REACHED * reached.max(initial=0.0)
+        values = _spread(forces, is_reached, elements, body.space)
+        found[number].append((elements, _projected(values, body.space, of_tractions)))
     return found
+
+
+def _spread(forces: FloatArray, is_reached: BoolArray, elements: IntArray, space: BoundarySpace) -> FloatArray:
+    """Return tractions (m, n_local, 2) at the nodes of elements (m,) that stand for nodal forces (n_nodes, 2)."""
+    dofs = space.element_dofs[elements]
+    is_covered = np.asarray(is_reached[dofs].all(axis=1))
+    # nodes that are alone: on a sliver, or beside nodes that a support holds
+    alone = np.setdiff1d(np.flatnonzero(is_reached), dofs[is_covered])
+    is_covered |= np.isin(dofs, alone).any(axis=1)
+    xi, weights = gauss_legendre(space.degree + 1)
+    integrals = 0.5 * space.mesh.lengths[elements][:, None] * (space.basis(xi) @ weights)
+    totals = np.bincount(dofs[is_covered].ravel(), integrals[is_covered].ravel(), minlength=len(forces))
+    has_total = totals > 0.0
+    at_nodes = np.where(has_total[:, None], forces, 0.0) / np.where(has_total, totals, 1.0)[:, None]
+    return np.asarray(at_nodes[dofs] * is_covered[:, None, None])
 
 
 def _sides(rows: ContactRows) -> list[tuple[int, sparse.csr_array, IntArray, float]]:
@@ -72,10 +90,8 @@ def _sides(rows: ContactRows) -> list[tuple[int, sparse.csr_array, IntArray, flo
     return sides
 
 
-def _projected(
-    at_nodes: FloatArray, elements: IntArray, space: BoundarySpace, of_tractions: BoundarySpace
-) -> FloatArray:
-    """Project a field with given values at the nodes of displacements onto the tractions of some elements."""
+def _projected(at_nodes: FloatArray, space: BoundarySpace, of_tractions: BoundarySpace) -> FloatArray:
+    """Project fields (m, n_local, 2) at the nodes of displacements onto the tractions of elements."""
     xi, weights = gauss_legendre(space.degree + 1)
     projection = space.basis(xi) @ projector(of_tractions, xi, weights).T
-    return np.asarray(np.einsum("pl,epc->elc", projection, at_nodes[space.element_dofs[elements]]))
+    return np.asarray(np.einsum("pl,epc->elc", projection, at_nodes))

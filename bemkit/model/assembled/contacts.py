@@ -200,8 +200,8 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
     if overlap > pair.interference + OVERLAP_TOLERANCE * size:
         x, y = deepest
         raise OverlapError(
-            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} m at ({x:.6g}, {y:.6g}), and an "
-            f"interference of {pair.interference:g} m is given: move them apart, or give the interference that is meant"
+            f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
+            f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
         )
 
 

@@ -22,6 +22,8 @@ from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_moti
 from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.linear.block_cg import NotConvergedError
+from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity, condensed_under
@@ -69,7 +71,8 @@ class AssembledModel:
         body = self.body.under(loads, offset)
         if not np.array_equal(is_eliminated, self.prepared.tangent_is_eliminated):
             body = replace(body, tangent_is_eliminated=is_eliminated)
-        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work)
+        spent = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
+        return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + spent)
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.
@@ -142,7 +145,9 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     Raises
     ------
     SingularMatrixError
-        If supports and contacts, all sticking, do not hold a body.
+        If supports and contacts, all sticking, do not hold a body; the message names it.
+    NotConvergedError
+        If an iterative linear solver does not converge.
     """
     bodies = prepared.bodies
     elastic: list[SteklovPoincare | None] = [None] * len(bodies)
@@ -152,9 +157,12 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
         first = bodies[group[0]]
         material = first.material.scaled(prepared.units.modulus)
         solver = linear_solver(prepared, int(group[0])).solver
-        map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
         first_inside = prepared.insides[group[0]]
-        base = _loaded(map_, first_inside).condense(prepared.conditions[group[0]], prepared.forces[group[0]])
+        try:
+            map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
+            base = _loaded(map_, first_inside).condense(prepared.conditions[group[0]], prepared.forces[group[0]])
+        except (SingularMatrixError, NotConvergedError) as error:
+            raise type(error)(f"body {first.name!r}: {error}") from error
         work += base.work
         for number in group.tolist():
             elastic[number] = _loaded(map_, prepared.insides[number])
@@ -178,7 +186,8 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
         weights=prepared.column("weights") / prepared.units.length,
         tangent_is_eliminated=prepared.tangent_is_eliminated,
     )
-    work += OperationCounts(contact_unknowns=2 * prepared.n_contact)
+    n_eliminated = int(np.count_nonzero(prepared.tangent_is_eliminated))
+    work += OperationCounts(contact_unknowns=2 * prepared.n_contact - n_eliminated)
     return AssembledModel(
         prepared, tuple(each for each in elastic if each is not None), maps, joined, _problem(prepared, joined), work
     )

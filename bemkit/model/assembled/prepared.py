@@ -16,6 +16,7 @@ from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
 from bemkit.model.assembled.obstacles import obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
@@ -83,6 +84,12 @@ class PreparedAssembly:
     def names(self) -> tuple[str, ...]:
         """The contact of each contact node."""
         return tuple(rows.name for rows in self.rows for _ in range(rows.n_contact))
+
+    @property
+    def acting_at(self) -> FloatArray:
+        """(n_contact, 2) array [m]: where the force of each contact node acts on the body that it belongs to."""
+        points = (rows.on_body @ dof_points(self.bodies[rows.body].space) for rows in self.rows)
+        return np.concatenate([np.zeros((0, 2)), *points])
 
     @property
     def law(self) -> FrictionLaw:

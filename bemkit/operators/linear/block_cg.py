@@ -144,9 +144,10 @@ def _spread(
     """Make columns more nearly orthonormal.
 
     Eigenvalues of a Gram matrix tell directions only down to the square root of round-off. In a first pass smaller
-    ones are taken for just that and kept, and a second pass finds out how large they are.
+    ones are taken for just that and kept, and a second pass finds out how large they are. Scaled to one there, what is
+    left of dependent columns would be told from directions no more: round-off, for which P Q is not P of Q.
     """
-    scale, inverse = _scales(columns, preconditioned, name)
+    scale, inverse = _scales(columns, preconditioned, name, is_scaled=not is_last)
     values, vectors = _definite(inverse[:, None] * multiply(columns.T, preconditioned) * inverse, name)
     floor = _DEPENDENT * float(values.max(initial=0.0))
     kept = values > (floor if is_last else -np.inf)
@@ -155,9 +156,11 @@ def _spread(
     return multiply(columns, change), multiply(preconditioned, change), (values[:, None] * vectors.T) * scale
 
 
-def _scales(columns: FloatArray, preconditioned: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return the sizes of the columns and their inverses, zero for columns without size."""
-    scale = _sizes(columns, preconditioned, name)
+def _scales(
+    columns: FloatArray, preconditioned: FloatArray, name: str, *, is_scaled: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the sizes of the columns, or ones, and their inverses, zero for columns without size."""
+    scale = _sizes(columns, preconditioned, name) if is_scaled else np.ones(columns.shape[1])
     inverse = np.zeros(scale.shape)
     np.divide(1.0, scale, out=inverse, where=scale > 0.0)
     return scale, inverse

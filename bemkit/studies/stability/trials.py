@@ -1,4 +1,4 @@
-"""Solve random scenes and judge what comes out."""
+"""Solve random scenes and assemblies and judge what comes out."""
 
 from __future__ import annotations
 
@@ -12,13 +12,20 @@ from itertools import pairwise
 from pathlib import Path
 
 from bemkit.errors import BemkitError
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.outputs import write_text
 from bemkit.results.solution import Solution
+from bemkit.runs.assembly import run_assembly_history
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.studies.engine import Task
-from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
+from bemkit.studies.stability.independent_check import check_assembly, check_solution
+from bemkit.studies.stability.independent_check.verdict import Entries
+from bemkit.studies.stability.random_assemblies import RandomAssembly, random_assembly
 from bemkit.studies.stability.random_scenes import RandomCase, random_case
+
+EVERY = 4
+"""Every fourth trial has several bodies; the others are what they would be without these."""
 
 
 class Outcome(Enum):
@@ -67,12 +74,17 @@ class Trial:
         return self.outcome in (Outcome.WRONG, Outcome.TRACEBACK)
 
 
+def drawn_case(seed: int, index: int) -> RandomCase | RandomAssembly:
+    """Draw what a trial solves; see `random_case` and `random_assembly`."""
+    return random_assembly(seed, index) if index % EVERY == EVERY - 1 else random_case(seed, index)
+
+
 def try_case(seed: int, index: int) -> Trial:
-    """Draw a random scene, solve it and judge the answer; see `random_case`."""
+    """Draw a random scene or assembly, solve it and judge the answer; see `drawn_case`."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning of numpy is a number that nobody expected
         try:
-            steps = solved_steps(random_case(seed, index))
+            steps = solved_steps(drawn_case(seed, index))
             return Trial(seed, index, *judge(steps))
         except BemkitError as error:
             return Trial(seed, index, Outcome.NAMED, type(error).__name__, str(error))
@@ -80,33 +92,41 @@ def try_case(seed: int, index: int) -> Trial:
             return Trial(seed, index, Outcome.TRACEBACK, type(error).__name__, traceback.format_exc())
 
 
-def solved_steps(case: RandomCase) -> tuple[Solution, ...]:
+def solved_steps(case: RandomCase | RandomAssembly) -> tuple[Solution, ...] | tuple[AssemblySolution, ...]:
     """Solve the scenes of a case; one solution for each load step."""
+    if isinstance(case, RandomAssembly):
+        return (run(case.scenes[0]),) if len(case.scenes) == 1 else run_assembly_history(case.scenes)
     if len(case.scenes) == 1 and len(case.scenes[0].load_factors) == 1:
         return (run(case.scenes[0]),)
     return run_history(case.scenes)
 
 
-def judge(steps: Iterable[Solution]) -> tuple[Outcome, str, str]:
+def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outcome, str, str]:
     """Judge the steps of a load history by the independent check; return outcome, reason and message, see `Trial`."""
-    steps = tuple(steps)
-    for before, step in pairwise((None, *steps)):
+    solutions: tuple[Solution | AssemblySolution, ...] = tuple(steps)
+    for before, step in pairwise((None, *solutions)):
         if step is None or not step.is_converged:
             continue
-        check = check_solution(step, before)
+        check = _check(step, before)
         if not check.is_good:
             return Outcome.WRONG, check.faults[0], describe(check)
         if check.needs_warning and not step.warnings:
             return Outcome.WRONG, check.needs_warning, describe(check)
-    last = steps[-1]
+    last = solutions[-1]
     if not last.is_converged:
         return Outcome.NAMED, last.status.name.lower(), last.message or last.status.value
-    if any(step.warnings for step in steps):
-        return Outcome.WARNED, "warning", "; ".join(sorted({text for step in steps for text in step.warnings}))
+    if any(step.warnings for step in solutions):
+        return Outcome.WARNED, "warning", "; ".join(sorted({text for step in solutions for text in step.warnings}))
     return Outcome.SUCCESS, "", ""
 
 
-def describe(check: IndependentCheck) -> str:
+def _check(step: Solution | AssemblySolution, before: Solution | AssemblySolution | None) -> Entries:
+    if isinstance(step, AssemblySolution):
+        return check_assembly(step, before if isinstance(before, AssemblySolution) else None)
+    return check_solution(step, before if isinstance(before, Solution) else None)
+
+
+def describe(check: Entries) -> str:
     """Return the entries of the check that are too large, with their values."""
     entries = [f"{name} {check.exact[name]:.1e}" for name in check.faults]
     doubts = [f"{name} {getattr(check, name):.1e}" for name in ("reciprocity", "hidden_overlap")]
@@ -122,5 +142,5 @@ def save_trial(trial: Trial, folder: Path) -> None:
     """Write the scenes of a trial as TOML into a folder, headed by what was found."""
     lines = [f"{trial.outcome.value}: {trial.reason}", *trial.message.splitlines()]
     head = "".join(f"# {line}\n" for line in lines)
-    for name, text in random_case(trial.seed, trial.index).files().items():
+    for name, text in drawn_case(trial.seed, trial.index).files().items():
         write_text(str(folder / name), head + text)

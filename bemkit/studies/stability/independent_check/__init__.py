@@ -8,7 +8,9 @@ supports, contact and friction, whether forces and energy balance, and whether t
 elastic body.
 """
 
+from bemkit.studies.stability.independent_check.assembly_check import AssemblyCheck as AssemblyCheck
+from bemkit.studies.stability.independent_check.assembly_check import check_assembly as check_assembly
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
-from bemkit.studies.stability.independent_check.check import COARSE_LIMIT as COARSE_LIMIT
 from bemkit.studies.stability.independent_check.check import IndependentCheck as IndependentCheck
 from bemkit.studies.stability.independent_check.check import check_solution as check_solution
+from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT as COARSE_LIMIT

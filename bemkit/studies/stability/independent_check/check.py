@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.laws import FrictionLaw
+from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.studies.stability.independent_check.balance import (
@@ -19,17 +21,7 @@ from bemkit.studies.stability.independent_check.balance import (
 )
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
 from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
-
-COARSE_LIMIT = 0.1
-"""Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
-that of fields which do not belong to the body at all."""
-COARSE_SHARE = 2.0
-"""The same for each unit of `IndependentCheck.coarseness`: collocation with 35, 70 and 140 elements on a block between
-two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
-OVERLAP_LIMIT = 1e-5
-"""Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
-the warning takes for round-off."""
-_INEXACT = ("reciprocity", "coarseness", "hidden_overlap")
+from bemkit.studies.stability.independent_check.verdict import Entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +62,41 @@ def measured_contact(fields: Fields) -> Measured:
         slip = slip - nodes.components(before.boundary.displacement[nodes.nodes])[:, 1]
         turned = scales.turned + scales_of(before).turned  # after a large motion more than all there is of a small one
         slip = np.sign(slip) * np.maximum(np.abs(slip) - turned, 0.0)
-    clearance = np.where(np.isfinite(table.gap), table.gap - motion[:, 0], np.inf) / scales.length
-    pressure, shear = -table.sigma_n / scales.stress, table.sigma_t / scales.stress
+    units = np.broadcast_to(scales.length, slip.shape), np.broadcast_to(scales.stress, slip.shape)
+    return measure(table, law, motion[:, 0], slip, nodes.is_supported, units)
+
+
+def measure(
+    table: ContactTable,
+    law: FrictionLaw,
+    approach: FloatArray,
+    slip: FloatArray,
+    is_supported: BoolArray,
+    units: tuple[FloatArray, FloatArray],
+) -> Measured:
+    """Return what the laws speak of.
+
+    Parameters
+    ----------
+    table : ContactTable
+    law : FrictionLaw
+        Of its nodes.
+    approach, slip : (n_contact,) arrays [m]
+        Displacements along the direction of contact, and tangential since the state before.
+    is_supported : (n_contact,) bool array
+        Nodes that no friction law governs.
+    units : two (n_contact,) arrays [m], [Pa]
+    """
+    length, stress = units
+    clearance = np.where(np.isfinite(table.gap), table.gap - approach, np.inf) / length
+    pressure, shear = -table.sigma_n / stress, table.sigma_t / stress
     acts_across_gap = np.broadcast_to(np.asarray(law.acts_across_gap), pressure.shape)
-    held = np.maximum(np.abs(pressure), np.where(acts_across_gap | nodes.is_supported, 0.0, np.abs(shear)))
+    held = np.maximum(np.abs(pressure), np.where(acts_across_gap | is_supported, 0.0, np.abs(shear)))
     # A node that is held by less than it is away counts as open (its complementarity says by how much): whether
     # cohesion acts shall not depend on a traction of 1e-16.
     acts = (held > np.abs(clearance)) | acts_across_gap
-    bound = np.where(acts, law.bound(np.minimum(table.sigma_n, 0.0)), 0.0) / scales.stress
-    return Measured(pressure, shear, clearance, slip / scales.length, held, bound, ~nodes.is_supported)
+    bound = np.where(acts, law.bound(np.minimum(table.sigma_n, 0.0)), 0.0) / stress
+    return Measured(pressure, shear, clearance, slip / length, held, bound, ~is_supported)
 
 
 def obstacle_mismatch(fields: Fields) -> float:
@@ -138,9 +156,8 @@ def slip_opposition(measured: Measured) -> float:
     return largest(np.minimum(np.abs(measured.slip), missing)[measured.obeys_friction])
 
 
-def status_mismatch(solution: Solution, measured: Measured) -> float:
+def status_mismatch(status: IntArray, measured: Measured) -> float:
     """Return the largest violation [-] of what the status of a node claims."""
-    status = solution.contact.status
     direction = np.select([status == NodeStatus.SLIP_FORWARD, status == NodeStatus.SLIP_BACKWARD], [1.0, -1.0])
     slides_freely = measured.bound <= CONTACT_LIMIT
     against = np.where(slides_freely, 0.0, np.minimum(-direction * measured.slip, measured.bound))
@@ -151,8 +168,8 @@ def status_mismatch(solution: Solution, measured: Measured) -> float:
     return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
 
 
-@dataclass(frozen=True)
-class IndependentCheck:
+@dataclass(frozen=True, kw_only=True)
+class IndependentCheck(Entries):
     """Violations found in the fields of a solution, dimensionless; zero is perfect.
 
     Parameters
@@ -177,13 +194,8 @@ class IndependentCheck:
         Work of loads and contact tractions on the rigid motions that no support holds.
     negative_energy, energy : float
         Elastic energy below zero; against half the work of the external forces.
-    reciprocity : float
-        Betti's theorem against states of uniform stress, point forces and centres of dilatation outside of the body;
-        holds up to the discretisation error.
-    coarseness : float
-        Length of the longest element over the diameter of the body.
-    hidden_overlap : float
-        How deep nodes that supports hold against their obstacle are in it, over the largest displacement.
+    reciprocity, coarseness, hidden_overlap
+        See `Entries`; point forces and centres of dilatation outside of the body and uniform stresses are the states.
     """
 
     numbers: float
@@ -200,42 +212,6 @@ class IndependentCheck:
     equilibrium: float
     negative_energy: float
     energy: float
-    reciprocity: float
-    coarseness: float
-    hidden_overlap: float
-
-    @property
-    def exact(self) -> dict[str, float]:
-        """The entries that must vanish to round-off on every mesh, by name."""
-        return {name: value for name, value in asdict(self).items() if name not in _INEXACT}
-
-    @property
-    def worst(self) -> float:
-        """The largest entry that must vanish to round-off; nan if any entry is."""
-        return float(np.max(list(self.exact.values())))
-
-    @property
-    def faults(self) -> tuple[str, ...]:
-        """Names of the entries that must vanish and do not, the largest first."""
-        wrong = {name: value for name, value in self.exact.items() if not value <= CONTACT_LIMIT}
-        return tuple(sorted(wrong, key=lambda name: -np.nan_to_num(wrong[name], nan=np.inf, posinf=np.inf)))
-
-    @property
-    def is_good(self) -> bool:
-        """Whether the fields obey supports, contact, friction, equilibrium and the balance of energy."""
-        return not self.faults
-
-    @property
-    def needs_warning(self) -> str:
-        """What a solution must warn of: "reciprocity" of a coarse mesh, "hidden_overlap"; empty if there is nothing."""
-        if self.hidden_overlap > OVERLAP_LIMIT:
-            return "hidden_overlap"
-        return "reciprocity" if self.is_coarse else ""
-
-    @property
-    def is_coarse(self) -> bool:
-        """Whether tractions and displacements belong to one elastic body only roughly."""
-        return not self.reciprocity <= max(COARSE_LIMIT, COARSE_SHARE * self.coarseness)
 
 
 def check_solution(solution: Solution, before: Solution | None = None) -> IndependentCheck:
@@ -245,28 +221,29 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
     load history.
     """
     if not _is_finite(solution):
-        return IndependentCheck(float("inf"), *(float("nan"),) * 16)
-    fields = Fields.of(solution, before)
-    measured = measured_contact(fields)
+        unknown = dict.fromkeys((entry.name for entry in fields(IndependentCheck)), float("nan"))
+        return IndependentCheck(**{**unknown, "numbers": float("inf")})
+    parts = Fields.of(solution, before)
+    measured = measured_contact(parts)
     has_history = before is None and len(solution.scene.load_factors) > 1
     return IndependentCheck(
         numbers=0.0,
-        obstacle=obstacle_mismatch(fields),
-        table=max(table_mismatch(fields), resultant_mismatch(solution)),
-        tractions=max(traction_mismatch(fields), load_mismatch(fields)),
-        supports=support_mismatch(fields),
+        obstacle=obstacle_mismatch(parts),
+        table=max(table_mismatch(parts), resultant_mismatch(solution)),
+        tractions=max(traction_mismatch(parts), load_mismatch(parts)),
+        supports=support_mismatch(parts),
         penetration=largest(-measured.clearance),
         tension=largest(-measured.pressure),
         complementarity=largest(np.minimum(measured.held, np.abs(measured.clearance))),
         cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
         slip_opposition=0.0 if has_history else slip_opposition(measured),
-        status=0.0 if has_history else status_mismatch(solution, measured),
-        equilibrium=imbalance(fields),
-        negative_energy=negative_energy(fields),
-        energy=energy_mismatch(fields),
-        reciprocity=reciprocity_mismatch(fields),
-        coarseness=float(fields.boundary.lengths.max()) / solution.mesh.diameter,
-        hidden_overlap=hidden_overlap(fields),
+        status=0.0 if has_history else status_mismatch(solution.contact.status, measured),
+        equilibrium=imbalance(parts),
+        negative_energy=negative_energy(parts),
+        energy=energy_mismatch(parts),
+        reciprocity=reciprocity_mismatch(parts),
+        coarseness=float(parts.boundary.lengths.max()) / solution.mesh.diameter,
+        hidden_overlap=hidden_overlap(parts),
     )
 
 

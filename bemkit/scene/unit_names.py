@@ -1,0 +1,67 @@
+"""The names of the units that a scene is stated in; they label results and change no number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from bemkit.errors import InputError
+
+_LONGEST = 24
+
+
+@dataclass(frozen=True)
+class UnitNames:
+    """Names of units, one consistent set.
+
+    Parameters
+    ----------
+    length : str
+        Such as ``"mm"``.
+    stress : str
+        Such as ``"MPa"``; of tractions, pressures and moduli.
+    force : str, optional
+        Of forces per thickness, stress times length, such as ``"N/mm"``; put together of the two if left out.
+
+    Raises
+    ------
+    InputError
+        If a name is empty, longer than 24 letters or not printable.
+    """
+
+    length: str
+    stress: str
+    force: str | None = None
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            name = getattr(self, entry.name)
+            if name is None and entry.name == "force":
+                object.__setattr__(self, "force", f"{self.stress} {self.length}")
+                continue
+            if not (isinstance(name, str) and name.strip() and name.isprintable() and len(name) <= _LONGEST):
+                raise InputError(f"units.{entry.name} is {name!r}: give a short name such as 'mm' or 'MPa'")
+
+    @property
+    def energy(self) -> str:
+        """Of energies and moments per thickness."""
+        return f"{self.force} {self.length}"
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the names of all quantities."""
+        return {"length": self.length, "stress": self.stress, "force": self.force or "", "energy": self.energy}
+
+
+def unit_of(quantity: str, units: UnitNames | None) -> str:
+    """Return the name of the unit of a quantity (length, stress, force, energy), empty if units have no names."""
+    return units.as_dict()[quantity] if units is not None and quantity else ""
+
+
+def amount(value: float, quantity: str, units: UnitNames | None, digits: int = 4) -> str:
+    """Return a number with its unit, if units have names."""
+    return f"{value:.{digits}g} {unit_of(quantity, units)}".rstrip()
+
+
+def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
+    """Return a label with the unit in brackets, if units have names."""
+    unit = unit_of(quantity, units)
+    return f"{label} [{unit}]" if unit else label

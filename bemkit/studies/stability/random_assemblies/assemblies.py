@@ -1,0 +1,118 @@
+"""Random assemblies: bodies, contacts, law, driver, units, place and load history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
+from bemkit.scene.conditions import Part, Pressure, Traction
+from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.scene import LARGEST_KRYLOV_ERROR
+from bemkit.scene.toml import scene_to_toml
+from bemkit.solvers.alm import AugmentedLagrangian
+from bemkit.solvers.base import ContactSolver
+from bemkit.solvers.fixed_point import FixedPoint
+from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.studies.stability.random_assemblies.layouts import random_layout
+from bemkit.studies.stability.random_assemblies.members import Members
+from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.random_scenes.draw import Draw
+
+_STREAM = 2
+"""Keeps the draws of assemblies apart from those of scenes with the same numbers."""
+
+
+@dataclass(frozen=True)
+class RandomAssembly:
+    """Assemblies that follow each other in time, mostly a single one, and the numbers from which they were drawn."""
+
+    seed: int
+    index: int
+    scenes: tuple[Assembly, ...]
+
+    def files(self) -> dict[str, str]:
+        """Return scene files (TOML) by name, one for each assembly."""
+        name = f"random-assembly-{self.seed}-{self.index}"
+        names = [name] if len(self.scenes) == 1 else [f"{name}-step-{k}" for k in range(1, len(self.scenes) + 1)]
+        return {f"{each}.toml": scene_to_toml(scene) for each, scene in zip(names, self.scenes, strict=True)}
+
+
+def random_assembly(seed: int, index: int) -> RandomAssembly:
+    """Draw assembly number `index` of a seed; the same numbers always give the same assembly.
+
+    Raises
+    ------
+    BemkitError
+        If what was drawn is no assembly; the message says why.
+    """
+    draw = Draw(np.random.PCG64([seed, index, _STREAM]))
+    members = Members.drawn(draw)
+    layout = random_layout(draw, members)
+    discretisation = members.discretisation()
+    spaces = [discretisation if body.discretisation is None else body.discretisation for body in layout.bodies]
+    symmetric = all(space.is_symmetric for space in spaces) and not any(
+        Krylov().error_at(body.material) > LARGEST_KRYLOV_ERROR for body in layout.bodies
+    )
+    assembly = Assembly(
+        title=f"random assembly {index} of seed {seed}",
+        bodies=layout.bodies,
+        contacts=layout.contacts,
+        touching=layout.touching,
+        law=members.law(),
+        discretisation=discretisation,
+        linear_solver=draw.one_of((Automatic(), Automatic(), DenseCholesky(), Krylov() if symmetric else Automatic())),
+        solver=_solver(draw),
+    )
+    if all(space.estimates_error for space in spaces) and draw.chance(0.05):
+        bodies = tuple(replace(body, mesh=None) for body in assembly.bodies)
+        mesh = MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 80)))
+        assembly = replace(assembly, bodies=bodies, mesh=mesh)
+    elsewhere = _similarity(draw).apply(assembly)
+    return RandomAssembly(seed, index, _history(draw, elsewhere))
+
+
+def _similarity(draw: Draw) -> AssemblySimilarity:
+    """Draw units, a direction and a place: mostly steel and millimetres to metres, sometimes far from the origin."""
+    length = 1.0 if draw.chance(0.4) else draw.decades(-6.0, 6.0)
+    stress = 1.0 if draw.chance(0.3) else draw.decades(-6.0, 12.0)
+    turn = draw.one_of((0.0, 0.0, 0.0, 90.0, draw.between(-180.0, 180.0)))
+    far = draw.one_of((0.0, 0.0, 0.0, 1.0, draw.decades(0.0, 5.0)))
+    x, y = (length * far * draw.direction()).tolist()
+    return AssemblySimilarity(length, stress, turn, (x, y))
+
+
+def _solver(draw: Draw) -> ContactSolver:
+    drivers: dict[ContactSolver, float] = {
+        SemismoothNewton(): 8.0,
+        SemismoothNewton(rho=draw.decades(-3.0, 3.0)): 1.0,
+        AugmentedLagrangian(max_steps=60): 1.0,
+        FixedPoint(max_steps=60): 1.0,
+    }
+    return draw.one_by_weight(drivers)
+
+
+def _history(draw: Draw, assembly: Assembly) -> tuple[Assembly, ...]:
+    """Return the assembly, sometimes followed by one whose loads have changed."""
+    if assembly.mesh.accuracy is not None or not draw.chance(0.15):
+        return (assembly,)
+    factors = [draw.one_of((0.5, 1.0, 1.5, 0.0)) for _ in assembly.bodies]
+    bodies = tuple(_loaded(body, factor) for body, factor in zip(assembly.bodies, factors, strict=True))
+    return assembly, replace(assembly, bodies=bodies)
+
+
+def _loaded(body: Body, factor: float) -> Body:
+    """Return a body whose tractions and pressures are multiplied."""
+
+    def changed(part: Part) -> Part:
+        match part.condition:
+            case Traction(float(x), float(y)):
+                return replace(part, condition=Traction(factor * x, factor * y))
+            case Pressure(float(pressure), float(shear)):
+                return replace(part, condition=Pressure(factor * pressure, factor * shear))
+        return part
+
+    return replace(body, parts=tuple(changed(part) for part in body.parts))

@@ -1,0 +1,189 @@
+"""Assemblies in other units, turned and elsewhere: every result follows from that of the original."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.laws import CohesiveCoulomb, FrictionLaw, Tresca
+from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
+from bemkit.errors import InputError
+from bemkit.geometry.placement import Placement
+from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
+from bemkit.scene.assembly import Assembly, ContactPair
+from bemkit.scene.body import Body
+from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
+from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
+from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
+
+
+@dataclass(frozen=True)
+class AssemblySimilarity:
+    """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
+
+    Assemblies are changed number by number, so that the result can be written to a file: fields have to be numbers, and
+    copies in a grid stay as they are turned only by way of a list of places.
+
+    Parameters
+    ----------
+    length, stress : float
+        Factors of all lengths, displacements among them, and of all stresses, moduli among them.
+    turn : float [degree]
+        Anticlockwise, about the origin.
+    shift : (float, float) [m]
+        Where the origin goes.
+    """
+
+    length: float = 1.0
+    stress: float = 1.0
+    turn: float = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def _motion(self) -> Placement:
+        return Placement(self.shift, self.turn)
+
+    def points(self, points: FloatArray) -> FloatArray:
+        """Map points (..., 2)."""
+        return self._motion.forward(self.length * points)
+
+    def vectors(self, vectors: FloatArray) -> FloatArray:
+        """Turn vectors (..., 2)."""
+        return self._motion.turned(vectors)
+
+    def apply(self, assembly: Assembly) -> Assembly:
+        """Return the similar assembly."""
+        touching = assembly.touching
+        if touching is not None:
+            law = None if touching.law is None else self._law(touching.law)
+            touching = replace(touching, within=self.length * touching.within, law=law)
+        return replace(
+            assembly,
+            bodies=tuple(self._body(body) for body in assembly.bodies),
+            contacts=tuple(self._pair(pair) for pair in assembly.contacts),
+            touching=touching,
+            law=self._law(assembly.law),
+        )
+
+    def _pair(self, pair: ContactPair) -> ContactPair:
+        law = None if pair.law is None else self._law(pair.law)
+        return replace(pair, gap=self.length * pair.gap, interference=self.length * pair.interference, law=law)
+
+    def _law(self, law: FrictionLaw) -> FrictionLaw:
+        match law:
+            case Tresca(bound_value=bound):
+                return Tresca(self.stress * _number(bound))
+            case CohesiveCoulomb(coefficient, cohesion, cap):
+                return CohesiveCoulomb(coefficient, self.stress * _number(cohesion), self.stress * _number(cap))
+        return law
+
+    def _body(self, body: Body) -> Body:
+        material = replace(body.material, youngs_modulus=self.stress * body.material.youngs_modulus)
+        placement = self._motion.after(Placement(self._scaled(body.placement.shift), body.placement.turn))
+        return replace(
+            body,
+            shape=self._shape(body.shape),
+            material=material,
+            parts=tuple(self._part(part) for part in body.parts),
+            body_forces=tuple(self._force(force) for force in body.body_forces),
+            placement=placement,
+            copies=None if body.copies is None else self._copies(body.copies),
+        )
+
+    def _scaled(self, point: tuple[float, float]) -> tuple[float, float]:
+        return self.length * point[0], self.length * point[1]
+
+    def _point(self, point: tuple[float, float]) -> tuple[float, float]:
+        x, y = self.points(np.array(point)).tolist()
+        return x, y
+
+    def _vector(self, x: float, y: float, factor: float) -> tuple[float, float]:
+        x, y = (factor * self.vectors(np.array([x, y]))).tolist()
+        return x, y
+
+    def _copies(self, copies: Copies) -> Copies:
+        """Return the copies of a body that is already in its new place."""
+        match copies:
+            case CircleCopies(count, angle, centre):
+                return CircleCopies(count, angle, self._point(centre))
+            case GridCopies() if self._motion.is_shift:
+                return GridCopies(copies.columns, copies.rows, self._scaled(copies.step))
+        # x -> M P M^-1 x moves what M has moved
+        back = Placement(turn=-self.turn).after(Placement((-self.shift[0], -self.shift[1])))
+        places = [Placement(self._scaled(place.shift), place.turn) for place in copies.placements().values()]
+        return ListedCopies(tuple(self._motion.after(place.after(back)) for place in places))
+
+    def _shape(self, shape: Shape) -> Shape:
+        factor, scaled = self.length, self._scaled
+        match shape:
+            case Rectangle(width, height, corner):
+                return Rectangle(factor * width, factor * height, scaled(corner))
+            case Polygon(vertices, names):
+                return Polygon(tuple(scaled(vertex) for vertex in vertices), names)
+            case Disk(radius, centre):
+                return Disk(factor * radius, scaled(centre))
+            case Ring(inner, outer, centre):
+                return Ring(factor * inner, factor * outer, scaled(centre))
+            case Sector(radius, start, end, centre):
+                return Sector(factor * radius, start, end, scaled(centre))
+            case PlateWithHole(width, height, radius, corner):
+                return PlateWithHole(factor * width, factor * height, factor * radius, scaled(corner))
+            case ExteriorOf(inner_shape):
+                return ExteriorOf(self._shape(inner_shape))
+        raise InputError(f"shape is {type(shape).__name__}: give one of those that random assemblies are made of")
+
+    def _part(self, part: Part) -> Part:
+        if part.where is not None:
+            raise InputError(f"part {part.name!r} is chosen by a region: choose it by sides")
+        return replace(part, condition=self._condition(part.condition))
+
+    def _condition(self, condition: Condition) -> Condition:
+        match condition:
+            case Traction(x, y):
+                return Traction(*self._vector(_number(x), _number(y), self.stress))
+            case Pressure(pressure, shear):
+                return Pressure(self.stress * _number(pressure), self.stress * _number(shear))
+            case PrescribedDisplacement(x, y) if x is not None and y is not None:
+                return PrescribedDisplacement(*self._vector(_number(x), _number(y), self.length))
+            case PrescribedDisplacement(x, y) if self.turn == 0.0:
+                scaled = (None if each is None else self.length * _number(each) for each in (x, y))
+                return PrescribedDisplacement(*scaled)
+            case PrescribedDisplacement():
+                raise InputError("one component of a displacement cannot be turned: give both")
+            case Contact(obstacle, law):
+                return Contact(self._obstacle(obstacle), None if law is None else self._law(law))
+        return condition
+
+    def _obstacle(self, obstacle: Obstacle) -> Obstacle:
+        match obstacle:
+            case HalfPlane(point, (x, y)):
+                return HalfPlane(self._point(point), self._vector(x, y, 1.0))
+            case Circle(centre, radius):
+                return Circle(self._point(centre), self.length * radius)
+            case Cavity(centre, radius):
+                return Cavity(self._point(centre), self.length * radius)
+            case Gap(value, None):
+                return Gap(self.length * _number(value))
+        raise InputError(f"obstacle is {type(obstacle).__name__}: give a plane, a circle, a cavity or a plain gap")
+
+    def _force(self, force: BodyForce) -> BodyForce:
+        match force:
+            case Gravity(density, (x, y)):
+                return replace(force, density=self.stress * density, acceleration=self._vector(x, y, 1.0 / self.length))
+            case Rotation(density, rate, centre):
+                return replace(
+                    force,
+                    density=self.stress * density,
+                    angular_velocity=rate / self.length,
+                    centre=self._point(centre),
+                )
+        return force  # heat by a number: the same everywhere
+
+
+def _number(field: object) -> float:
+    """Return a field that is a number."""
+    if not isinstance(field, int | float):
+        raise InputError(f"{field!r} is no number: give one, fields are not turned")
+    return float(field)
