@@ -343,6 +343,32 @@ def test_forces_and_motions_set_the_units(scale: float) -> None:
         assert getattr(solved(driven(**changes)).rigid["punch"], name) == pytest.approx(scale * expected, rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"force_y": -3.0}, 3.0 / np.sqrt(5.0)),
+        ({"moment": 30.0}, 30.0 / 5.0),
+        ({"force_y": None, "y": -3.0}, 3.0 / np.sqrt(5.0) * STEEL.plane_modulus),
+        ({"force_y": None, "turn": 3.0}, 3.0 * STEEL.plane_modulus),
+    ],
+)
+def test_the_unit_of_stress_is_that_of_the_largest_force_or_motion(
+    changes: dict[str, float | None], expected: float
+) -> None:
+    units = prepare_assembly(driven(**changes)).units
+    assert units.length == pytest.approx(np.sqrt(5.0), rel=1e-12)
+    assert units.stress == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_body_that_hangs_above_comes_down_and_one_without_force_stays() -> None:
+    high = replace(PUNCH, obstacle=bk.PolygonalObstacle(((0.5, 1.1), (1.5, 1.1), (1.5, 1.5), (0.5, 1.5))))
+    down = solved(replace(PRESSED, rigid=(high,))).rigid["punch"]
+    assert down.y + 0.1 == pytest.approx(solved(PRESSED).rigid["punch"].y, rel=1e-10)
+    still = solved(driven(force_y=0.0))
+    assert still.rigid["punch"].y == 0.0
+    assert np.abs(still.contact.sigma_n).max() == 0.0
+
+
 def test_what_overlaps_unmeant_is_refused_and_an_interference_presses() -> None:
     deep = replace(PUNCH, obstacle=bk.Circle((1.0, 1.499), 0.5), force_y=None)
     with pytest.raises(OverlapError, match=r"contact 'block.top / punch': the bodies overlap by 0.001 at \(1, 1\)"):
