@@ -111,6 +111,9 @@ class Assembly:
         Finds contacts where bodies face each other, besides those that are listed.
     law : FrictionLaw
         In all contacts that have no law of their own, with bodies and with rigid obstacles.
+    load_factors : tuple of float
+        All loads, given displacements and body forces that are not constant times these numbers, one step after the
+        other; slip counts from the end of the step before. Gaps and obstacles stay as they are.
     discretisation : Discretisation
         Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
@@ -124,7 +127,8 @@ class Assembly:
     ------
     InputError
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
-        listed twice, or an accuracy is asked of collocation or goes with elements of a body.
+        listed twice, a load factor is missing or not finite, or an accuracy is asked of collocation or goes with
+        elements of a body or with load factors.
     """
 
     title: str
@@ -132,6 +136,7 @@ class Assembly:
     contacts: tuple[ContactPair, ...] = ()
     touching: Touching | None = None
     law: FrictionLaw = field(default_factory=Frictionless)
+    load_factors: tuple[float, ...] = (1.0,)
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
@@ -147,6 +152,9 @@ class Assembly:
         repeated = [name for name, count in Counter(body.name for body in self.placed_bodies).items() if count > 1]
         if repeated:
             raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
@@ -159,6 +167,11 @@ class Assembly:
             _ = self.scene_of(body)  # parts and sides are checked
 
     def _check_accuracy(self, accuracy: float) -> None:
+        if len(self.load_factors) > 1:
+            raise InputError(
+                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
+                "belongs to one mesh: give elements"
+            )
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
             if discretisation.needs_accuracy:
@@ -182,7 +195,20 @@ class Assembly:
             names = list(self._by_name)
             listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
             raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
-        _ = self._by_name[body].contact_part(part)
+        placed = self._by_name[body]
+        if any(part == own.name for own in placed.parts) or part not in self._side_names(placed):
+            _ = placed.contact_part(part)
+
+    def _side_names(self, body: Body) -> tuple[str, ...]:
+        """Return the names of the sides of a body; copies share them, for an outline checks itself."""
+        if id(body.shape) not in self._sides:
+            self._sides[id(body.shape)] = tuple(body.shape.outline().side_names)
+        return self._sides[id(body.shape)]
+
+    @cached_property
+    def _sides(self) -> dict[int, tuple[str, ...]]:
+        """The names of the sides of shapes."""
+        return {}
 
     @cached_property
     def placed_bodies(self) -> tuple[Body, ...]:
@@ -211,7 +237,7 @@ class Assembly:
         taken = {side for part in body.parts for side in part.sides}
         whole = any(not part.sides for part in body.parts)
         free = [part.name for part in body.parts if isinstance(part.condition, Free)]
-        sides = [] if whole else [side for side in body.shape.outline().side_names if side not in taken]
+        sides = [] if whole else [side for side in self._side_names(body) if side not in taken]
         return tuple(dict.fromkeys([*listed, *free, *sides]))
 
     @cached_property
@@ -243,6 +269,7 @@ class Assembly:
                 parts=parts,
                 body_forces=body.body_forces,
                 law=self.law if touches_obstacle else Frictionless(),
+                load_factors=self.load_factors,
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,
                 mesh=self.mesh if body.mesh is None else body.mesh,

@@ -31,7 +31,7 @@ _SCENE_KEYS = (
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "discretisation", "linear_solver", "solver"),
-    *("law", "touching", "mesh", "bodies", "contacts"),
+    *("load_factors", "law", "touching", "mesh", "bodies", "contacts"),
 )
 _BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
 _PART_KEYS = ("sides", "where", "condition")

@@ -15,7 +15,6 @@ from bemkit.contact.joined.member import Member
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contact_tractions import contact_tractions
-from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.boundary_tractions import insert_loads
@@ -57,7 +56,10 @@ class AssembledModel:
         prepared : PreparedAssembly
             From `PreparedAssembly.under` of this model's.
         """
-        condensed = tuple(_under(each, prepared, number) for number, each in enumerate(self.condensed))
+        condensed = tuple(
+            each if _is_loaded_alike(prepared, self.prepared, number) else _under(each, prepared, number)
+            for number, each in enumerate(self.condensed)
+        )
         elastic = tuple(
             replace(each, inside=inside) if isinstance(each, HeavyElasticity) and inside is not None else each
             for each, inside in zip(self.elastic, prepared.insides, strict=True)
@@ -189,66 +191,60 @@ def _motions(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
     return np.asarray(along[:, conditions.is_retained])
 
 
-def _nodal(body: PlacedBody, conditions: NodalConditions) -> tuple[sparse.csr_array, FloatArray]:
-    """Return how the retained displacements move the nodes in the axes of the scene.
-
-    Returns
-    -------
-    sparse (2 n_nodes, n_retained) array, (2 n_nodes,) array
-        Displacements are the product, and the array what supports prescribe.
-    """
+def _nodal(body: PlacedBody, conditions: NodalConditions) -> sparse.csr_array:
+    """Return how retained displacements move nodes in the axes of the scene, sparse (2 n_nodes, n_retained)."""
     directions = body.to_place(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
     node, k = np.nonzero(conditions.is_retained)
     vectors = directions[node, k]
     rows = 2 * node[:, None] + np.arange(2)
     columns = np.broadcast_to(np.arange(node.size)[:, None], rows.shape)
     shape = (2 * len(directions), node.size)
-    matrix = sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
-    given = np.einsum("nkc,nk->nc", directions, np.where(conditions.is_fixed, conditions.displacement, 0.0))
-    return matrix, given.ravel()
+    return sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
-def _in_frames(rows: ContactRows, on_nodes: sparse.csr_array) -> sparse.csr_array:
-    """Return the (n, t) components (2 n, 2 n_nodes) of what a coupling (n, n_nodes) makes of nodal displacements."""
-    n = rows.n_contact
-    blocks = sparse.bsr_array((rows.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n))
-    return sparse.csr_array(blocks @ sparse.kron(on_nodes, sparse.eye_array(2), format="csr"))
+def _given(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
+    """Return the displacements (2 n_nodes,) that supports prescribe, in the axes of the scene."""
+    fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)
+    return np.asarray(np.einsum("nkc,nk->nc", body.to_place(conditions.frame), fixed)).ravel()
 
 
-def _couplings(rows: ContactRows) -> list[tuple[int, sparse.csr_array]]:
-    """Return the bodies that a contact involves, and how their nodes enter it."""
-    found = [(rows.body, _in_frames(rows, rows.on_body))]
-    if rows.on_other is not None:
-        found.append((rows.other, -_in_frames(rows, rows.on_other)))
-    return found
+def _coupling(prepared: PreparedAssembly) -> sparse.csr_array:
+    """Return how the nodes of all bodies move the contact nodes, (2 n_contact, 2 n_nodes), in (n, t) components."""
+    n_nodes = [body.space.n_dofs // 2 for body in prepared.bodies]
+    first = np.concatenate([[0], np.cumsum(n_nodes)])
+    data, row, column, begin = [np.zeros(0)], [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], 0
+    for rows in prepared.rows:
+        for sign, number, on_nodes in ((1.0, rows.body, rows.on_body), (-1.0, rows.other, rows.on_other)):
+            if on_nodes is not None:
+                data.append(sign * on_nodes.data)
+                row.append(begin + np.repeat(np.arange(rows.n_contact), np.diff(on_nodes.indptr)))
+                column.append(first[number] + on_nodes.indices)
+        begin += rows.n_contact
+    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(column))
+    difference = sparse.csr_array(entries, (begin, int(first[-1])))
+    frames = sparse.bsr_array((prepared.frame, np.arange(begin), np.arange(begin + 1)), shape=(2 * begin, 2 * begin))
+    return sparse.csr_array(sparse.csr_array(frames) @ sparse.kron(difference, sparse.eye_array(2), format="csr"))
 
 
 def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
-    nodal = [_nodal(*pair)[0] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    sizes = [matrix.shape[1] for matrix in nodal]
-    first = np.concatenate([[0], np.cumsum(sizes)])
-    data, row, column, begin = [], [], [], 0
-    for rows in prepared.rows:
-        for number, coupling in _couplings(rows):
-            block = sparse.coo_array(coupling @ nodal[number])
-            data.append(block.data)
-            row.append(block.row + begin)
-            column.append(block.col + first[number])
-        begin += 2 * rows.n_contact
-    shape = (begin, int(first[-1]))
-    if not data:
-        return sparse.csr_array(shape)
-    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(column))
-    relative = sparse.csr_array(sparse.coo_array(entries, shape))
+    nodal = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    relative = sparse.csr_array(_coupling(prepared) @ sparse.block_diag(nodal, format="csr"))
     relative.eliminate_zeros()
     return relative
 
 
 def _offset(prepared: PreparedAssembly) -> FloatArray:
     """Return the relative displacements (2 n_contact,) that supports prescribe."""
-    given = [_nodal(*pair)[1] for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    parts = [np.zeros(0)]
-    for rows in prepared.rows:
-        parts.append(np.sum([coupling @ given[number] for number, coupling in _couplings(rows)], axis=0))
-    return np.concatenate(parts)
+    given = [_given(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    if not any(each.any() for each in given):
+        return np.zeros(2 * prepared.n_contact)
+    return np.asarray(_coupling(prepared) @ np.concatenate(given))
+
+
+def _is_loaded_alike(prepared: PreparedAssembly, other: PreparedAssembly, number: int) -> bool:
+    """Tell whether all that acts on a body is the same object in two steps."""
+    given, before = (
+        (each.forces[number], each.insides[number], each.conditions[number].displacement) for each in (prepared, other)
+    )
+    return all(one is two for one, two in zip(given, before, strict=True))

@@ -12,6 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
+from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
@@ -119,16 +120,60 @@ class PreparedAssembly:
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
 
+        What acts on a body is worked out anew only if its parts or body forces are other objects than before.
+
         Parameters
         ----------
         assembly : Assembly
             Differs in numbers of conditions and contacts alone.
+
+        Raises
+        ------
+        InputError
+            If its bodies have other names.
         """
+        names, others = ([body.name for body in each] for each in (self.bodies, assembly.placed_bodies))
+        if names != others:
+            raise InputError(
+                f"the bodies are {_first_of(others)}, and those of the step before {_first_of(names)}: change numbers "
+                "of conditions and contacts only"
+            )
         bodies = tuple(
-            replace(body, body=other, scene=assembly.scene_of(other))
+            body.under(other, assembly.scene_of(other))
             for body, other in zip(self.bodies, assembly.placed_bodies, strict=True)
         )
-        return _prepared(assembly, bodies, self.units)
+        return _prepared(assembly, bodies, self.units, self)
+
+    def rows_under(self, assembly: Assembly) -> tuple[ContactRows, ...] | None:
+        """Return the contacts between bodies with the gaps and laws of another assembly, None if they are others."""
+        pairs = list(zip(self.assembly.contacts, assembly.contacts, strict=False))
+        if len(self.assembly.contacts) != len(assembly.contacts) or any(
+            replace(one, gap=0.0, law=None) != replace(two, gap=0.0, law=None) for one, two in pairs
+        ):
+            return None
+        return tuple(
+            replace(rows, gap=rows.gap + (two.gap - one.gap), law=assembly.law_of(two))
+            for rows, (one, two) in zip(self.rows, pairs, strict=False)
+        )
+
+
+def _first_of(names: Sequence[str]) -> str:
+    return ", ".join(repr(name) for name in names[:6]) + (", ..." if len(names) > 6 else "")
+
+
+def prepare_assembly_steps(
+    assemblies: Sequence[Assembly], meshes: Mapping[str, BoundaryMesh] | None = None
+) -> tuple[PreparedAssembly, ...]:
+    """Work out what assemblies that follow each other in time say, in the units of the largest load.
+
+    All take the contacts that are found in the first one; see `prepare_assembly`.
+    """
+    bodies = place(assemblies[0], meshes)
+    contacts = listed_contacts(assemblies[0], bodies)
+    steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
+    units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
+    first = _prepared(steps[0], _under(steps[0], bodies), units)
+    return (first, *(first.under(step) for step in steps[1:]))
 
 
 def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> PreparedAssembly:
@@ -137,6 +182,7 @@ def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | No
     Parameters
     ----------
     assembly : Assembly
+        With a single load.
     meshes : mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, in the coordinates of their shapes.
 
@@ -149,9 +195,7 @@ def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | No
     ConflictingSupportsError
         If supports contradict each other at a node.
     """
-    bodies = place(assembly, meshes)
-    assembly = assembly.with_contacts(listed_contacts(assembly, bodies)) if assembly.touching else assembly
-    return _prepared(assembly, bodies, find_common_units(assembly, bodies))
+    return prepare_assembly_steps([assembly], meshes)[0]
 
 
 def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units:
@@ -174,10 +218,24 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     return units
 
 
-def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) -> PreparedAssembly:
+def _under(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
+    """Return placed bodies with what another assembly says of them."""
+    pairs = zip(bodies, assembly.placed_bodies, strict=True)
+    return tuple(body.under(other, assembly.scene_of(other)) for body, other in pairs)
+
+
+def _prepared(
+    assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units, before: PreparedAssembly | None = None
+) -> PreparedAssembly:
+    """Prepare placed bodies; what is as it was in the same units before is taken over."""
     force_unit = units.stress * units.length
-    conditions, forces = [], []
-    for body in bodies:
+    conditions: list[NodalConditions] = []
+    forces: list[FloatArray] = []
+    for number, body in enumerate(bodies):
+        if before is not None and body.is_loaded_like(before.bodies[number]):
+            conditions.append(before.conditions[number])
+            forces.append(before.forces[number])
+            continue
         own = body.units(units.modulus, force_unit)
         supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
         conditions.append(supported(body.own_space, supports))
@@ -189,16 +247,24 @@ def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) 
         )
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, space, in_place)))
     with_obstacles = tuple(obstacle_rows(bodies, conditions))
-    rows = (*body_rows(assembly, assembly.contacts, bodies, conditions, with_obstacles), *with_obstacles)
-    retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units)
+    between = None if before is None else before.rows_under(assembly)
+    if between is None:
+        between = tuple(body_rows(assembly, assembly.contacts, bodies, conditions, with_obstacles))
+    rows = (*between, *with_obstacles)
+    retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units, before)
     return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
 
 
-def _insides(bodies: Sequence[PlacedBody], units: Units) -> tuple[ForcesInside | None, ...]:
+def _insides(
+    bodies: Sequence[PlacedBody], units: Units, before: PreparedAssembly | None
+) -> tuple[ForcesInside | None, ...]:
     """Return what acts inside each body; copies that are turned alike share it."""
     found: dict[tuple[int, tuple[BodyForce, ...]], ForcesInside | None] = {}
     insides = []
-    for body in bodies:
+    for number, body in enumerate(bodies):
+        if before is not None and body.is_loaded_like(before.bodies[number]):
+            insides.append(before.insides[number])
+            continue
         forces = tuple(seen_from(force, body.turn) for force in body.body.body_forces)
         key = (id(body.own_mesh), forces)
         if key not in found:
