@@ -39,11 +39,15 @@ class ContactPair:
         Largest overlap of the shapes as they are drawn that is meant; more is an error.
     multipliers_on : str, optional
         The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`.
+    reach : float [m], optional
+        Largest distance of points that may come to touch; by default half the size of the smaller body. Round bodies
+        with many neighbours need less, so that no point faces two of them.
 
     Raises
     ------
     InputError
-        If a name has no dot, a side shall touch itself, a length is not finite, or the multipliers are on neither side.
+        If a name has no dot, a side shall touch itself, a length is not finite, the reach is not positive, or the
+        multipliers are on neither side.
     """
 
     sides: tuple[str, str]
@@ -51,6 +55,7 @@ class ContactPair:
     gap: float = 0.0
     interference: float = 0.0
     multipliers_on: str | None = None
+    reach: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sides", tuple(self.sides))
@@ -62,6 +67,7 @@ class ContactPair:
             raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
         if not 0.0 <= self.interference < np.inf:
             raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
+        _check_reach(self.reach, f"contact {self.name!r}: reach")
         if self.multipliers_on is not None and self.multipliers_on not in self.sides:
             raise InputError(
                 f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides"
@@ -83,19 +89,28 @@ class Touching:
         Largest distance of sides that face each other.
     law : FrictionLaw, optional
         That of the assembly if left out.
+    reach : float [m], optional
+        Of each contact found; see `ContactPair`.
 
     Raises
     ------
     InputError
-        If the distance is negative or not finite.
+        If the distance is negative or not finite, or the reach not positive.
     """
 
     within: float
     law: FrictionLaw | None = None
+    reach: float | None = None
 
     def __post_init__(self) -> None:
+        _check_reach(self.reach, "touching.reach")
         if not 0.0 <= self.within < np.inf:
             raise InputError(f"touching.within is {self.within}: give a length, zero or positive")
+
+
+def _check_reach(reach: float | None, name: str) -> None:
+    if reach is not None and not reach > 0.0:
+        raise InputError(f"{name} is {reach}: give a positive length")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,6 +23,10 @@ _FEW_PIECES = 20
 _FEW_STEPS = 12
 """Full steps under weaker friction."""
 
+_COSTLY_FULL, _COSTLY_DAMPED = 20, 5
+"""Full steps and steps with line search at most where responses are costly: jumps of walls of 200 blocks to 98 % of
+their collapse load take 15 full steps, and a line search saves hardly any that have not settled by then."""
+
 
 class Phase(Enum):
     """What the next step does."""
@@ -93,9 +97,11 @@ class SemismoothNewton:
     max_steps : int
         Steps allowed; a path counts as one.
     full_steps : int
-        Full steps allowed before the line search begins; it begins earlier if active sets come back.
+        Full steps allowed before the line search begins; it begins earlier if active sets come back. At most 20 where
+        the responses of the body are costly.
     damped_steps : int
-        Steps with line search allowed before the path is followed; zero leaves the line search out.
+        Steps with line search allowed before the path is followed; zero leaves the line search out. At most 5 where
+        responses are costly: load steps closer to each other help more.
     follows_path : bool
         Whether to follow the path of solutions when all else fails; see `bemkit.solvers.homotopy`.
 
@@ -186,8 +192,9 @@ class SemismoothNewton:
             return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
             return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
-        if following.n_in_phase >= self.full_steps:
-            reason = f"{self.full_steps} full steps have not settled the active sets"
+        most = min(self.full_steps, _COSTLY_FULL) if problem.body.is_costly else self.full_steps
+        if following.n_in_phase >= most:
+            reason = f"{most} full steps have not settled the active sets"
             return self._rescued(problem, following, Status.STALLED, reason)
         return following
 
@@ -205,7 +212,8 @@ class SemismoothNewton:
         if size > (1.0 - 1e-3) * iterate.merit:
             return self._rescued(problem, following, Status.STALLED, "no Newton step reduces the residual")
         following = replace(following, state=residual.state, residual=residual, sets=residual.sets, merit=size)
-        if following.n_in_phase >= self.damped_steps:
+        most = min(self.damped_steps, _COSTLY_DAMPED) if problem.body.is_costly else self.damped_steps
+        if following.n_in_phase >= most:
             return self._rescued(problem, following, Status.STALLED, "the line search takes too many steps")
         return following
 

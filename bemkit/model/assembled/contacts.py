@@ -96,7 +96,9 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     law = assembly.law_of(assembly.touching)
     found = []
     for first, second in find_facing(sides, assembly.touching.within, owners=owners):
-        pair = ContactPair((names[first], names[second]), law, multipliers_on=names[first])
+        pair = ContactPair(
+            (names[first], names[second]), law, multipliers_on=names[first], reach=assembly.touching.reach
+        )
         if frozenset(pair.sides) not in known:
             found.append(pair)
     return (*assembly.contacts, *found)
@@ -168,7 +170,7 @@ def body_rows(
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:
-            coupling = couple(side, other_side, without=without, reach=_reach(bodies[first], bodies[second]))
+            coupling = couple(side, other_side, without=without, reach=_reach(pairs[k], bodies[first], bodies[second]))
         except ValueError as error:
             raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
         _check_overlap(pairs[k], coupling, bodies[first], bodies[second])
@@ -216,7 +218,9 @@ def _approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_f
     return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
 
 
-def _reach(one: PlacedBody, two: PlacedBody) -> float:
+def _reach(pair: ContactPair, one: PlacedBody, two: PlacedBody) -> float:
+    if pair.reach is not None:
+        return pair.reach
     return 0.5 * min(one.mesh.diameter, two.mesh.diameter)
 
 
