@@ -30,13 +30,13 @@ their collapse load take 15 full steps, and a line search saves hardly any that 
 _FIRST_SPRING, _WEAKENED, _LAST_SPRING = 3e-2, 0.25, 1e-5
 """Springs of the phase SPRINGS in units of the stiffness scale: the first, each after the last, and the weakest."""
 
-_MOST_WITH_SPRINGS = 70
-"""Steps of that phase; packings of 200 discs take 50."""
+_MOST_WITH_SPRINGS = 90
+"""Steps of that phase; a packing of 200 discs takes 70."""
 
 _MOST_OF_ONE = 3
 """Rigid motions of a single body."""
 
-_MOST_HELD = 8
+_MOST_HELD = 5
 """Full steps with springs after which many costly bodies are held by springs throughout."""
 
 
@@ -144,8 +144,8 @@ class SemismoothNewton:
 
     References
     ----------
-    [HintermuellerItoKunisch2002], [HueeberStadlerWohlmuth2008]; the linearised bound after [ChristensenEtAl1998]; springs
-    after [Rockafellar1976].
+    [HintermuellerItoKunisch2002], [HueeberStadlerWohlmuth2008]; the linearised bound after [ChristensenEtAl1998];
+    springs after [Rockafellar1976].
     """
 
     rho: float | None = None

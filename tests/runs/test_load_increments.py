@@ -67,7 +67,7 @@ def test_a_load_history_is_one_scene_and_one_result(tmp_path) -> None:  # type: 
     points = np.array([[1.0, 0.5]])
     inside = bk.interior_fields(solution.bodies["block 0-0"]).stress(points)
     np.testing.assert_allclose(inside, bk.interior_fields(steps[-1].bodies["block 0-0"]).stress(points), rtol=1e-12)
-    bk.write_result(solution, tmp_path / "wall.h5")
+    bk.write_result(tmp_path / "wall.h5", solution)
     read = bk.read_result(tmp_path / "wall.h5")
     np.testing.assert_allclose(bk.interior_fields(read.bodies["block 0-0"]).stress(points), inside, rtol=1e-12)
 
