@@ -1,9 +1,10 @@
-"""Times and memory of many bodies: ``python -m tests.benchmarks.masonry [courses] [blocks a course]``.
+"""Times and memory of many bodies: ``python -m tests.benchmarks.masonry [steps | packing] [numbers]``.
 
-With ``steps`` before the numbers, a wall as an assembly: weight alone, and a push of a tenth of what friction holds, each
-load step from the end of the last one, with the seconds of each stage. With ``packing [discs] [width]``, a random
-packing of discs in a box. Without a word, the contact system alone: one sticking response, the programme that finds unsolvable loads, and a whole solve under weight and a push on the
-uppermost course of a tenth of what friction holds. Times are those of the processor and, in brackets, of the clock.
+``[courses] [blocks a course]`` alone: the contact system of a wall, one sticking response, the programme that finds
+unsolvable loads, and a whole solve under weight and a push on the uppermost course of a tenth of what friction holds.
+Times are those of the processor and, in brackets, of the clock. ``steps [courses] [blocks a course]``: such a wall as
+an assembly, weight alone and then the push, with the seconds of each stage. ``packing [discs] [width]``: a random
+packing of discs in a box.
 """
 
 import resource

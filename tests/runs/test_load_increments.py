@@ -111,3 +111,24 @@ def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type:
     assert "Increments down to 0.25 of the step led to" in second.message
     assert "The static programme finds no collapse under this load" in second.message
     np.testing.assert_array_equal(second.contact.sigma_n, first.contact.sigma_n)
+
+
+def test_steps_of_other_bodies_are_refused() -> None:
+    with pytest.raises(bk.InputError, match=r"the bodies are .*, and those of the step before .*: change numbers"):
+        bk.run_assembly_history([wall(2, 2, push=True), wall(2, 3, push=True)])
+
+
+def test_what_has_no_largest_factor_says_so() -> None:
+    falling = bk.Gravity(1.0, (1.0, 0.0), is_constant=True)
+    assembly = wall(2, 2, push=True)
+    leaning = tuple(replace(body, body_forces=(*body.body_forces, falling)) for body in assembly.bodies)
+    # a push to the right cannot hold what slides to the right, and a pull cannot hold all courses
+    with pytest.raises(UnsolvableSceneError, match="no contact tractions can balance the constant load"):
+        bk.largest_load_factor(replace(assembly, bodies=leaning, law=bk.Coulomb(0.1)))
+    with pytest.raises(bk.InputError, match="no two bodies are in contact"):
+        bk.largest_load_factor(replace(assembly, bodies=_without_floor(assembly), touching=None))
+
+
+def _without_floor(assembly: bk.Assembly) -> tuple[bk.Body, ...]:
+    held = bk.Part("floor", bk.Clamped(), ("bottom",))
+    return tuple(replace(body, parts=(held,)) for body in assembly.bodies)

@@ -132,17 +132,7 @@ class PreparedAssembly:
         InputError
             If its bodies have other names.
         """
-        names, others = ([body.name for body in each] for each in (self.bodies, assembly.placed_bodies))
-        if names != others:
-            raise InputError(
-                f"the bodies are {_first_of(others)}, and those of the step before {_first_of(names)}: change numbers "
-                "of conditions and contacts only"
-            )
-        bodies = tuple(
-            body.under(other, assembly.scene_of(other))
-            for body, other in zip(self.bodies, assembly.placed_bodies, strict=True)
-        )
-        return _prepared(assembly, bodies, self.units, self)
+        return _prepared(assembly, _under(assembly, self.bodies), self.units, self)
 
     def rows_under(self, assembly: Assembly) -> tuple[ContactRows, ...] | None:
         """Return the contacts between bodies with the gaps and laws of another assembly, None if they are others."""
@@ -219,7 +209,13 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
 
 
 def _under(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
-    """Return placed bodies with what another assembly says of them."""
+    """Return placed bodies with what another assembly says of them; refuse bodies of other names."""
+    names, others = ([body.name for body in each] for each in (bodies, assembly.placed_bodies))
+    if names != others:
+        raise InputError(
+            f"the bodies are {_first_of(others)}, and those of the step before {_first_of(names)}: change numbers of "
+            "conditions and contacts only"
+        )
     pairs = zip(bodies, assembly.placed_bodies, strict=True)
     return tuple(body.under(other, assembly.scene_of(other)) for body, other in pairs)
 
