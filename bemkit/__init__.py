@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from bemkit.results.result_file import write_result as write_result
     from bemkit.results.solution import Solution as Solution
     from bemkit.runs.assembly import run_assembly_history as run_assembly_history
+    from bemkit.runs.collapse import largest_load_factor as largest_load_factor
     from bemkit.runs.history import run_history as run_history
     from bemkit.runs.nested import run_cascade as run_cascade
     from bemkit.runs.run import FailedRun as FailedRun
@@ -151,6 +152,7 @@ _HOME = {
     "results.result_file": ("read_result", "write_result"),
     "results.solution": ("Solution",),
     "runs.assembly": ("run_assembly_history",),
+    "runs.collapse": ("largest_load_factor",),
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),

@@ -12,7 +12,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+    from scipy.sparse import csc_array, csr_array
 
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
@@ -27,7 +27,7 @@ _MANY_MOTIONS = 60
 a condition for each."""
 
 
-_MEETS = 1e-7
+MEETS = 1e-7
 """Speed into an obstacle, relative to the largest of a motion, from which on a node meets it: what linear programming
 leaves."""
 
@@ -97,7 +97,7 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
         return None
     touches = np.isfinite(problem.gap)
     best = None
-    for cohesion, slope in _friction_envelopes(problem):
+    for cohesion, slope in friction_envelopes(problem):
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
         coefficients = _largest_escape(motions, load / force_scale, resistance, np.where(touches, slope, np.nan))
         motion = np.asarray(coefficients @ motions).reshape(-1, 2)
@@ -132,7 +132,7 @@ def find_long_travel(problem: ContactProblem) -> float | None:
     return float(problem.gap[is_far].min()) / deformation
 
 
-def _friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
+def friction_envelopes(problem: ContactProblem) -> list[tuple[FloatArray, FloatArray]]:
     """Return pairs (c, s) of (n_contact,) arrays with ``bound <= c + s |sigma_n|`` for the pressures tried."""
     none = np.zeros(problem.n_contact)
     pressure = float(np.abs(problem.sticking_state.traction).max()) or 1.0
@@ -169,18 +169,18 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
                 return np.array([sign])
         return np.zeros(1)
 
-    takes_part = _outermost(motions, touches) if not isinstance(motions, np.ndarray) else touches
+    takes_part = outermost(motions, touches) if not isinstance(motions, np.ndarray) else touches
     while True:
         coefficients = _escape_from(motions, load, resistance, np.where(takes_part, slope, np.nan))
         motion = np.asarray(coefficients @ motions).reshape(-1, 2)
-        meets = motion[:, 0] + np.where(touches, slope, 0.0) * np.abs(motion[:, 1]) > _MEETS * np.abs(motion).max()
+        meets = motion[:, 0] + np.where(touches, slope, 0.0) * np.abs(motion[:, 1]) > MEETS * np.abs(motion).max()
         meets |= (resistance > 0.0) & (motion[:, 1] != 0.0)
         if not np.any(meets & touches & ~takes_part):
             return coefficients
         takes_part |= meets & touches
 
 
-def _outermost(motions: csr_array, touches: BoolArray) -> BoolArray:
+def outermost(motions: csr_array, touches: BoolArray) -> BoolArray:
     """Return (n_contact,) bool: the first and the last of the nodes at which the same motions meet."""
     nodes = np.flatnonzero(touches)
     felt = (abs(motions.T)).tocsr()
@@ -200,17 +200,10 @@ def _escape_from(motions: RigidMotions, load: FloatArray, resistance: FloatArray
     from scipy import sparse
     from scipy.optimize import linprog
 
-    touches = np.isfinite(slope)
-    n_motions, resists = motions.shape[0], touches & (resistance > 0.0)
-    by_component = sparse.csc_array(motions)
-    normal, tangential = by_component[:, 2 * np.flatnonzero(touches)], by_component[:, 2 * np.flatnonzero(touches) + 1]
-    wedged = tangential @ sparse.diags_array(slope[touches])
-    held = by_component[:, 2 * np.flatnonzero(resists) + 1]
-    unit = sparse.eye_array(n_motions)
-    balance = sparse.hstack([wedged - normal, -wedged - normal, held, unit, -unit], format="csc")
-    n_forces = balance.shape[1] - 2 * n_motions
-    limits = np.full((balance.shape[1], 2), [0.0, np.inf])
-    limits[n_forces - held.shape[1] : n_forces] = resistance[resists, None] * [-1.0, 1.0]
+    n_motions, (works, bounds) = motions.shape[0], contact_forces(motions, resistance, slope)
+    n_forces, unit = works.shape[1], sparse.eye_array(n_motions)
+    balance = sparse.hstack([works, unit, -unit], format="csc")
+    limits = np.vstack([bounds, np.tile([0.0, np.inf], (2 * n_motions, 1))])
     cost = np.append(np.zeros(n_forces), np.ones(2 * n_motions))
     below_largest, none = sparse.csr_array((0, balance.shape[1])), np.zeros(0)
     if n_motions <= _MANY_MOTIONS:
@@ -231,3 +224,36 @@ def _escape_from(motions: RigidMotions, load: FloatArray, resistance: FloatArray
     if result.x is None:  # leaving all of the load is admissible, so this is the solver's failure: do not condemn it
         return np.zeros(n_motions)
     return -np.asarray(result.eqlin.marginals, dtype=float)
+
+
+def contact_forces(motions: RigidMotions, resistance: FloatArray, slope: FloatArray) -> tuple[csc_array, FloatArray]:
+    """Return the forces that friction allows at the nodes whose slope is a number, as sums of simple ones.
+
+    Parameters
+    ----------
+    motions : RigidMotions
+    resistance : (n_contact,) array [N]
+        What friction holds without pressure.
+    slope : (n_contact,) array [-]
+        Further friction by pressure.
+
+    Returns
+    -------
+    works : (n_motions, n_forces) sparse array
+        Work of each simple force on each motion: those on both edges of the cones of friction, then the tangential ones
+        that need no pressure.
+    bounds : (n_forces, 2) array
+        Least and largest factor of each.
+    """
+    from scipy import sparse
+
+    touches = np.isfinite(slope)
+    resists = touches & (resistance > 0.0)
+    by_component = sparse.csc_array(motions)
+    normal, tangential = by_component[:, 2 * np.flatnonzero(touches)], by_component[:, 2 * np.flatnonzero(touches) + 1]
+    wedged = tangential @ sparse.diags_array(slope[touches])
+    held = by_component[:, 2 * np.flatnonzero(resists) + 1]
+    works = sparse.hstack([wedged - normal, -wedged - normal, held], format="csc")
+    bounds = np.full((works.shape[1], 2), [0.0, np.inf])
+    bounds[works.shape[1] - held.shape[1] :] = resistance[resists, None] * [-1.0, 1.0]
+    return works, bounds

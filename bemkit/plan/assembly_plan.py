@@ -8,13 +8,14 @@ import numpy as np
 
 from bemkit.contact.joined.joined_bodies import MOST_DENSE
 from bemkit.model.assembled.placed import PlacedBody, groups
-from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, prepare_assembly
+from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, prepare_assembly_steps
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.plan.plan import Plan, Sizes
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import load_steps
 
 _BYTES = 8
 _CONTACT_STEPS = 8
@@ -114,7 +115,7 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     if accuracy is not None:
         further = f"until the estimated error is below {accuracy:g}; this plan is for the first meshes"
     yield PlanItem("further meshes", accuracy is not None, further)
-    n_pairs = sum(pair.rigid_body is None for pair in assembly.contacts)
+    n_pairs = len(assembly.elastic_contacts)
     n_fixed = sum(rows.other < 0 for rows in prepared.rows)
     yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
     yield PlanItem("rigid obstacles", n_fixed > 0, f"{n_fixed} parts face them" if n_fixed else "no part faces one")
@@ -153,4 +154,4 @@ def _body_line(body: PlacedBody) -> str:
 
 def make_assembly_plan(assembly: Assembly) -> Plan:
     """Plan an assembly; see `plan_assembly`."""
-    return plan_assembly([prepare_assembly(assembly)])
+    return plan_assembly(prepare_assembly_steps(load_steps(assembly)))

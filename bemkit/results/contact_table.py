@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -96,7 +97,18 @@ class ContactTable:
 
     def rows(self, part: str) -> BoolArray:
         """Return (n_contact,) bool: the nodes of one part."""
-        return np.array([name == part for name in self.part], bool)
+        nodes = self._nodes.get(part, ())
+        own = np.zeros(self.n_contact, bool)
+        own[list(nodes)] = True
+        return own
+
+    @cached_property
+    def _nodes(self) -> Mapping[str, Sequence[int]]:
+        """The nodes of each part."""
+        nodes: dict[str, list[int]] = {}
+        for node, part in enumerate(self.part):
+            nodes.setdefault(part, []).append(node)
+        return nodes
 
     def columns(self) -> dict[str, FloatArray | IntArray]:
         """Return the numerical columns by name."""

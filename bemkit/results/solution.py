@@ -257,3 +257,24 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
         memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
     )
+
+
+def as_one(solutions: Sequence[AnySolution], n_steps: int) -> AnySolution:
+    """Return the last step of a load history with the steps, solves, times, memory and warnings of all.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution or AssemblySolution
+        As many as were reached.
+    n_steps : int
+        As many as there were to be.
+    """
+    if n_steps == 1:
+        return solutions[0]
+    names = [f"load step {number} of {n_steps}" for number in range(1, len(solutions) + 1)]
+    last = solutions[-1]
+    return replace(
+        with_totals(last, solutions, names),
+        message=f"{names[-1]}: {last.message}",
+        warnings=tuple(dict.fromkeys(warning for step in reversed(solutions) for warning in step.warnings)),
+    )

@@ -14,7 +14,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly
+from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
@@ -24,11 +24,13 @@ from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces, nodal_resultants
 from bemkit.results.rigid_result import RigidResult
-from bemkit.results.solution import BoundaryFields
+from bemkit.results.solution import BoundaryFields, as_one
 from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.load_increments import reach_load
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
 
 
@@ -48,14 +50,30 @@ def run_assembly(
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 
+    Returns
+    -------
+    AssemblySolution
+        Of a load history the last step, with the linear solves and records of all; its assembly has the load factors
+        that were reached.
+
     Raises
     ------
     UnsolvableSceneError
-        If no contact tractions can balance the loads.
+        If no contact tractions can balance the first load.
     ValueError
         If the assembly is not well posed; the message names the body or the contact.
     """
-    return run_assembly_history([assembly], meshes=meshes, callback=callback)[0]
+    steps = run_assembly_history([assembly], meshes=meshes, callback=callback)
+    n_steps = len(assembly.load_factors)
+    if n_steps == 1:
+        return steps[0]
+    n_reached = max(1, sum(step.is_converged for step in steps))
+    stated = replace(steps[0].assembly, bodies=assembly.bodies, load_factors=assembly.load_factors[:n_reached])
+    bodies = {
+        body.name: replace(body, scene=stated.scene_of(placed))
+        for body, placed in zip(steps[-1].bodies.values(), stated.placed_bodies, strict=True)
+    }
+    return replace(as_one(steps, n_steps), assembly=stated, bodies=bodies)
 
 
 def run_assembly_history(
@@ -66,65 +84,83 @@ def run_assembly_history(
 ) -> tuple[AssemblySolution, ...]:
     """Solve assemblies that follow each other in time, slip counting from the end of the step before.
 
-    Every body is factored once for all steps.
+    Every body is factored once for all steps. Where the jump to a load stalls, it is gone in halves; see
+    `bemkit.runs.load_increments.reach_load`.
 
     Parameters
     ----------
     assemblies : sequence of Assembly
-        The same bodies and contacts under changing loads, motions, gaps or laws.
+        The same bodies and contacts under changing loads, motions, gaps or laws; one with several load factors stands
+        for as many steps.
     meshes, callback : optional
         As for `run_assembly`.
 
     Returns
     -------
     tuple of AssemblySolution
-        One for each step, up to the first that does not converge.
+        One for each step, up to the first that does not converge. If that is not the first one, its fields are those
+        of the step before, the last state that is certified; status, message and history are its own.
+
+    Raises
+    ------
+    UnsolvableSceneError
+        If no contact tractions can balance the first load.
     """
-    if not assemblies:
+    scenes = [step for each in assemblies for step in load_steps(each)]
+    if not scenes:
         raise InputError("assemblies is empty: give at least one assembly")
     clock = StageClock.start()
-    prepared = prepare_assembly(assemblies[0], meshes)
-    if not prepared.n_contact:
+    steps = prepare_assembly_steps(scenes, meshes)
+    if not steps[0].n_contact:
         raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
-    steps = [prepared, *(prepared.under(_like(each, prepared.assembly)) for each in assemblies[1:])]
     plan = plan_assembly(steps)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
-    solutions: list[AssemblySolution] = []
-    with blas_threads_for(max(body.space.n_dofs for body in prepared.bodies)):
+    with blas_threads_for(max(body.space.n_dofs for body in steps[0].bodies)):
         with assembly_time() as assembly:
-            model = build_assembled_model(prepared)
+            model = build_assembled_model(steps[0])
         clock = clock.closed_build(assembly)
-        state: ContactState | None = None
-        for step in steps:
-            if state is not None:
-                model = model.under(step)
-                model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
-                clock = clock.closed(Stage.CONDENSE)
-            result = _solved(model, state, callback)
-            clock = clock.closed(Stage.SOLVE)
-            solutions.append(_solution(model, result, plan, clock))
-            clock = StageClock.start()
-            state = result.state
+        result = _first_solved(model, callback)
+        clock = clock.closed(Stage.SOLVE)
+        solutions = [_solution(model, result, plan, clock)]
+        for step in steps[1:]:
             if not result.is_converged:
                 break
+            clock = StageClock.start()
+            before, model = model, model.under(step)
+            clock = clock.closed(Stage.CONDENSE)
+            reached = reach_load(before, model, result.state, callback)
+            result, model = reached.result, replace(model, problem=reached.problem)
+            clock = clock.closed(Stage.SOLVE)
+            is_there = result.is_converged
+            solutions.append(
+                _solution(model, result, plan, clock) if is_there else _not_reached(solutions[-1], result, clock)
+            )
     return tuple(solutions)
 
 
-def _like(assembly: Assembly, first: Assembly) -> Assembly:
-    """Return an assembly with the contacts that were found in the first one."""
-    return assembly.with_contacts(first.contacts) if assembly.touching else assembly
-
-
-def _solved(
-    model: AssembledModel, start: ContactState | None, callback: Callable[[StepRecord], None] | None
-) -> ContactSolution:
+def _first_solved(model: AssembledModel, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
     solver = model.prepared.assembly.solver
-    result = solve(model.problem, solver, start=start, throw=False, callback=callback)
+    result = solve(model.problem, solver, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
         raise UnsolvableSceneError(result.message if load is None else load.description)
     return result
+
+
+def _not_reached(before: AssemblySolution, result: ContactSolution, clock: StageClock) -> AssemblySolution:
+    """Return what stands for a step that failed: the fields of the step before, and why they are the last."""
+    return replace(
+        before,
+        status=result.status,
+        message=f"{result.message} The fields are those of the step before.",
+        history=result.history,
+        linear_solves=result.linear_solves,
+        outer_steps=result.steps,
+        timings=clock.timings,
+        memory=clock.memory,
+        warnings=before.plan.warnings,
+    )
 
 
 def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock: StageClock) -> AssemblySolution:

@@ -24,7 +24,7 @@ from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions
-from bemkit.results.solution import BoundaryFields, Solution, with_totals
+from bemkit.results.solution import BoundaryFields, Solution, as_one
 from bemkit.results.warnings import find_warnings
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.runs.warm_start import state_on
@@ -95,15 +95,7 @@ def run_on_mesh(
 ) -> Solution:
     """Solve a scene on one mesh; of a load history return the last step with the solves, records and times of all."""
     steps = run_history([scene], mesh=mesh, start=start, callback=callback)
-    if len(scene.load_factors) == 1:
-        return steps[0]
-    names = [f"load step {number} of {len(scene.load_factors)}" for number in range(1, len(steps) + 1)]
-    return replace(
-        with_totals(steps[-1], steps, names),
-        scene=scene,
-        message=f"{names[-1]}: {steps[-1].message}",
-        warnings=tuple(dict.fromkeys(warning for step in reversed(steps) for warning in step.warnings)),
-    )
+    return steps[0] if len(scene.load_factors) == 1 else replace(as_one(steps, len(scene.load_factors)), scene=scene)
 
 
 def _solve_in_turn(

@@ -41,12 +41,15 @@ class ContactPair:
         Largest overlap of the shapes as they are drawn that is meant; more is an error.
     multipliers_on : str, optional
         The side on whose nodes contact is decided; by default see `bemkit.contact.mortar`. Never a rigid body.
+    reach : float [m], optional
+        Largest distance of points that may come to touch; by default half the size of the smaller body. Round bodies
+        with many neighbours need less, so that no point faces two of them.
 
     Raises
     ------
     InputError
-        If neither name has a dot, a side shall touch itself, a length is not finite, or the multipliers are on neither
-        side.
+        If neither name has a dot, a side shall touch itself, a length is not finite, the reach is not positive, or the
+        multipliers are on neither side.
     """
 
     sides: tuple[str, str]
@@ -54,6 +57,7 @@ class ContactPair:
     gap: float = 0.0
     interference: float = 0.0
     multipliers_on: str | None = None
+    reach: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sides", tuple(self.sides))
@@ -67,6 +71,7 @@ class ContactPair:
             raise InputError(f"contact {self.name!r}: gap is {self.gap}: give a finite length")
         if not 0.0 <= self.interference < np.inf:
             raise InputError(f"contact {self.name!r}: interference is {self.interference}: give a length, not negative")
+        _check_reach(self.reach, f"contact {self.name!r}: reach")
         if self.multipliers_on is not None and self.multipliers_on not in self.elastic_sides:
             raise InputError(
                 f"contact {self.name!r}: multipliers_on is {self.multipliers_on!r}: give one of the two sides, "
@@ -99,19 +104,28 @@ class Touching:
         Largest distance of sides that face each other.
     law : FrictionLaw, optional
         That of the assembly if left out.
+    reach : float [m], optional
+        Of each contact found; see `ContactPair`.
 
     Raises
     ------
     InputError
-        If the distance is negative or not finite.
+        If the distance is negative or not finite, or the reach not positive.
     """
 
     within: float
     law: FrictionLaw | None = None
+    reach: float | None = None
 
     def __post_init__(self) -> None:
+        _check_reach(self.reach, "touching.reach")
         if not 0.0 <= self.within < np.inf:
             raise InputError(f"touching.within is {self.within}: give a length, zero or positive")
+
+
+def _check_reach(reach: float | None, name: str) -> None:
+    if reach is not None and not reach > 0.0:
+        raise InputError(f"{name} is {reach}: give a positive length")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,6 +143,9 @@ class Assembly:
         Finds contacts where bodies face each other, besides those that are listed.
     law : FrictionLaw
         In all contacts that have no law of their own, with bodies and with rigid obstacles.
+    load_factors : tuple of float
+        All loads, given displacements and body forces that are not constant times these numbers, one step after the
+        other; slip counts from the end of the step before. Gaps and obstacles stay as they are.
     discretisation : Discretisation
         Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
@@ -144,8 +161,8 @@ class Assembly:
     ------
     InputError
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
-        listed twice, a rigid body takes part in no contact, or an accuracy is asked of collocation or goes with
-        elements of a body.
+        listed twice, a rigid body takes part in no contact, a load factor is missing or not finite, or an accuracy is
+        asked of collocation or goes with elements of a body or with load factors.
     """
 
     title: str
@@ -154,6 +171,7 @@ class Assembly:
     contacts: tuple[ContactPair, ...] = ()
     touching: Touching | None = None
     law: FrictionLaw = field(default_factory=Frictionless)
+    load_factors: tuple[float, ...] = (1.0,)
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
@@ -171,6 +189,9 @@ class Assembly:
         repeated = [name for name, count in names.items() if count > 1]
         if repeated:
             raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
@@ -184,6 +205,11 @@ class Assembly:
             _ = self.scene_of(body)  # parts and sides are checked
 
     def _check_accuracy(self, accuracy: float) -> None:
+        if len(self.load_factors) > 1:
+            raise InputError(
+                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
+                "belongs to one mesh: give elements"
+            )
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
             if discretisation.needs_accuracy:
@@ -221,7 +247,25 @@ class Assembly:
             names = list(self._by_name)
             listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
             raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
-        _ = self._by_name[body].contact_part(part)
+        placed = self._by_name[body]
+        if any(part == own.name for own in placed.parts) or part not in self._side_names(placed):
+            _ = placed.contact_part(part)
+
+    def _side_names(self, body: Body) -> tuple[str, ...]:
+        """Return the names of the sides of a body; copies share them, for an outline checks itself."""
+        if id(body.shape) not in self._sides:
+            self._sides[id(body.shape)] = tuple(body.shape.outline().side_names)
+        return self._sides[id(body.shape)]
+
+    @cached_property
+    def _sides(self) -> dict[int, tuple[str, ...]]:
+        """The names of the sides of shapes."""
+        return {}
+
+    @property
+    def elastic_contacts(self) -> tuple[ContactPair, ...]:
+        """The contacts that no rigid body takes part in."""
+        return tuple(pair for pair in self.contacts if pair.rigid_body is None)
 
     @cached_property
     def placed_bodies(self) -> tuple[Body, ...]:
@@ -250,7 +294,7 @@ class Assembly:
         taken = {side for part in body.parts for side in part.sides}
         whole = any(not part.sides for part in body.parts)
         free = [part.name for part in body.parts if isinstance(part.condition, Free)]
-        sides = [] if whole else [side for side in body.shape.outline().side_names if side not in taken]
+        sides = [] if whole else [side for side in self._side_names(body) if side not in taken]
         return tuple(dict.fromkeys([*listed, *free, *sides]))
 
     @cached_property
@@ -282,6 +326,7 @@ class Assembly:
                 parts=parts,
                 body_forces=body.body_forces,
                 law=self.law if touches_obstacle else Frictionless(),
+                load_factors=self.load_factors,
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,
                 mesh=self.mesh if body.mesh is None else body.mesh,

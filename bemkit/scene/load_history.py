@@ -9,20 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 from bemkit.arrays import FloatArray
 from bemkit.formulas import Expression, ScalarField
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
 from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
 from bemkit.scene.scene import Scene
 
+AnyScene = TypeVar("AnyScene", Scene, Assembly)
 
-def load_steps(scene: Scene) -> tuple[Scene, ...]:
-    """Return the steps of a scene's load history, each a scene of its own with a single load.
+
+def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
+    """Return the steps of a load history, each a scene or an assembly of its own with a single load.
 
     Returns
     -------
-    tuple of Scene
+    tuple of Scene or of Assembly
         As many as there are load factors.
     """
     if scene.load_factors == (1.0,):
@@ -30,21 +35,34 @@ def load_steps(scene: Scene) -> tuple[Scene, ...]:
     return tuple(with_scaled_loads(scene, factor) for factor in scene.load_factors)
 
 
-def with_scaled_loads(scene: Scene, factor: float) -> Scene:
+def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
     """Return a scene whose loads, prescribed displacements and body forces are multiplied by a number.
 
     Returns
     -------
-    Scene
-        With the load factor 1; obstacles, the law, and body forces that are constant are unchanged.
+    Scene or Assembly
+        With the load factor 1; obstacles, gaps, laws, and body forces that are constant are unchanged.
     """
+    if isinstance(scene, Assembly):
+        bodies = tuple(replace(body, **_scaled(body, factor)) for body in scene.bodies)
+        rigid = tuple(body.scaled(factor) for body in scene.rigid)
+        return replace(scene, bodies=bodies, rigid=rigid, load_factors=(1.0,))
+    return replace(scene, **_scaled(scene, factor), load_factors=(1.0,))
+
+
+def _scaled(loaded: Scene | Body, factor: float) -> dict[str, Any]:
+    """Return parts and body forces under scaled loads; those without loads are the same objects."""
 
     def scaled(field: ScalarField) -> ScalarField:
         return _times(factor, field)
 
-    parts = tuple(replace(part, condition=with_fields(part.condition, scaled, scaled)) for part in scene.parts)
-    forces = tuple(force if force.is_constant else scaled_body_force(force, factor) for force in scene.body_forces)
-    return replace(scene, parts=parts, body_forces=forces, load_factors=(1.0,))
+    conditions = [with_fields(part.condition, scaled, scaled) for part in loaded.parts]
+    parts = [
+        part if condition is part.condition else replace(part, condition=condition)
+        for part, condition in zip(loaded.parts, conditions, strict=True)
+    ]
+    forces = (force if force.is_constant else scaled_body_force(force, factor) for force in loaded.body_forces)
+    return {"parts": tuple(parts), "body_forces": tuple(forces)}
 
 
 @dataclass(frozen=True)

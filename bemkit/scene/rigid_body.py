@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,6 +83,11 @@ class RigidBody:
     def load(self) -> FloatArray:
         """(3,) array [N/m, N/m, N m/m]: the given loads, zero where a motion is given."""
         return np.array([getattr(self, load) or 0.0 for _, load in COMPONENTS])
+
+    def scaled(self, factor: float) -> RigidBody:
+        """Return the body with its given motions and loads multiplied by a number."""
+        given = {key: getattr(self, key) for pair in COMPONENTS for key in pair}
+        return replace(self, **{key: factor * value for key, value in given.items() if value is not None})
 
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return (n, 2, 3): how the motions x, y, turn displace points (n, 2) [m] of the body."""

@@ -23,6 +23,22 @@ _FEW_PIECES = 20
 _FEW_STEPS = 12
 """Full steps under weaker friction."""
 
+_COSTLY_FULL, _COSTLY_DAMPED = 20, 5
+"""Full steps and steps with line search at most where responses are costly: jumps of walls of 200 blocks to 98 % of
+their collapse load take 15 full steps, and a line search saves hardly any that have not settled by then."""
+
+_FIRST_SPRING, _WEAKENED, _LAST_SPRING = 3e-2, 0.25, 1e-5
+"""Springs of the phase SPRINGS in units of the stiffness scale: the first, each after the last, and the weakest."""
+
+_MOST_WITH_SPRINGS = 90
+"""Steps of that phase; a packing of 200 discs takes 70."""
+
+_MOST_OF_ONE = 3
+"""Rigid motions of a single body."""
+
+_MOST_HELD = 5
+"""Full steps with springs after which many costly bodies are held by springs throughout."""
+
 
 class Phase(Enum):
     """What the next step does."""
@@ -37,6 +53,8 @@ class Phase(Enum):
     """Full Newton steps under a share of the friction, and the path from there to all of it, if it is short."""
     PATH = auto()
     """The whole path of solutions under a decreasing extra pressure."""
+    SPRINGS = auto()
+    """Full Newton steps with springs on many bodies that nothing but contact holds, weaker as the sets settle."""
 
     @property
     def more_patient(self) -> tuple["Phase", ...]:
@@ -68,6 +86,12 @@ class NewtonIterate(Iterate):
         The last of these that springs held and that kept the sets.
     n_paths : int
         Paths followed to their ends so far.
+    n_held : int
+        Full steps in which springs had to hold the bodies, since the start.
+    spring : float
+        Stiffness of the springs of the phase SPRINGS [Pa/m]; zero before this phase.
+    anchor : ContactState or None
+        Where these springs are without force.
     """
 
     residual: Residual
@@ -79,6 +103,9 @@ class NewtonIterate(Iterate):
     n_in_phase: int = 0
     n_regularised: int = 0
     n_paths: int = 0
+    n_held: int = 0
+    spring: float = 0.0
+    anchor: ContactState | None = None
 
 
 @dataclass(frozen=True)
@@ -93,9 +120,11 @@ class SemismoothNewton:
     max_steps : int
         Steps allowed; a path counts as one.
     full_steps : int
-        Full steps allowed before the line search begins; it begins earlier if active sets come back.
+        Full steps allowed before the line search begins; it begins earlier if active sets come back. At most 20 where
+        the responses of the body are costly.
     damped_steps : int
-        Steps with line search allowed before the path is followed; zero leaves the line search out.
+        Steps with line search allowed before the path is followed; zero leaves the line search out. At most 5 where
+        responses are costly: load steps closer to each other help more.
     follows_path : bool
         Whether to follow the path of solutions when all else fails; see `bemkit.solvers.homotopy`.
 
@@ -108,11 +137,15 @@ class SemismoothNewton:
     linear solves for each that is wrong. Should it lead nowhere, the residual is made to fall by a line search from the
     best state so far; if that stalls, the whole path of solutions is followed, which takes a few linear solves per
     contact node.
-    Sets that do not hold the body are helped by weak springs for that step.
+    Sets that do not hold the body are helped by weak springs for that step. Of many bodies that contact alone holds, as
+    in a packing, such sets leave now these, now those free: should all else fail, springs hold all of them throughout,
+    and become weaker as the sets settle, each time without force where the last ones have led (the proximal point
+    method).
 
     References
     ----------
-    [HintermuellerItoKunisch2002], [HueeberStadlerWohlmuth2008]; the linearised bound after [ChristensenEtAl1998].
+    [HintermuellerItoKunisch2002], [HueeberStadlerWohlmuth2008]; the linearised bound after [ChristensenEtAl1998];
+    springs after [Rockafellar1976].
     """
 
     rho: float | None = None
@@ -141,6 +174,8 @@ class SemismoothNewton:
             return self._damped_step(problem, iterate)
         if iterate.phase is Phase.WEAKER_FRICTION:
             return self._weaker_step(problem, iterate)
+        if iterate.phase is Phase.SPRINGS:
+            return self._spring_step(problem, iterate)
         return self._path_step(problem, iterate)
 
     def _equations(self, problem: ContactProblem) -> ProjectionEquations:
@@ -176,6 +211,7 @@ class SemismoothNewton:
             best=(size, residual) if size < iterate.best[0] else iterate.best,
             visited=iterate.visited | {sets.key},
             n_in_phase=iterate.n_in_phase + 1,
+            n_held=iterate.n_held + response.is_regularised,
             n_regularised=iterate.n_regularised + 1 if response.is_regularised and sets.key == iterate.sets.key else 0,
         )
         # Equal sets give equal steps, unless springs or a nonlinear law remember the state.
@@ -186,9 +222,12 @@ class SemismoothNewton:
             return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
             return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
-        if following.n_in_phase >= self.full_steps:
-            reason = f"{self.full_steps} full steps have not settled the active sets"
+        most = min(self.full_steps, _COSTLY_FULL) if problem.body.is_costly else self.full_steps
+        if following.n_in_phase >= most:
+            reason = f"{most} full steps have not settled the active sets"
             return self._rescued(problem, following, Status.STALLED, reason)
+        if problem.body.is_costly and following.n_held >= _MOST_HELD and _may_be_sprung(problem, following):
+            return _sprung(problem, following, f"springs held the bodies in {_MOST_HELD} steps")
         return following
 
     def _damped_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
@@ -205,7 +244,8 @@ class SemismoothNewton:
         if size > (1.0 - 1e-3) * iterate.merit:
             return self._rescued(problem, following, Status.STALLED, "no Newton step reduces the residual")
         following = replace(following, state=residual.state, residual=residual, sets=residual.sets, merit=size)
-        if following.n_in_phase >= self.damped_steps:
+        most = min(self.damped_steps, _COSTLY_DAMPED) if problem.body.is_costly else self.damped_steps
+        if following.n_in_phase >= most:
             return self._rescued(problem, following, Status.STALLED, "the line search takes too many steps")
         return following
 
@@ -216,7 +256,9 @@ class SemismoothNewton:
         for phase in iterate.phase.more_patient:
             if phase is Phase.DAMPED and self.damped_steps > 0:
                 return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
-            if phase is not Phase.DAMPED and may_follow:
+            if phase is Phase.SPRINGS and _may_be_sprung(problem, iterate):
+                return _sprung(problem, iterate, reason)
+            if phase not in (Phase.DAMPED, Phase.SPRINGS) and may_follow:
                 return replace(iterate, phase=phase, n_in_phase=0, message=f"{reason}; the path is followed next")
         return replace(iterate, ended=status, message="; ".join(filter(None, (reason, hindrance))))
 
@@ -250,12 +292,58 @@ class SemismoothNewton:
             return self._rescued(problem, following, Status.STALLED, end.reason)
         return following
 
+    def _spring_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
+        equations = self._equations(problem)
+        start = iterate if iterate.anchor is not None else self._begun(problem, problem.sticking_state)
+        anchor = problem.sticking_state if iterate.anchor is None else iterate.anchor
+        linear = equations.linearised(start.residual, start.sets).regularised(anchor.displacement, iterate.spring)
+        residual = equations.evaluate(problem.respond(linear))
+        sets = equations.through_stick(residual, start.sets)
+        following = replace(
+            iterate,
+            state=residual.state,
+            linear_solves=iterate.linear_solves + 1,
+            message=f"springs of {iterate.spring / problem.body.stiffness_scale:.1e}",
+            residual=residual,
+            sets=sets,
+            merit=merit(problem, residual),
+            n_in_phase=iterate.n_in_phase + 1,
+            anchor=anchor,
+        )
+        if sets.n_changed(start.sets) <= problem.n_contact // 100:
+            following = replace(following, spring=_WEAKENED * iterate.spring, anchor=residual.state)
+            if following.spring < _LAST_SPRING * problem.body.stiffness_scale:
+                begun = self._begun(problem, residual.state)
+                kept = {name: getattr(following, name) for name in ("linear_solves", "n_paths", "message", "spring")}
+                return replace(begun, **kept)
+        if following.n_in_phase >= _MOST_WITH_SPRINGS:
+            return replace(following, ended=Status.STALLED, message="the active sets do not settle with springs either")
+        return following
+
     def _restarted(
         self, problem: ContactProblem, iterate: NewtonIterate, state: ContactState, message: str
     ) -> NewtonIterate:
         """Return the iterate with full steps to come from the end of a path."""
         begun = self._begun(problem, state)
-        return replace(begun, linear_solves=iterate.linear_solves, n_paths=iterate.n_paths + 1, message=message)
+        kept = {name: getattr(iterate, name) for name in ("linear_solves", "n_held", "spring")}
+        return replace(begun, n_paths=iterate.n_paths + 1, message=message, **kept)
+
+
+def _may_be_sprung(problem: ContactProblem, iterate: NewtonIterate) -> bool:
+    """Tell whether springs had to hold many bodies, and have not held them throughout yet."""
+    is_many = problem.body.rigid_motions().shape[0] > _MOST_OF_ONE
+    return is_many and iterate.n_held > 0 and iterate.spring == 0.0
+
+
+def _sprung(problem: ContactProblem, iterate: NewtonIterate, reason: str) -> NewtonIterate:
+    """Return the beginning of the steps with springs, with all nodes sticking."""
+    return replace(
+        iterate,
+        phase=Phase.SPRINGS,
+        n_in_phase=0,
+        spring=_FIRST_SPRING * problem.body.stiffness_scale,
+        message=f"{reason}; springs hold the bodies from now on",
+    )
 
 
 def _few_pieces(problem: ContactProblem) -> int:

@@ -1,15 +1,20 @@
-"""Times and memory of a wall of many blocks: ``python -m tests.benchmarks.masonry [courses] [blocks a course]``.
+"""Times and memory of many bodies: ``python -m tests.benchmarks.masonry [steps | packing] [numbers]``.
 
-One sticking response, the programme that finds unsolvable loads, and a whole solve under weight and a push on the
-uppermost course of a tenth of what friction holds. Times are those of the processor and, in brackets, of the clock.
+``[courses] [blocks a course]`` alone: the contact system of a wall, one sticking response, the programme that finds
+unsolvable loads, and a whole solve under weight and a push on the uppermost course of a tenth of what friction holds.
+Times are those of the processor and, in brackets, of the clock. ``steps [courses] [blocks a course]``: such a wall as
+an assembly, weight alone and then the push, with the seconds of each stage. ``packing [discs] [width]``: a random
+packing of discs in a box.
 """
 
 import resource
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
+import bemkit as bk
 from bemkit.contact.conditions import stick
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem
@@ -17,6 +22,8 @@ from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import StepRecord, solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.contact.joined.blocks import wall
+from tests.runs.masonry import wall as wall_assembly
+from tests.runs.packing import packing
 
 FRICTION = 0.6
 
@@ -46,5 +53,28 @@ def main(courses: int = 20, per_course: int = 50) -> None:
     lap(f"{found.status.name} after {found.linear_solves} responses")
 
 
+def assembled(assembly: bk.Assembly) -> None:
+    """Print steps, stages and memory of an assembly."""
+    begin = time.perf_counter()
+
+    def shown(record: StepRecord) -> None:
+        words = f"{record.n_separated} open, {record.n_slip} slip, certificate {record.certificate.worst:.0e}"
+        print(f"{time.perf_counter() - begin:8.1f} s  step {record.step}: {words} {record.message}", flush=True)
+
+    for solution in bk.run_assembly_history([assembly], callback=shown):
+        stages = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in solution.timings.items())
+        print(f"{solution!r}\n  {solution.linear_solves} responses: {stages}")
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(f"{time.perf_counter() - begin:.1f} s, {time.process_time():.1f} s of the processor, {memory:.2f} GB")
+
+
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:]))
+    numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
+    if "steps" in sys.argv:
+        n_courses, per_course = numbers or (20, 50)
+        push = 0.1 * FRICTION * 2 * per_course
+        assembled(replace(wall_assembly(n_courses, per_course, push=True), load_factors=(0.0, push)))
+    elif "packing" in sys.argv:
+        assembled(packing(*(numbers or (200, 20))))
+    else:
+        main(*numbers)

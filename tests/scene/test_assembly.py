@@ -97,7 +97,7 @@ def test_every_key_survives_its_text() -> None:
         reference="nobody",
         bodies=(held, heavy),
         contacts=(
-            ContactPair(("upper-1.tip", "lower-1-1.top"), Coulomb(0.3), 1e-6, 1e-5, "lower-1-1.top"),
+            ContactPair(("upper-1.tip", "lower-1-1.top"), Coulomb(0.3), 1e-6, 1e-5, "lower-1-1.top", 0.2),
             ContactPair(("upper-2.tip", "lower-2-1.top")),
             ContactPair(("curve", "lower-2-1.right")),
             ContactPair(("upper-2.tip", "level")),
@@ -113,8 +113,9 @@ def test_every_key_survives_its_text() -> None:
             ),
             RigidBody(name="level", obstacle=SignedDistance(Expression("y - x")), force_x=1.0, y=2.0, turn=-0.1),
         ),
-        touching=Touching(0.01, Coulomb(0.1)),
+        touching=Touching(0.01, Coulomb(0.1), 0.3),
         law=Coulomb(0.5),
+        load_factors=(0.5, 1.0),
     )
     assert scene_from_toml(scene_to_toml(scene)) == scene
     assert scene_from_toml(scene_to_toml(BLOCKS)) == BLOCKS
@@ -129,6 +130,12 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"load_factors": ()}, r"load_factors is (): give finite numbers such as (0.5, 1.0)"),
+        ({"load_factors": (1.0, float("nan"))}, "load_factors is (1.0, nan): give finite numbers"),
+        (
+            {"load_factors": (0.5, 1.0), "mesh": MeshOptions(accuracy=1e-3)},
+            "mesh.accuracy is 0.001 with a load history of 2 steps",
+        ),
         ({"title": ""}, "title is '': give one line of printable text"),
         ({"bodies": ()}, "bodies is empty: give at least one body"),
         ({"bodies": (LOWER, SMALL, LOWER)}, "'lower' is the name of two bodies: give each its own name"),
@@ -208,6 +215,8 @@ def test_what_does_not_fit_together_is_named(change: dict[str, object], message:
         ),
         (lambda: replace(PUNCH, moment=1.0), "rigid body 'punch': turn is 0.01 and moment is 1.0: give one of them"),
         (lambda: Touching(-1.0), "touching.within is -1.0: give a length, zero or positive"),
+        (lambda: Touching(0.1, reach=0.0), "touching.reach is 0.0: give a positive length"),
+        (lambda: ContactPair(PAIR.sides, reach=-1.0), "contact 'upper.bottom / lower.top': reach is -1.0: give a"),
         (lambda: GridCopies(0), "columns is 0: give a number from 1 to 100000"),
         (lambda: GridCopies(1000, 1000), "columns times rows is 1000000: give a number"),
         (lambda: CircleCopies(0, 1.0), "count is 0: give a number"),

@@ -8,6 +8,7 @@ import pytest
 from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem
 from bemkit.operators.equilibrium import Imbalance
+from bemkit.solvers import ssn
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import Status, solve
@@ -81,6 +82,20 @@ def test_the_path_of_solutions_is_left_out_where_responses_are_costly():
     assert why_no_path(costly) == "the path of solutions is not followed, because responses of this body are costly"
     silent = solve(costly, SemismoothNewton(follows_path=False), throw=False)
     assert "costly" not in silent.message  # nobody asked for it
+
+
+def test_costly_bodies_are_given_up_early(monkeypatch):
+    """After fewer full steps, and fewer with line search, than other bodies get."""
+    problem = block_problem(Coulomb(0.5))
+    costly = replace(problem, body=Inexact(problem.body, is_costly=True))
+    assert solve(costly, SemismoothNewton()).steps == 3
+    monkeypatch.setattr(ssn, "_COSTLY_FULL", 1)
+    monkeypatch.setattr(ssn, "_COSTLY_DAMPED", 1)
+    assert solve(problem, SemismoothNewton()).steps == 3
+    found = solve(costly, SemismoothNewton(), throw=False)
+    assert found.steps == 2
+    assert found.history[1].message == "1 full steps have not settled the active sets; line search begins"
+    assert "the line search takes too many steps" in found.message
 
 
 def test_lemkes_method_declines_before_it_asks():

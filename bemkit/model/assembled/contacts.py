@@ -100,7 +100,9 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     law = assembly.law_of(assembly.touching)
     found = []
     for first, second in find_facing(sides, assembly.touching.within, owners=owners):
-        pair = ContactPair((names[first], names[second]), law, multipliers_on=names[first])
+        pair = ContactPair(
+            (names[first], names[second]), law, multipliers_on=names[first], reach=assembly.touching.reach
+        )
         if frozenset(pair.sides) not in known:
             found.append(pair)
     return (*assembly.contacts, *found)
@@ -122,7 +124,7 @@ def body_rows(
     at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
-    pairs = [pair for pair in assembly.contacts if pair.rigid_body is None]
+    pairs = assembly.elastic_contacts
     ordered = [_ordered(pair, bodies, numbers) for pair in pairs]
     lengths = [min(float(side.space.mesh.lengths[side.elements].sum()) for _, _, side in one) for one in ordered]
     taken: list[dict[int, str]] = [{} for _ in bodies]  # node -> the part that has its multiplier
@@ -136,7 +138,7 @@ def body_rows(
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:
-            coupling = couple(side, other_side, without=without, reach=_reach(bodies[first], bodies[second]))
+            coupling = couple(side, other_side, without=without, reach=_reach(pairs[k], bodies[first], bodies[second]))
         except ValueError as error:
             raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
         size = min(bodies[number].mesh.diameter for number in (first, second))
@@ -186,7 +188,9 @@ def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fi
     return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
 
 
-def _reach(one: PlacedBody, two: PlacedBody) -> float:
+def _reach(pair: ContactPair, one: PlacedBody, two: PlacedBody) -> float:
+    if pair.reach is not None:
+        return pair.reach
     return 0.5 * min(one.mesh.diameter, two.mesh.diameter)
 
 

@@ -15,12 +15,10 @@ from bemkit.contact.joined.member import Member
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contact_tractions import contact_tractions
-from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
 from bemkit.model.boundary_tractions import insert_loads
-from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import NotConvergedError
 from bemkit.operators.linear.dense import SingularMatrixError
@@ -61,7 +59,10 @@ class AssembledModel:
         prepared : PreparedAssembly
             From `PreparedAssembly.under` of this model's.
         """
-        condensed = tuple(_under(each, prepared, number) for number, each in enumerate(self.condensed))
+        condensed = tuple(
+            each if _is_loaded_alike(prepared, self.prepared, number) else _under(each, prepared, number)
+            for number, each in enumerate(self.condensed)
+        )
         elastic = tuple(
             replace(each, inside=inside) if isinstance(each, HeavyElasticity) and inside is not None else each
             for each, inside in zip(self.elastic, prepared.insides, strict=True)
@@ -225,77 +226,85 @@ def _motions(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
     return np.asarray(along[:, conditions.is_retained])
 
 
-def _nodal(body: PlacedBody, conditions: NodalConditions) -> tuple[sparse.csr_array, FloatArray]:
-    """Return how the retained displacements move the nodes in the axes of the scene.
-
-    Returns
-    -------
-    sparse (2 n_nodes, n_retained) array, (2 n_nodes,) array
-        Displacements are the product, and the array what supports prescribe.
-    """
+def _nodal(body: PlacedBody, conditions: NodalConditions) -> sparse.csr_array:
+    """Return how retained displacements move nodes in the axes of the scene, sparse (2 n_nodes, n_retained)."""
     directions = body.to_place(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
     node, k = np.nonzero(conditions.is_retained)
     vectors = directions[node, k]
     rows = 2 * node[:, None] + np.arange(2)
     columns = np.broadcast_to(np.arange(node.size)[:, None], rows.shape)
     shape = (2 * len(directions), node.size)
-    matrix = sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
-    given = np.einsum("nkc,nk->nc", directions, np.where(conditions.is_fixed, conditions.displacement, 0.0))
-    return matrix, given.ravel()
+    return sparse.csr_array((vectors.ravel(), (rows.ravel(), columns.ravel())), shape)
 
 
-def _couplings(rows: ContactRows, units: Units) -> list[tuple[int, sparse.csr_array]]:
-    """Return the bodies that a contact involves, and how their nodes, or a rigid body's motions, enter it."""
-    n = rows.n_contact
-    to_frames = sparse.bsr_array((rows.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n))
-    found = [(rows.body, sparse.csr_array(to_frames @ _of_nodes(rows.on_body)))]
-    if isinstance(rows.on_other, np.ndarray):
-        by_motions = sparse.csr_array((rows.on_other / motion_units(units)).reshape(2 * n, 3))
-        found.append((rows.other, sparse.csr_array(-(to_frames @ by_motions))))
-    elif rows.on_other is not None:
-        found.append((rows.other, sparse.csr_array(-(to_frames @ _of_nodes(rows.on_other)))))
-    return found
+def _given(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
+    """Return the displacements (2 n_nodes,) that supports prescribe, in the axes of the scene."""
+    fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)
+    return np.asarray(np.einsum("nkc,nk->nc", body.to_place(conditions.frame), fixed)).ravel()
 
 
-def _of_nodes(coupling: sparse.csr_array) -> sparse.csr_array:
-    """Return what a coupling (n, n_nodes) makes of nodal displacements in x and y, (2 n, 2 n_nodes)."""
-    return sparse.csr_array(sparse.kron(coupling, sparse.eye_array(2), format="csr"))
+def _frames(prepared: PreparedAssembly) -> sparse.csr_array:
+    """Return what takes displacements in x and y at the contact nodes to (n, t) components."""
+    n = prepared.n_contact
+    return sparse.csr_array(sparse.bsr_array((prepared.frame, np.arange(n), np.arange(n + 1)), shape=(2 * n, 2 * n)))
 
 
-def _moved(prepared: PreparedAssembly) -> list[tuple[sparse.csr_array, FloatArray]]:
-    """Return `_nodal` of all bodies, and the like of the rigid ones and their motions."""
-    elastic = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    return [*elastic, *(rigid_motions(body, prepared.units) for body in prepared.assembly.rigid)]
+def _coupling(prepared: PreparedAssembly) -> sparse.csr_array:
+    """Return how the nodes of all bodies move the contact nodes, (2 n_contact, 2 n_nodes), in (n, t) components."""
+    n_nodes = [body.space.n_dofs // 2 for body in prepared.bodies]
+    first = np.concatenate([[0], np.cumsum(n_nodes)])
+    data, row, column, begin = [np.zeros(0)], [np.zeros(0, np.intp)], [np.zeros(0, np.intp)], 0
+    for rows in prepared.rows:
+        for sign, number, on_nodes in ((1.0, rows.body, rows.on_body), (-1.0, rows.other, rows.on_other)):
+            if isinstance(on_nodes, sparse.csr_array):
+                data.append(sign * on_nodes.data)
+                row.append(begin + np.repeat(np.arange(rows.n_contact), np.diff(on_nodes.indptr)))
+                column.append(first[number] + on_nodes.indices)
+        begin += rows.n_contact
+    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(column))
+    difference = sparse.csr_array(entries, (begin, int(first[-1])))
+    return sparse.csr_array(_frames(prepared) @ sparse.kron(difference, sparse.eye_array(2), format="csr"))
+
+
+def _rigid_coupling(prepared: PreparedAssembly) -> sparse.csr_array:
+    """Return how the motions of all rigid bodies move the contact nodes, (2 n_contact, 3 n_rigid)."""
+    n_elastic, n_rigid = len(prepared.bodies), len(prepared.assembly.rigid)
+    by_motions, begin = np.zeros((prepared.n_contact, 2, n_rigid, 3)), 0
+    for rows in prepared.rows:
+        if isinstance(rows.on_other, np.ndarray):
+            own = rows.on_other / motion_units(prepared.units)
+            by_motions[begin : begin + rows.n_contact, :, rows.other - n_elastic] = -own
+        begin += rows.n_contact
+    return sparse.csr_array(_frames(prepared) @ sparse.csr_array(by_motions.reshape(2 * begin, 3 * n_rigid)))
 
 
 def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
-    nodal = [matrix for matrix, _ in _moved(prepared)]
-    sizes = [matrix.shape[1] for matrix in nodal]
-    first = np.concatenate([[0], np.cumsum(sizes)])
-    data, row, column, begin = [], [], [], 0
-    for rows in prepared.rows:
-        for number, coupling in _couplings(rows, prepared.units):
-            block = sparse.coo_array(coupling @ nodal[number])
-            data.append(block.data)
-            row.append(block.row + begin)
-            column.append(block.col + first[number])
-        begin += 2 * rows.n_contact
-    shape = (begin, int(first[-1]))
-    if not data:
-        return sparse.csr_array(shape)
-    entries = np.concatenate(data), (np.concatenate(row), np.concatenate(column))
-    relative = sparse.csr_array(sparse.coo_array(entries, shape))
+    nodal = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    relative = sparse.csr_array(_coupling(prepared) @ sparse.block_diag(nodal, format="csr"))
+    if prepared.assembly.rigid:
+        chosen = [rigid_motions(body, prepared.units)[0] for body in prepared.assembly.rigid]
+        driven = _rigid_coupling(prepared) @ sparse.block_diag(chosen, format="csr")
+        relative = sparse.csr_array(sparse.hstack([relative, driven], format="csr"))
     relative.eliminate_zeros()
     return relative
 
 
 def _offset(prepared: PreparedAssembly) -> FloatArray:
     """Return the relative displacements (2 n_contact,) that supports and motions of rigid bodies prescribe."""
-    given = [values for _, values in _moved(prepared)]
-    parts = [np.zeros(0)]
-    for rows in prepared.rows:
-        parts.append(
-            np.sum([coupling @ given[number] for number, coupling in _couplings(rows, prepared.units)], axis=0)
-        )
-    return np.concatenate(parts)
+    offset = np.zeros(2 * prepared.n_contact)
+    given = [_given(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
+    if any(each.any() for each in given):
+        offset += _coupling(prepared) @ np.concatenate(given)
+    if prepared.assembly.rigid:
+        motions = [rigid_motions(body, prepared.units)[1] for body in prepared.assembly.rigid]
+        offset += _rigid_coupling(prepared) @ np.concatenate(motions)
+    return offset
+
+
+def _is_loaded_alike(prepared: PreparedAssembly, other: PreparedAssembly, number: int) -> bool:
+    """Tell whether all that acts on a body is the same object in two steps."""
+    given, before = (
+        (each.forces[number], each.insides[number], each.conditions[number].displacement) for each in (prepared, other)
+    )
+    return all(one is two for one, two in zip(given, before, strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,17 @@ class PlacedBody:
     scene: Scene
     mesh: BoundaryMesh
     own_mesh: BoundaryMesh
+
+    def under(self, body: Body, scene: Scene) -> PlacedBody:
+        """Return it with other numbers of conditions, on the same mesh and spaces."""
+        other = replace(self, body=body, scene=scene)
+        other.__dict__.update({name: self.__dict__[name] for name in ("space", "own_space") if name in self.__dict__})
+        return other
+
+    def is_loaded_like(self, other: PlacedBody) -> bool:
+        """Whether its parts and body forces are the very objects that another one has."""
+        own, others = ((*each.body.parts, *each.body.body_forces) for each in (self, other))
+        return len(own) == len(others) and all(one is two for one, two in zip(own, others, strict=True))
 
     @property
     def name(self) -> str:

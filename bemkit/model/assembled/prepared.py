@@ -131,6 +131,8 @@ class PreparedAssembly:
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
 
+        What acts on a body is worked out anew only if its parts or body forces are other objects than before.
+
         Parameters
         ----------
         assembly : Assembly
@@ -139,7 +141,7 @@ class PreparedAssembly:
         Raises
         ------
         InputError
-            If a rigid body becomes another one, or a load drives another of its motions.
+            If its bodies have other names, a rigid body becomes another one, or a load drives another of its motions.
         """
         for body, other in zip_longest(self.assembly.rigid, assembly.rigid):
             if body is None or other is None or _layout(body) != _layout(other):
@@ -147,11 +149,39 @@ class PreparedAssembly:
                     f"rigid body {(body or other).name!r} changes its shape, its place or what is given of it: change "
                     "numbers only, or run the assembly on its own"
                 )
-        bodies = tuple(
-            replace(body, body=other, scene=assembly.scene_of(other))
-            for body, other in zip(self.bodies, assembly.placed_bodies, strict=True)
+        return _prepared(assembly, _under(assembly, self.bodies), self.units, self)
+
+    def rows_under(self, assembly: Assembly) -> tuple[ContactRows, ...] | None:
+        """Return the contacts of elastic bodies with the gaps and laws of another assembly, None if they are others."""
+        before, after = self.assembly.elastic_contacts, assembly.elastic_contacts
+        if len(before) != len(after) or any(
+            replace(one, gap=0.0, law=None) != replace(two, gap=0.0, law=None)
+            for one, two in zip(before, after, strict=True)
+        ):
+            return None
+        return tuple(
+            replace(rows, gap=rows.gap + (two.gap - one.gap), law=assembly.law_of(two))
+            for rows, one, two in zip(self.rows, before, after, strict=False)
         )
-        return _prepared(assembly, bodies, self.units)
+
+
+def _first_of(names: Sequence[str]) -> str:
+    return ", ".join(repr(name) for name in names[:6]) + (", ..." if len(names) > 6 else "")
+
+
+def prepare_assembly_steps(
+    assemblies: Sequence[Assembly], meshes: Mapping[str, BoundaryMesh] | None = None
+) -> tuple[PreparedAssembly, ...]:
+    """Work out what assemblies that follow each other in time say, in the units of the largest load.
+
+    All take the contacts that are found in the first one; see `prepare_assembly`.
+    """
+    bodies = place(assemblies[0], meshes)
+    contacts = listed_contacts(assemblies[0], bodies)
+    steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
+    units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
+    first = _prepared(steps[0], _under(steps[0], bodies), units)
+    return (first, *(first.under(step) for step in steps[1:]))
 
 
 def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> PreparedAssembly:
@@ -160,6 +190,7 @@ def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | No
     Parameters
     ----------
     assembly : Assembly
+        With a single load.
     meshes : mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, in the coordinates of their shapes.
 
@@ -172,9 +203,7 @@ def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | No
     ConflictingSupportsError
         If supports contradict each other at a node.
     """
-    bodies = place(assembly, meshes)
-    assembly = assembly.with_contacts(listed_contacts(assembly, bodies)) if assembly.touching else assembly
-    return _prepared(assembly, bodies, find_common_units(assembly, bodies))
+    return prepare_assembly_steps([assembly], meshes)[0]
 
 
 def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units:
@@ -199,18 +228,41 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     return units
 
 
-def _prepared(assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units) -> PreparedAssembly:
+def _under(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[PlacedBody, ...]:
+    """Return placed bodies with what another assembly says of them; refuse bodies of other names."""
+    names, others = ([body.name for body in each] for each in (bodies, assembly.placed_bodies))
+    if names != others:
+        raise InputError(
+            f"the bodies are {_first_of(others)}, and those of the step before {_first_of(names)}: change numbers of "
+            "conditions and contacts only"
+        )
+    pairs = zip(bodies, assembly.placed_bodies, strict=True)
+    return tuple(body.under(other, assembly.scene_of(other)) for body, other in pairs)
+
+
+def _prepared(
+    assembly: Assembly, bodies: tuple[PlacedBody, ...], units: Units, before: PreparedAssembly | None = None
+) -> PreparedAssembly:
+    """Prepare placed bodies; what is as it was in the same units before is taken over."""
     force_unit = units.stress * units.length
-    conditions, forces = [], []
-    for body in bodies:
+    conditions: list[NodalConditions] = []
+    forces: list[FloatArray] = []
+    for number, body in enumerate(bodies):
+        if before is not None and body.is_loaded_like(before.bodies[number]):
+            conditions.append(before.conditions[number])
+            forces.append(before.forces[number])
+            continue
         own = body.units(units.modulus, force_unit)
         supports = supports_on(body.scene, body.own_mesh, own, body.own_space)
         conditions.append(supported(body.own_space, supports))
         in_place = body.units(units.modulus, force_unit, body.mesh)
         forces.append(body.turn.turned_back(nodal_forces(body.scene, body.mesh, body.space_in_place, in_place)))
     with_obstacles = tuple(obstacle_rows(assembly, bodies, conditions))
-    rows = (*body_rows(assembly, bodies, conditions, with_obstacles), *with_obstacles)
-    retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units)
+    between = None if before is None else before.rows_under(assembly)
+    if between is None:
+        between = tuple(body_rows(assembly, bodies, conditions, with_obstacles))
+    rows = (*between, *with_obstacles)
+    retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units, before)
     return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
 
 
@@ -218,11 +270,16 @@ def _layout(body: RigidBody) -> tuple[object, ...]:
     return body.name, body.obstacle, body.centre, body.is_driven.tolist()
 
 
-def _insides(bodies: Sequence[PlacedBody], units: Units) -> tuple[ForcesInside | None, ...]:
+def _insides(
+    bodies: Sequence[PlacedBody], units: Units, before: PreparedAssembly | None
+) -> tuple[ForcesInside | None, ...]:
     """Return what acts inside each body; copies that are turned alike share it."""
     found: dict[tuple[int, tuple[BodyForce, ...]], ForcesInside | None] = {}
     insides = []
-    for body in bodies:
+    for number, body in enumerate(bodies):
+        if before is not None and body.is_loaded_like(before.bodies[number]):
+            insides.append(before.insides[number])
+            continue
         forces = tuple(seen_from(force, body.turn) for force in body.body.body_forces)
         key = (id(body.own_mesh), forces)
         if key not in found:

@@ -1,0 +1,134 @@
+"""Load steps of several bodies: walls up to their collapse and beyond, jumps that stall, steps that are kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.runs import load_increments
+from bemkit.runs.history import UnsolvableSceneError
+from bemkit.solvers.base import Status
+from tests.runs.masonry import FRICTION, wall
+
+
+def check_up_to_collapse(assembly: bk.Assembly, expected: float, moved: str, weight: float) -> None:
+    """Increments up to 98 % of the limit converge, 102 % cannot be carried, and the steps before are kept."""
+    limit = bk.largest_load_factor(assembly)
+    assert limit == pytest.approx(expected, rel=1e-6)  # accuracy of linear programmes
+    factors = tuple(limit * share for share in (0.0, 0.5, 0.74, 0.86, 0.98, 1.02))
+    *steps, beyond = bk.run_assembly_history([replace(assembly, load_factors=factors)])
+    assert [step.is_converged for step in steps] == [True] * 5
+    for factor, step in zip(factors, steps, strict=False):
+        floors = [one for one in step.contacts if one.name.endswith(".floor")]
+        assert sum(one.force_y for one in floors) == pytest.approx(weight, rel=1e-9)
+        push = factor if expected > 1.0 else factor * weight
+        assert sum(one.force_x for one in floors) == pytest.approx(-push, rel=1e-9, abs=1e-9 * weight)
+        assert step.outer_steps < 20  # each from the end of the last one
+    assert beyond.status is Status.UNSOLVABLE_LOAD
+    assert f"bodies '{moved}" in beyond.message
+    assert "The fields are those of the step before." in beyond.message
+    np.testing.assert_array_equal(beyond.contact.sigma_n, steps[-1].contact.sigma_n)
+
+
+def test_a_wall_is_pushed_up_to_its_collapse() -> None:
+    """Friction under the uppermost course, of weight 8, holds the push."""
+    check_up_to_collapse(wall(3, 4, push=True), FRICTION * 8.0, "block 2-0", 24.0)
+
+
+def test_a_wall_leans_up_to_its_collapse() -> None:
+    check_up_to_collapse(wall(5, 4, push=False), FRICTION, "block 0-0", 40.0)
+
+
+@pytest.mark.slow
+def test_a_wall_of_200_blocks_is_pushed_up_to_its_collapse() -> None:
+    check_up_to_collapse(wall(10, 20, push=True), FRICTION * 40.0, "block 9-0", 400.0)
+
+
+def test_a_load_history_is_one_scene_and_one_result(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    factors = (0.0, 2.0, 4.0)
+    assembly = replace(wall(2, 2, push=True), load_factors=tuple(0.5 * factor for factor in factors))
+    assert bk.scene_from_toml(bk.scene_to_toml(assembly)) == assembly
+    steps = bk.run_assembly_history([assembly])
+    solution = bk.run(assembly)
+    assert solution.is_converged
+    assert solution.message.startswith("load step 3 of 3: ")
+    assert solution.linear_solves == sum(step.linear_solves for step in steps)
+    assert [
+        record.message.split(";")[0] for record in solution.history if record.step in (0, len(solution.history) - 1)
+    ] == [
+        "load step 1 of 3",
+        "load step 3 of 3",
+    ]
+    np.testing.assert_array_equal(solution.contact.sigma_t, steps[-1].contact.sigma_t)
+    assert solution.assembly.load_factors == assembly.load_factors
+    points = np.array([[1.0, 0.5]])
+    inside = bk.interior_fields(solution.bodies["block 0-0"]).stress(points)
+    np.testing.assert_allclose(inside, bk.interior_fields(steps[-1].bodies["block 0-0"]).stress(points), rtol=1e-12)
+    bk.write_result(tmp_path / "wall.h5", solution)
+    read = bk.read_result(tmp_path / "wall.h5")
+    np.testing.assert_allclose(bk.interior_fields(read.bodies["block 0-0"]).stress(points), inside, rtol=1e-12)
+
+
+def test_steps_that_are_reached_are_kept_in_the_result_of_a_scene() -> None:
+    assembly = replace(wall(2, 2, push=True), load_factors=(1.0, 5.0))  # friction holds 2.4
+    solution = bk.run(assembly)
+    assert solution.status is Status.UNSOLVABLE_LOAD
+    assert solution.message.startswith("load step 2 of 2: No contact tractions can balance this load")
+    assert solution.assembly.load_factors == (1.0,)  # the fields are of this one
+    assert not solution.is_certified
+    with pytest.raises(UnsolvableSceneError, match="slides bodies 'block 1-0'"):
+        bk.run(replace(assembly, load_factors=(5.0, 1.0)))
+
+
+def test_a_jump_that_stalls_is_gone_in_halves() -> None:
+    """Two full steps settle small increments and no large ones."""
+    impatient = bk.SemismoothNewton(full_steps=5, damped_steps=0, follows_path=False)
+    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6))
+    assembly = replace(assembly, solver=impatient)
+    first, second = bk.run_assembly_history([assembly])
+    assert second.is_converged
+    assert "increments in its place led there" in second.message
+    remarks = [record.message for record in second.history]
+    assert any(remark.startswith("increment to 0.5 of the step") for remark in remarks)
+    steps = [record.step for record in second.history]
+    assert steps == list(range(len(steps)))
+    assert second.linear_solves == second.history[-1].linear_solves
+    floors = [one.force_x for one in second.contacts if one.name.endswith(".floor")]
+    assert sum(floors) == pytest.approx(-4.6, rel=1e-9)
+    assert first.is_converged
+
+
+def test_a_step_out_of_reach_says_how_far_it_came(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.setattr(load_increments, "MOST_HALVINGS", 2)
+    hopeless = bk.SemismoothNewton(full_steps=2, damped_steps=0, follows_path=False)
+    assembly = replace(wall(3, 4, push=True), load_factors=(0.0, 4.6), solver=hopeless)
+    first, second = bk.run_assembly_history([assembly])
+    assert first.is_converged
+    assert second.status in (Status.STALLED, Status.CYCLING)
+    assert "Increments down to 0.25 of the step led to" in second.message
+    assert "The static programme finds no collapse under this load" in second.message
+    np.testing.assert_array_equal(second.contact.sigma_n, first.contact.sigma_n)
+
+
+def test_steps_of_other_bodies_are_refused() -> None:
+    with pytest.raises(bk.InputError, match=r"the bodies are .*, and those of the step before .*: change numbers"):
+        bk.run_assembly_history([wall(2, 2, push=True), wall(2, 3, push=True)])
+
+
+def test_what_has_no_largest_factor_says_so() -> None:
+    falling = bk.Gravity(1.0, (1.0, 0.0), is_constant=True)
+    assembly = wall(2, 2, push=True)
+    leaning = tuple(replace(body, body_forces=(*body.body_forces, falling)) for body in assembly.bodies)
+    # a push to the right cannot hold what slides to the right, and a pull cannot hold all courses
+    with pytest.raises(UnsolvableSceneError, match="no contact tractions can balance the constant load"):
+        bk.largest_load_factor(replace(assembly, bodies=leaning, law=bk.Coulomb(0.1)))
+    with pytest.raises(bk.InputError, match="no two bodies are in contact"):
+        bk.largest_load_factor(replace(assembly, bodies=_without_floor(assembly), touching=None))
+
+
+def _without_floor(assembly: bk.Assembly) -> tuple[bk.Body, ...]:
+    held = bk.Part("floor", bk.Clamped(), ("bottom",))
+    return tuple(replace(body, parts=(held,)) for body in assembly.bodies)

@@ -1,0 +1,39 @@
+"""Random packings of discs under their weight: many bodies that nothing but contact holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import bemkit as bk
+from tests.runs.packing import packing
+
+
+def check_packing(assembly: bk.Assembly) -> None:
+    solution = bk.run(assembly)
+    assert solution.is_converged
+    assert solution.certificate.worst <= 1e-9
+    walls = [one for one in solution.contacts if " / " not in one.name]
+    weight = sum(body.mesh.area for body in solution.bodies.values())
+    assert sum(one.force_y for one in walls) == pytest.approx(weight, rel=1e-9)
+    assert sum(one.force_x for one in walls) == pytest.approx(0.0, abs=1e-9 * weight)
+
+
+def test_a_packing_of_twelve_discs_rests() -> None:
+    check_packing(packing(12, 5.0))
+
+
+def test_points_that_face_two_discs_are_why_contacts_have_a_reach() -> None:
+    """With the reach of half a disc the contacts tie many points twice, and six digits are lost."""
+    near = packing(12, 5.0)
+    far = replace(near, touching=replace(near.touching, reach=None))
+    counts = [bk.run(each).contact.n_contact for each in (near, replace(far, touching=bk.Touching(0.02, reach=0.05)))]
+    assert counts[0] > counts[1]
+    assert bk.run(far).contact.n_contact > 2 * counts[0]
+
+
+@pytest.mark.slow
+def test_a_packing_of_200_discs_rests() -> None:
+    """Full steps free now these discs, now those; springs that become weaker lead to the state where all rest."""
+    check_packing(packing(200, 20.0))
