@@ -16,6 +16,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly
 from bemkit.model.boundary_tractions import mean_tractions
+from bemkit.model.energy import with_energies_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_memory
@@ -100,7 +101,7 @@ def run_assembly_history(
                 model = model.under(step)
                 model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
                 clock = clock.closed(Stage.CONDENSE)
-            result = _solved(model, state, callback)
+            result = with_energies_checked(model, _solved(model, state, callback))
             clock = clock.closed(Stage.SOLVE)
             solutions.append(_solution(model, result, plan, clock))
             clock = StageClock.start()
