@@ -123,7 +123,8 @@ def _solved(
     result = solve(model.problem, solver, start=start, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-        raise UnsolvableSceneError(result.message if load is None else load.description)
+        remedy = "hold what moves by a support, raise the friction, or change the loads"
+        raise UnsolvableSceneError(result.message if load is None else f"{load.description}: {remedy}")
     return result
 
 

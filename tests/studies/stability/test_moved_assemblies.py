@@ -15,13 +15,10 @@ from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarit
 FRICTION = 0.25
 
 
-def assembly(*, reflects: bool = False, is_unique: bool = False) -> bk.Assembly:
+def assembly(*, reflects: bool = False) -> bk.Assembly:
     """Three blocks of unlike materials and meshes on a rigid floor, one of them on two, under weight and shear.
 
     Sides of a block are whole numbers of elements long, so that reflected blocks are divided alike.
-
-    Friction by Coulomb's law leaves several states to blocks that are squeezed together, of which the order of the
-    nodes may choose; by Tresca's law there is one.
     """
     sign = -1.0 if reflects else 1.0
 
@@ -48,18 +45,18 @@ def assembly(*, reflects: bool = False, is_unique: bool = False) -> bk.Assembly:
             block("three", 0.3, 1.0, 1.5, 0.5, parts=(load,), mesh=bk.MeshOptions(elements=30)),
         ),
         contacts=(
-            bk.ContactPair(("three.bottom", "one.top"), law=None if is_unique else cohesive),
+            bk.ContactPair(("three.bottom", "one.top"), law=cohesive),
             bk.ContactPair(("three.bottom", "two.top")),
             bk.ContactPair(("one.right", "two.left"), gap=-0.0101, law=bk.Tresca(2e-5)),
         ),
-        law=bk.Tresca(2e-4) if is_unique else bk.Coulomb(FRICTION),
+        law=bk.Coulomb(FRICTION),
         discretisation=bk.QuadraticGalerkin(),
     )
 
 
 @lru_cache
-def plain(*, is_unique: bool = False) -> AssemblySolution:
-    solution = bk.run(assembly(is_unique=is_unique))
+def plain() -> AssemblySolution:
+    solution = bk.run(assembly())
     assert solution.is_converged
     assert len(set(solution.contact.status.tolist())) >= 3  # open, sticking and slipping nodes
     return solution
@@ -103,30 +100,28 @@ def test_same_statuses_after_the_same_iterations(name: str) -> None:
 
 
 def test_a_reflected_assembly_slips_the_other_way() -> None:
-    unique = plain(is_unique=True)
-    solution = bk.run(assembly(reflects=True, is_unique=True))
-    assert (solution.linear_solves, solution.outer_steps) == (unique.linear_solves, unique.outer_steps)
-    for contact in unique.contact.parts:
-        own, expected = (each.contact.rows(contact) for each in (solution, unique))
+    solution = bk.run(assembly(reflects=True))
+    assert (solution.linear_solves, solution.outer_steps) == (plain().linear_solves, plain().outer_steps)
+    for contact in plain().contact.parts:
+        own, expected = (each.contact.rows(contact) for each in (solution, plain()))
         np.testing.assert_array_equal(
-            solution.contact.status[own], np.array([0, 1, 3, 2])[unique.contact.status[expected]][::-1]
+            solution.contact.status[own], np.array([0, 1, 3, 2])[plain().contact.status[expected]][::-1]
         )
-        np.testing.assert_allclose(solution.contact.sigma_n[own], unique.contact.sigma_n[expected][::-1], atol=1e-11)
-        np.testing.assert_allclose(solution.contact.sigma_t[own], -unique.contact.sigma_t[expected][::-1], atol=1e-11)
+        np.testing.assert_allclose(solution.contact.sigma_n[own], plain().contact.sigma_n[expected][::-1], atol=1e-11)
+        np.testing.assert_allclose(solution.contact.sigma_t[own], -plain().contact.sigma_t[expected][::-1], atol=1e-11)
 
 
 def test_bodies_and_sides_come_in_any_order() -> None:
     """Contacts that meet in a corner do not: of equally long ones the first has the multiplier there."""
-    unique = plain(is_unique=True)
-    given = assembly(is_unique=True)
+    given = assembly()
     swapped = tuple(replace(pair, sides=pair.sides[::-1]) for pair in given.contacts)
     assert [pair.multipliers_on for pair in given.contacts] == [None] * 3
     solution = bk.run(replace(given, bodies=given.bodies[::-1], contacts=swapped))
     for pair in given.contacts:
         own = solution.contact.rows(" / ".join(pair.sides[::-1]))
-        expected = unique.contact.rows(pair.name)
-        np.testing.assert_array_equal(solution.contact.status[own], unique.contact.status[expected])
-        np.testing.assert_allclose(solution.contact.sigma_n[own], unique.contact.sigma_n[expected], atol=1e-11)
+        expected = plain().contact.rows(pair.name)
+        np.testing.assert_array_equal(solution.contact.status[own], plain().contact.status[expected])
+        np.testing.assert_allclose(solution.contact.sigma_n[own], plain().contact.sigma_n[expected], atol=1e-11)
 
 
 def test_multipliers_on_the_other_side_change_forces_by_the_discretisation_error() -> None:
