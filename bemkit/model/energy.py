@@ -11,10 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.model.assembled.model import AssembledModel
 from bemkit.model.contact_model import Model
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
+from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.solvers.base import ContactSolution, Status
 
 _ROUND_OFF = 1e-10
@@ -34,20 +36,50 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     """
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
-    condensed = model.body.condensed
     displacement, force = model.map_fields(*model.body.recover(result.state))
+    is_symmetric = model.scene.discretisation.is_symmetric
+    doubt = _doubt(model.body.condensed, model.elastic, model.prepared.space, is_symmetric, (displacement, force))
+    return _named(result, doubt) if doubt else result
+
+
+def with_energies_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named NEGATIVE_ENERGY and by the body if the energy of one is negative or can be.
+
+    See `with_energy_checked`.
+    """
+    if not result.state.is_finite or result.status is Status.NOT_FINITE:
+        return result
+    unknowns = model.body.member_displacements(result.state)
+    bodies = zip(model.prepared.bodies, model.elastic, model.condensed, model.prepared.insides, unknowns, strict=True)
+    for body, elastic, condensed, inside, own in bodies:
+        displacement, force = condensed.recover(own)
+        if inside is not None:
+            displacement, force = displacement - inside.displacement, force - inside.force
+        is_symmetric = body.scene.discretisation.is_symmetric
+        doubt = _doubt(condensed, elastic, body.own_space, is_symmetric, (displacement, force))
+        if doubt:
+            return _named(result, f"body {body.name!r}: {doubt}")
+    return result
+
+
+def _doubt(
+    condensed: CondensedMap,
+    elastic: SteklovPoincare,
+    space: BoundarySpace,
+    is_symmetric: bool,
+    fields: tuple[FloatArray, FloatArray],
+) -> str:
+    """Say why the energy of a body is or can be negative; empty if it is not."""
+    displacement, force = fields
     sensitivity = condensed.sensitivity
     if sensitivity is None:  # a node resists by about E' per displacement, whatever the elements around it are
-        sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
+        sensitivity = np.full(displacement.shape, elastic.material.plane_modulus)
     # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
-    if not model.scene.discretisation.is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
-        return _named(result, "the stiffness that the contact boundary sees is negative in some direction")
-    space = model.prepared.space
+    if not is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
+        return "the stiffness that the contact boundary sees is negative in some direction"
     motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, sensitivity)
-    return (
-        _named(result, f"it is {-share:.1e} times the work of all forces, each taken by its size") if share else result
-    )
+    return f"it is {-share:.1e} times the work of all forces, each taken by its size" if share else ""
 
 
 def negative_share(

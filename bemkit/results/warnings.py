@@ -28,6 +28,8 @@ _MOST_ALIKE = 3
 """Doubts of one kind about several bodies and contacts that are told."""
 FEWEST_NODES = 4
 """Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
+_CLOSED = 1e-9
+"""Share of the largest clearance that may be the round-off of none."""
 
 
 def find_warnings(solution: Solution) -> tuple[str, ...]:
@@ -139,7 +141,10 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
 def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[str]:
     """Doubt zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
     words = np.array(contact.status_words(), dtype=object)
-    is_closed = words != "separated"
+    # friction that acts across a gap sticks or slips without contact
+    clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)
+    is_apart = (contact.sigma_n >= 0.0) & (clearance > _CLOSED * np.abs(clearance).max(initial=0.0))
+    is_closed = (words != "separated") & ~is_apart
     for part in contact.parts:
         own = contact.rows(part)
         kinds = {"contact": own & is_closed}

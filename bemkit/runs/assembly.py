@@ -16,6 +16,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
+from bemkit.model.energy import with_energies_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_memory
@@ -120,7 +121,7 @@ def run_assembly_history(
         with assembly_time() as assembly:
             model = build_assembled_model(steps[0])
         clock = clock.closed_build(assembly)
-        result = _first_solved(model, callback)
+        result = with_energies_checked(model, _first_solved(model, callback))
         clock = clock.closed(Stage.SOLVE)
         solutions = [_solution(model, result, plan, clock)]
         for step in steps[1:]:
@@ -130,7 +131,8 @@ def run_assembly_history(
             before, model = model, model.under(step)
             clock = clock.closed(Stage.CONDENSE)
             reached = reach_load(before, model, result.state, callback)
-            result, model = reached.result, replace(model, problem=reached.problem)
+            model = replace(model, problem=reached.problem)
+            result = with_energies_checked(model, reached.result)
             clock = clock.closed(Stage.SOLVE)
             is_there = result.is_converged
             solutions.append(
@@ -144,7 +146,8 @@ def _first_solved(model: AssembledModel, callback: Callable[[StepRecord], None] 
     result = solve(model.problem, solver, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-        raise UnsolvableSceneError(result.message if load is None else load.description)
+        remedy = "hold what moves by a support, raise the friction, or change the loads"
+        raise UnsolvableSceneError(result.message if load is None else f"{load.description}: {remedy}")
     return result
 
 

@@ -346,3 +346,22 @@ def test_forces_are_passed_on_whole_where_a_partner_ends_inside_an_element(degre
         assert force.force_y == pytest.approx(expected, rel=1e-12)  # sums of fifty numbers
         # constant tractions on linear elements know the moment to the square of the length of one
         assert force.moment == pytest.approx(0.83 * expected, rel=0.05 if degree == 1 else 1e-10)
+
+
+def test_a_body_whose_energy_can_be_negative_is_named() -> None:
+    """A slit that closes, by constant elements longer than its lips are thick: they push back the wrong way."""
+    names = ("bottom", "right low", "lip low", "root", "lip high", "right high", "top", "left")
+    corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 0.48), (0.3, 0.48), (0.3, 0.52), (1.0, 0.52), (1.0, 1.0), (0.0, 1.0))
+    split = bk.Body(
+        name="split",
+        shape=bk.Polygon(corners, names),
+        material=bk.Material(1.0, 0.4999),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Traction(y=-0.001), ("top",))),
+        mesh=bk.MeshOptions(elements=9),
+    )
+    pair = bk.ContactPair(("split.lip low", "split.lip high"), gap=-0.041)
+    solution = bk.run(
+        bk.Assembly(title="Split", bodies=(split,), contacts=(pair,), discretisation=bk.ConstantCollocation())
+    )
+    assert solution.status is bk.Status.NEGATIVE_ENERGY
+    assert "body 'split'" in solution.message

@@ -26,6 +26,9 @@ HELD_COSINE = 1e-3
 """Cosine of the angle between the free direction of a supported node and the direction of contact below which it does
 not approach."""
 
+_DIGITS = 9
+"""Decimals of lengths of contacts relative to the longest: round-off shall not decide which of two is longer."""
+
 
 class OverlapError(InputError):
     """Bodies that overlap by more than an interference that was given."""
@@ -119,9 +122,9 @@ def body_rows(
     Notes
     -----
     Where two contact sides of one body meet in a corner, the node there carries a multiplier of one contact alone: of
-    that with a rigid obstacle, else of the longer one. Three bodies that meet in a point would otherwise be tied in a
-    circle, and their tractions there could not be told apart. The other contact hands its share to its neighbours, as
-    at crosspoints of mortar methods [Wohlmuth2000].
+    that with a rigid obstacle, else of the longer one, the first of equally long ones. Three bodies that meet in a
+    point would otherwise be tied in a circle, and their tractions there could not be told apart. The other contact
+    hands its share to its neighbours, as at crosspoints of mortar methods [Wohlmuth2000].
     """
     numbers = {body.name: number for number, body in enumerate(bodies)}
     pairs = assembly.elastic_contacts
@@ -131,7 +134,7 @@ def body_rows(
     for rows in with_obstacles:
         taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.part))
     found: dict[int, ContactRows] = {}
-    for k in sorted(range(len(pairs)), key=lambda k: -lengths[k]):
+    for k in np.argsort(-np.round(np.array(lengths) / max(lengths, default=1.0), _DIGITS), kind="stable").tolist():
         (first, part, side), (second, _, other_side) = ordered[k]
         own_nodes, normals = nodes_on(side.space, side.elements)
         held = ~approaches(own_nodes, normals, conditions[first].frame, conditions[first].is_fixed)

@@ -110,7 +110,9 @@ def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outco
         check = _check(step, before)
         if not check.is_good:
             return Outcome.WRONG, check.faults[0], describe(check)
-        if check.needs_warning and not step.warnings:
+        # meshes of which an earlier step has warned stay what they are when the load goes
+        warned = solutions if isinstance(step, AssemblySolution) else (step,)
+        if check.needs_warning and not any(each.warnings for each in warned):
             return Outcome.WRONG, check.needs_warning, describe(check)
     last = solutions[-1]
     if not last.is_converged:

@@ -15,7 +15,7 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.scene.assembly import ContactPair
 from bemkit.scene.conditions import Contact
 from bemkit.studies.stability.independent_check.bodies import MeasuredBody
-from bemkit.studies.stability.independent_check.boundary import EPSILON, beyond, largest
+from bemkit.studies.stability.independent_check.boundary import EPSILON, beyond, largest, trusted_stress
 from bemkit.studies.stability.independent_check.check import Measured, measure, slip_opposition, status_mismatch
 from bemkit.studies.stability.independent_check.joints import Side, measure_flat, sampled_overlap
 from bemkit.studies.stability.independent_check.nodes import _mean_normals, distance_to
@@ -187,10 +187,13 @@ class Joints:
         for name in self.solution.contact.parts:
             partner = self.partner(name)
             sides = [side for side in (self.owner[name], partner) if side is not None]
-            scales = [self.bodies[side.split(".", 1)[0]].scales for side in sides]
+            bodies = [self.bodies[side.split(".", 1)[0]] for side in sides]
+            scales = [body.scales for body in bodies]
+            # a body that moves far passes on what is round-off there
+            trusted = max(trusted_stress(body.fields.solution) for body in bodies)
             rows = self.solution.contact.rows(name)
             length[rows] = max(each.length for each in scales)
-            stress[rows] = max(min(each.stress for each in scales), _LIGHTEST * most)
+            stress[rows] = max(min(each.stress for each in scales), trusted, _LIGHTEST * most)
         return length, stress
 
     def measured(self, before: AssemblySolution | None) -> Measured:

@@ -1,0 +1,144 @@
+"""The independent check of assemblies: right ones pass to round-off, and every fault is found by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.studies.stability.independent_check import AssemblyCheck, check_assembly
+from bemkit.studies.stability.trials import Outcome, judge
+
+MATERIAL = bk.Material(1.0, 0.3)
+SIDE = "upper.bottom / lower.top"
+
+
+@lru_cache
+def solved(degree: int = 2) -> AssemblySolution:
+    """A block on a wider one whose mesh does not match, pressed and sheared: it sticks in the middle and slips."""
+    lower = bk.Body(
+        name="lower",
+        shape=bk.Rectangle(2.0, 1.0),
+        material=bk.Material(4.0, 0.2),
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(elements=50),
+    )
+    upper = bk.Body(
+        name="upper",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=MATERIAL,
+        parts=(bk.Part("load", bk.Traction(0.1, -1.0), ("top",)),),
+        placement=bk.Placement((0.43, 1.0)),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    pair = bk.ContactPair(("upper.bottom", "lower.top"))
+    discretisation = bk.Galerkin(degree)
+    return bk.run(
+        bk.Assembly(
+            title="x", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.25), discretisation=discretisation
+        )
+    )
+
+
+def test_a_right_solution_passes_to_round_off() -> None:
+    check = check_assembly(solved())
+    assert check.faults == ()
+    assert check.worst < 1e-9  # the certificate; gaps, means, reactions and equilibrium are round-off
+    assert check.reciprocity < 0.02
+    assert check.hidden_overlap < 0.02  # of a corner of pressure, between nodes 1 / 15 apart
+
+
+def changed_table(**columns: Callable[[np.ndarray], np.ndarray]) -> AssemblySolution:
+    solution = solved()
+    table = solution.contact
+    return replace(
+        solution, contact=replace(table, **{name: change(getattr(table, name)) for name, change in columns.items()})
+    )
+
+
+def changed_body(name: str, field: str, change: Callable[[np.ndarray], np.ndarray]) -> AssemblySolution:
+    solution = solved()
+    body = solution.bodies[name]
+    boundary = replace(body.boundary, **{field: change(getattr(body.boundary, field))})
+    return replace(solution, bodies={**solution.bodies, name: replace(body, boundary=boundary)})
+
+
+def middle(values: np.ndarray) -> np.ndarray:
+    return np.arange(values.size) == values.size // 2
+
+
+FAULTS: dict[str, tuple[Callable[[], AssemblySolution], str]] = {
+    "a pulled node": (lambda: changed_table(sigma_n=lambda s: np.where(middle(s), 0.01, s)), "tension"),
+    "friction beyond the cone": (lambda: changed_table(sigma_t=lambda s: np.where(middle(s), -0.5, s)), "cone_excess"),
+    "friction along slip": (lambda: changed_table(sigma_t=lambda s: -s), "slip_opposition"),
+    "another gap": (lambda: changed_table(gap=lambda g: g + 1e-3, clearance=lambda c: c + 1e-3), "gaps"),
+    "bodies apart": (lambda: changed_table(u_n=lambda u: u - 1e-3, clearance=lambda c: c + 1e-3), "means"),
+    "bodies in each other": (
+        lambda: changed_table(u_n=lambda u: u + 1e-3, clearance=lambda c: c - 1e-3),
+        "penetration",
+    ),
+    "another slip": (lambda: changed_table(u_t=lambda u: u + 1e-3), "means"),
+    "a status": (lambda: changed_table(status=lambda s: np.where(middle(s), 0, s)), "status"),
+    "a partner that feels less": (lambda: changed_body("lower", "traction_dofs", lambda t: 0.9 * t), "reactions"),
+    "all contact too weak": (lambda: changed_table(sigma_n=lambda s: 0.9 * s), "equilibrium"),
+    "a base that gives way": (lambda: changed_body("lower", "displacement", lambda u: u + 1e-3), "supports"),
+    "a body elsewhere": (lambda: changed_body("upper", "displacement", lambda u: u + np.array([0.0, 1e-3])), "means"),
+    "no number": (lambda: changed_body("upper", "displacement", lambda u: u * np.nan), "numbers"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_named(fault: str) -> None:
+    make, name = FAULTS[fault]
+    solution = make()
+    assert name in check_assembly(solution).faults
+    assert judge([solution])[0] is Outcome.WRONG
+
+
+def test_energy_and_elasticity_are_compared() -> None:
+    solution = solved()
+    upper = solution.bodies["upper"]
+
+    def with_upper(**changes: object) -> AssemblyCheck:
+        return check_assembly(replace(solution, bodies={**solution.bodies, "upper": replace(upper, **changes)}))
+
+    assert "energy" in with_upper(energy=1.01 * upper.energy).faults
+    assert "negative_energy" in with_upper(energy=-upper.energy).faults
+    other = with_upper(scene=replace(upper.scene, material=bk.Material(3.0, 0.3)))
+    assert other.needs_warning == "reciprocity"
+
+
+def test_points_in_each_other_between_nodes_are_doubted() -> None:
+    """A disc of thirteen constant elements between plates: the mean distance of an element closes, not its middle."""
+    plate = bk.Body(
+        name="plate",
+        shape=bk.Rectangle(2.0, 1.0, (-1.0, -1.0)),
+        material=MATERIAL,
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        mesh=bk.MeshOptions(elements=30),
+    )
+    halves = (bk.Part("low", bk.Free(), ("arc-3", "arc-4")), bk.Part("top", bk.Traction(y=-1e-5), ("arc-1", "arc-2")))
+    disc = bk.Body(
+        name="disc", shape=bk.Disk(0.5, (0.0, 0.5)), material=MATERIAL, parts=halves, mesh=bk.MeshOptions(elements=13)
+    )
+    pair = bk.ContactPair(("disc.low", "plate.top"), multipliers_on="disc.low")
+    solution = bk.run(
+        bk.Assembly(
+            title="Disc",
+            bodies=(plate, disc),
+            contacts=(pair,),
+            law=bk.Tresca(1e-4),
+            discretisation=bk.ConstantCollocation(),
+        )
+    )
+    check = check_assembly(solution)
+    assert check.is_good
+    assert check.needs_warning == "hidden_overlap"
+    assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in solution.warnings)
+    assert judge([solution])[0] is Outcome.WARNED
+    assert judge([replace(solution, warnings=())])[:2] == (Outcome.WRONG, "hidden_overlap")
