@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.model.assembled.model import build_assembled_model
+from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.runs import load_increments
 from bemkit.runs.history import UnsolvableSceneError
+from bemkit.scene.load_history import with_scaled_loads
 from bemkit.solvers.base import Status
 from tests.runs.masonry import FRICTION, wall
 
@@ -132,3 +135,37 @@ def test_what_has_no_largest_factor_says_so() -> None:
 def _without_floor(assembly: bk.Assembly) -> tuple[bk.Body, ...]:
     held = bk.Part("floor", bk.Clamped(), ("bottom",))
     return tuple(replace(body, parts=(held,)) for body in assembly.bodies)
+
+
+def test_what_is_given_is_interpolated_between_two_steps() -> None:
+    """Loads, body forces, given displacements and gaps halfway are those of the step halfway."""
+    lower = bk.Body(
+        name="lower",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(10.0, 0.3),
+        parts=(bk.Part("base", bk.PrescribedDisplacement(0.1, bk.Expression("0.2 * x")), ("left",)),),
+        mesh=bk.MeshOptions(elements=16),
+    )
+    upper = replace(
+        lower,
+        name="upper",
+        parts=(bk.Part("load", bk.Pressure(bk.Expression("1 + x")), ("top",)),),
+        body_forces=(bk.Gravity(1.0, (0.0, -1.0)),),
+        placement=bk.Placement((0.0, 1.0)),
+    )
+    pair = bk.ContactPair(("upper.bottom", "lower.top"))
+    assembly = bk.Assembly(title="Two", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.5))
+    steps = [
+        replace(with_scaled_loads(assembly, factor), contacts=(replace(pair, gap=0.1 * factor),))
+        for factor in (1.0, 2.0, 3.0)
+    ]
+    prepared = prepare_assembly_steps(steps)
+    before = build_assembled_model(prepared[0])
+    halfway, after = (before.under(each) for each in prepared[1:])
+    problem = load_increments.between(before, after, 0.5, before.problem.sticking_state)
+    for name in ("load", "offset"):
+        expected = getattr(halfway.body, name)
+        assert np.abs(expected).max() > 0.0
+        np.testing.assert_allclose(getattr(problem.body, name), expected, atol=1e-13 * np.abs(expected).max())
+    np.testing.assert_allclose(problem.gap, halfway.problem.gap, rtol=1e-13)
+    np.testing.assert_array_equal(problem.slip_origin, before.problem.sticking_state.u_t)
