@@ -102,6 +102,14 @@ class Model:
             body = contact_body(elastic, prepared)
         return Model(prepared, elastic, body, _problem(prepared, body))
 
+    def with_law(self, scene: Scene) -> Model:
+        """Return the same body under the same loads; the scene differs in its solver and the numbers of its law alone.
+
+        Where this model's law has friction that of the scene has some, too, and nowhere else.
+        """
+        prepared = replace(self.prepared, scene=scene)
+        return Model(prepared, self.elastic, self.body, _problem(prepared, self.body))
+
     @property
     def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""

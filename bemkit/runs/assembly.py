@@ -85,7 +85,7 @@ def run_assembly_history(
     prepared = prepare_assembly(assemblies[0], meshes)
     if not prepared.n_contact:
         raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
-    steps = [prepared, *(prepared.under(_like(each, prepared.assembly)) for each in assemblies[1:])]
+    steps = [prepared, *(prepared.under(like_first(each, prepared.assembly)) for each in assemblies[1:])]
     plan = plan_assembly(steps)
     check_memory(plan)
     clock = clock.closed(Stage.MESH)
@@ -100,19 +100,29 @@ def run_assembly_history(
                 model = model.under(step)
                 model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
                 clock = clock.closed(Stage.CONDENSE)
-            result = _solved(model, state, callback)
-            clock = clock.closed(Stage.SOLVE)
-            solutions.append(_solution(model, result, plan, clock))
+            solution, state = solved_assembly(model, plan, clock, state, callback)
+            solutions.append(solution)
             clock = StageClock.start()
-            state = result.state
-            if not result.is_converged:
+            if not solution.is_converged:
                 break
     return tuple(solutions)
 
 
-def _like(assembly: Assembly, first: Assembly) -> Assembly:
+def like_first(assembly: Assembly, first: Assembly) -> Assembly:
     """Return an assembly with the contacts that were found in the first one."""
     return assembly.with_contacts(first.contacts) if assembly.touching else assembly
+
+
+def solved_assembly(
+    model: AssembledModel,
+    plan: Plan,
+    clock: StageClock,
+    start: ContactState | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+) -> tuple[AssemblySolution, ContactState]:
+    """Solve a model; return the physical fields and the state that later steps start from."""
+    result = _solved(model, start, callback)
+    return _solution(model, result, plan, clock.closed(Stage.SOLVE)), result.state
 
 
 def _solved(
