@@ -12,6 +12,8 @@ from bemkit.studies.engine import StudyError
 from bemkit.studies.sweep.keys import Key
 
 MOST_ROWS = 100_000
+_DECIMAL = 12
+"""Characters of a number that somebody has written rather than computed."""
 
 
 def read_variation(text: str) -> tuple[str, tuple[float, ...]]:
@@ -35,8 +37,13 @@ def read_variation(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def spaced(first: float, last: float, count: int) -> tuple[float, ...]:
-    """Return numbers at equal distances, rounded to what they are meant to be: 0.3 and no 0.30000000000000004."""
-    return tuple(float(f"{value:.15g}") for value in np.linspace(first, last, count).tolist())
+    """Return numbers at equal distances, without the last digit of decimal ones: 0.3 and no 0.30000000000000004."""
+    return tuple(_without_noise(value) for value in np.linspace(first, last, count).tolist())
+
+
+def _without_noise(value: float) -> float:
+    rounded = float(f"{value:.14g}")
+    return rounded if len(repr(rounded)) <= _DECIMAL else value
 
 
 def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list[tuple[float, ...]]]:

@@ -7,7 +7,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
-from typing import Any, get_type_hints
+from functools import cache
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 
@@ -161,9 +162,14 @@ def _inside(node: Any, declared: Any, step: Step, path: str) -> tuple[Any, Any]:
     if is_dataclass(node):
         names = [entry.name for entry in fields(node) if entry.init and entry.name != "name"]
         _known(step, names, path)
-        return getattr(node, step), get_type_hints(type(node))[step]
+        return getattr(node, step), _declared_types(cast(type, type(node)))[step]
     what = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
     raise StudyError(f"{path}.{step}: unknown key: {path} is {what}")
+
+
+@cache
+def _declared_types(of: type) -> dict[str, Any]:
+    return get_type_hints(of)
 
 
 def _known(name: str, names: list[str], path: str) -> str:

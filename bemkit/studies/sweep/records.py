@@ -98,10 +98,7 @@ RESULTS = tuple(entry.name for entry in fields(SweepRow) if entry.name != "value
 """The names of all results of a row."""
 
 
-def row_of(
-    values: tuple[float, ...],
-    found: Attempt[Solution] | Attempt[AssemblySolution] | Attempt[Solution | AssemblySolution],
-) -> SweepRow:
+def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution]) -> SweepRow:
     """Return the row of a scene that was solved, or was not."""
     solution = found.solution
     if solution is None:

@@ -158,8 +158,7 @@ def _solved_row(
 
 
 def _refused_row(values: Values, message: str) -> SweepRow:
-    nothing: Attempt[Solution] = Attempt(None, message, 0.0)
-    return row_of(values, nothing)
+    return row_of(values, Attempt(None, message, 0.0))
 
 
 def _label(keys: Sequence[Key], values: Values) -> str:
