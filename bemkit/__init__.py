@@ -120,6 +120,8 @@ if TYPE_CHECKING:
     from bemkit.solvers.base import solve as solve
     from bemkit.solvers.fixed_point import FixedPoint as FixedPoint
     from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
+    from bemkit.studies.sweep.sweep import sweep as sweep
+    from bemkit.studies.sweep.table import Sweep as Sweep
     from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
@@ -173,6 +175,8 @@ _HOME = {
     "solvers.base": ("ContactSolver", "Status", "solve"),
     "solvers.fixed_point": ("FixedPoint",),
     "solvers.ssn": ("SemismoothNewton",),
+    "studies.sweep.sweep": ("sweep",),
+    "studies.sweep.table": ("Sweep",),
     "testing.lemke": ("LemkePivoting",),
 }
 _MODULE_OF = {name: f"bemkit.{module}" for module, names in _HOME.items() for name in names}

@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study | stability``.
+"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -10,6 +10,7 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
-_STUDIES = ("stability", "study")
+_STUDIES = {"stability": "study", "study": "study", "sweep": "sweep"}
+"""Commands that are loaded only when they are asked for, and their modules."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -83,9 +85,7 @@ class _Commands(click.Group):
         """Return the command of a name."""
         if cmd_name not in _STUDIES:
             return super().get_command(ctx, cmd_name)
-        from bemkit.cli import study
-
-        command: click.Command = getattr(study, cmd_name)
+        command: click.Command = getattr(import_module(f"bemkit.cli.{_STUDIES[cmd_name]}"), cmd_name)
         return command
 
 

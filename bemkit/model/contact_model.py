@@ -102,6 +102,15 @@ class Model:
             body = contact_body(elastic, prepared)
         return Model(prepared, elastic, body, _problem(prepared, body))
 
+    def with_law(self, scene: Scene) -> Model:
+        """Return the same body under the same loads; the scene differs in its solver and the numbers of its law alone.
+
+        Where this model's law has friction that of the scene has some, too, and nowhere else.
+        """
+        prepared = replace(self.prepared, scene=scene)
+        _ = self.problem.sticking_state  # common to all laws
+        return Model(prepared, self.elastic, self.body, self.problem.with_law(_law(prepared, self.body)))
+
     @property
     def work(self) -> OperationCounts:
         """What it took to come here, from the operators on."""
@@ -203,6 +212,10 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody 
 
 
 def _problem(prepared: Prepared, body: CondensedBody | UntouchedBody) -> ContactProblem:
-    contact, units = prepared.contact, prepared.units
+    return ContactProblem(body, prepared.contact.gap / prepared.units.displacement, _law(prepared, body))
+
+
+def _law(prepared: Prepared, body: CondensedBody | UntouchedBody) -> FrictionLaw:
+    contact = prepared.contact
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
-    return ContactProblem(body, contact.gap / units.displacement, law.scaled(units.stress))
+    return law.scaled(prepared.units.stress)

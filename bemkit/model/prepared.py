@@ -260,7 +260,7 @@ class Prepared:
         ValueError
             If the scene has another body, other parts, or other kinds of conditions.
         """
-        _check_same_body(self.scene, scene)
+        check_same_body(self.scene, scene)
         check_symmetry(scene, self.mesh)
         return _prepared(scene, self.mesh, self.units, self.space)
 
@@ -320,8 +320,14 @@ def _check_position(mesh: BoundaryMesh) -> None:
         )
 
 
-def _check_same_body(scene: Scene, other: Scene) -> None:
-    """Refuse another scene whose matrices would be others."""
+def check_same_body(scene: Scene, other: Scene) -> None:
+    """Refuse another scene whose matrices would be others on the same mesh.
+
+    Raises
+    ------
+    InputError
+        Naming the first difference.
+    """
     for name in ("shape", "material", "symmetry", "discretisation"):
         if getattr(scene, name) != getattr(other, name):
             raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")

@@ -15,7 +15,7 @@ _MAX_LABEL = 1_000_000
 
 
 class Record(Protocol):
-    """A frozen dataclass whose fields are texts, floats and whole numbers."""
+    """A frozen dataclass whose fields are texts, floats, whole numbers, and as many floats in each record."""
 
     @property
     def key(self) -> Hashable:
@@ -83,7 +83,8 @@ class RecordFile(Generic[R]):
         with self.format.opened(path) as reader:
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
-            texts, floats, integers = ([name for name in types if types[name] is kind] for kind in (str, float, int))
+            texts, integers = ([name for name in types if types[name] is kind] for kind in (str, int))
+            floats = [name for name in types if types[name] not in (str, int)]
             rows = rows_of(reader.table("rows", texts=texts, floats=floats, integers=integers))
             records = tuple(self.record(**row) for row in rows)
         return labels, records

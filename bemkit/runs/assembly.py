@@ -121,7 +121,7 @@ def run_assembly_history(
         with assembly_time() as assembly:
             model = build_assembled_model(steps[0])
         clock = clock.closed_build(assembly)
-        result = with_energies_checked(model, _first_solved(model, callback))
+        result = with_energies_checked(model, _first_solved(model, callback=callback))
         clock = clock.closed(Stage.SOLVE)
         solutions = [_solution(model, result, plan, clock)]
         for step in steps[1:]:
@@ -141,9 +141,19 @@ def run_assembly_history(
     return tuple(solutions)
 
 
-def _first_solved(model: AssembledModel, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
+def solved_assembly(
+    model: AssembledModel, plan: Plan, clock: StageClock, start: ContactState | None = None
+) -> tuple[AssemblySolution, ContactState]:
+    """Solve a model under a single load; return the physical fields, and the state that others may start from."""
+    result = with_energies_checked(model, _first_solved(model, start))
+    return _solution(model, result, plan, clock.closed(Stage.SOLVE)), result.state
+
+
+def _first_solved(
+    model: AssembledModel, start: ContactState | None = None, callback: Callable[[StepRecord], None] | None = None
+) -> ContactSolution:
     solver = model.prepared.assembly.solver
-    result = solve(model.problem, solver, throw=False, callback=callback)
+    result = solve(model.problem, solver, start=start, throw=False, callback=callback)
     if not result.history:
         load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
         remedy = "hold what moves by a support, raise the friction, or change the loads"

@@ -70,7 +70,10 @@ def run_history(
         raise InputError("scenes is empty: give at least one scene")
     prepared, plan, clock = prepared_and_planned(steps, mesh)
     with blas_threads_for(plan.sizes.n_displacements):
-        return tuple(_solve_in_turn(prepared, plan, start, callback, clock))
+        if start is not None and not steps[0].contact_parts:
+            raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+        model, clock = built(prepared[0], clock)
+        return solve_in_turn(model, prepared, plan, start=start, callback=callback, clock=clock)
 
 
 def prepared_and_planned(
@@ -94,20 +97,24 @@ def run_on_mesh(
     callback: Callable[[StepRecord], None] | None = None,
 ) -> Solution:
     """Solve a scene on one mesh; of a load history return the last step with the solves, records and times of all."""
-    steps = run_history([scene], mesh=mesh, start=start, callback=callback)
+    return last_step(scene, run_history([scene], mesh=mesh, start=start, callback=callback))
+
+
+def last_step(scene: Scene, steps: Sequence[Solution]) -> Solution:
+    """Return the last load step of a scene with the solves, records and times of all."""
     return steps[0] if len(scene.load_factors) == 1 else replace(as_one(steps, len(scene.load_factors)), scene=scene)
 
 
-def _solve_in_turn(
+def solve_in_turn(
+    model: Model,
     steps: Sequence[Prepared],
     plan: Plan,
-    start: Solution | None,
-    callback: Callable[[StepRecord], None] | None,
+    *,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
     clock: StageClock,
-) -> list[Solution]:
-    if start is not None and not steps[0].scene.contact_parts:
-        raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
-    model, clock = built(steps[0], clock)
+) -> tuple[Solution, ...]:
+    """Solve load steps with the model of the first one, up to one that does not converge; see `run_history`."""
     state = None if start is None else state_on(model, start)
     solutions: list[Solution] = []
     for step in steps:
@@ -122,7 +129,7 @@ def _solve_in_turn(
         state = result.state
         if not result.is_converged:
             break
-    return solutions
+    return tuple(solutions)
 
 
 def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:

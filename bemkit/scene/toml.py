@@ -139,9 +139,23 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene | Assembly:
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
         raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
     try:
+        return scene_from_table(table)
+    except SceneError as error:
+        raise SceneError(f"{name}: {error}") from error
+
+
+def scene_from_table(table: dict[str, Any]) -> Scene | Assembly:
+    """Turn the table that a TOML text holds into a scene; see `scene_from_toml`.
+
+    Raises
+    ------
+    SceneError
+        If it is no valid scene; the message begins with the key.
+    """
+    try:
         return structure(table, Assembly) if "bodies" in table else structure(table, Scene)
     except StructureError as error:
-        raise SceneError(f"{name}: {printable(str(error))}") from error
+        raise SceneError(printable(str(error))) from error
 
 
 def scene_to_toml(scene: Scene | Assembly) -> str:

@@ -7,14 +7,16 @@ import pickle
 import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import groupby
 from multiprocessing import get_context, parent_process
 from threading import Thread
-from typing import Generic, NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
-from bemkit.errors import BemkitError, InputError
+from bemkit.errors import BemkitError, InputError, printable
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.record_file import R
 from bemkit.results.solution import Solution
 
@@ -22,14 +24,25 @@ REFUSED = "refused"
 """Status of a scene that is refused by a named error before any step."""
 
 
+MOST_TOGETHER = 16
+"""Tasks of a group that are computed elsewhere before the first of their records comes back."""
+
+
+CONNECT_SECONDS = 10.0
+"""How long a scheduler may take to answer."""
+
+
 class StudyError(InputError):
     """A study that cannot begin or cannot go on."""
 
 
-class Attempt(NamedTuple):
+AnySolution = TypeVar("AnySolution", bound=Solution | AssemblySolution)
+
+
+class Attempt(NamedTuple, Generic[AnySolution]):
     """A solution, or why there is none."""
 
-    solution: Solution | None
+    solution: AnySolution | None
     message: str
     seconds: float
 
@@ -44,7 +57,7 @@ class Attempt(NamedTuple):
         return self.solution is not None and self.solution.is_converged
 
 
-def attempt(solve: Callable[[], Solution]) -> Attempt:
+def attempt(solve: Callable[[], AnySolution]) -> Attempt[AnySolution]:
     """Solve a scene; errors that bemkit names are answers too."""
     begin = time.perf_counter()
     try:
@@ -59,11 +72,15 @@ class Task(Generic[R]):
     """One record to compute: its key, a label for the progress bar, and what computes it.
 
     To be sent to another process that must be picklable.
+
+    Tasks of one group share something costly, which the objects they have in common keep: neighbours among them go to
+    another process together.
     """
 
     key: Hashable
     label: str
     compute: Callable[[], R]
+    group: Hashable = None
 
 
 def compute(
@@ -72,6 +89,7 @@ def compute(
     *,
     finished: Mapping[Hashable, R] | None = None,
     begins: Callable[[Task[R]], None] | None = None,
+    n_workers: int = 1,
 ) -> Iterator[R]:
     """Compute the records of some tasks.
 
@@ -84,6 +102,8 @@ def compute(
         Of an earlier study; they are handed on instead of computed again.
     begins : callable, optional
         Called with each task before it is computed here.
+    n_workers : int
+        Of the executor: groups of tasks are split so that all have work.
 
     Yields
     ------
@@ -98,7 +118,7 @@ def compute(
     finished = {} if finished is None else finished
     if executor is not None:
         yield from (finished[task.key] for task in tasks if task.key in finished)
-        yield from _computed_elsewhere([task for task in tasks if task.key not in finished], executor)
+        yield from _computed_elsewhere([task for task in tasks if task.key not in finished], executor, n_workers)
         return
     for task in tasks:
         if task.key not in finished and begins is not None:
@@ -112,37 +132,71 @@ def compute_with_progress(
     *,
     is_live: bool,
     processes: int = 1,
+    cluster: str | None = None,
     finished: Mapping[Hashable, R] | None = None,
 ) -> Iterator[R]:
     """Compute records as `compute` does, here or in several processes, while a bar on standard error shows how far.
 
-    The bar bears a name, and is shown only if it is live.
+    The bar bears a name, and is shown only if it is live. With the address of a `distributed` scheduler, such as
+    ``tcp://10.0.0.1:8786``, the workers of its cluster take the place of processes.
+
+    Raises
+    ------
+    StudyError
+        As `compute` does, also if the cluster cannot be reached.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with ExitStack() as stack:
-        executor = None
-        if processes > 1:
+        executor: Executor | None = None
+        if cluster is not None:
+            executor, processes = stack.enter_context(_cluster(cluster))
+        elif processes > 1:
             # spawned processes do not inherit threads that hold locks
             executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
             stack.callback(executor.shutdown, cancel_futures=True)  # what has not begun is left out
         bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=not is_live)
         row = stack.enter_context(bar).add_task(name, total=len(tasks))
         for record in compute(
-            tasks, executor, finished=finished, begins=lambda task: bar.update(row, description=task.label)
+            tasks,
+            executor,
+            finished=finished,
+            begins=lambda task: bar.update(row, description=task.label),
+            n_workers=processes,
         ):
             bar.advance(row)
             yield record
 
 
-def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterator[R]:
-    futures = []
+@contextmanager
+def _cluster(address: str) -> Iterator[tuple[Executor, int]]:
+    """Give an executor of a cluster, and the number of its threads."""
     try:
-        futures = [executor.submit(task.compute) for task in tasks]
+        from distributed import Client
+    except ImportError:
+        raise StudyError('a cluster needs distributed: pip install "bemkit[cluster]"') from None
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS)
+    except (OSError, ValueError) as error:
+        reason = printable(str(error))[:200] or type(error).__name__
+        raise StudyError(
+            f"cluster {address}: no scheduler answers ({reason}): start one with 'dask scheduler'"
+        ) from error
+    with client:
+        n_workers = sum(client.nthreads().values())
+        if not n_workers:
+            raise StudyError(f"cluster {address}: it has no workers: start some with 'dask worker {address}'")
+        yield client.get_executor(), n_workers
+
+
+def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers: int) -> Iterator[R]:
+    futures: list[Future[list[R]]] = []
+    try:
+        futures = [executor.submit(_all_computed, bundle) for bundle in _bundles(tasks, n_workers)]
         for future in as_completed(futures):
-            yield future.result()
+            yield from future.result()
     except BrokenExecutor as error:
         reason = str(error) or type(error).__name__
         raise StudyError(
@@ -157,6 +211,19 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor) -> Iterato
     finally:
         for future in futures:
             future.cancel()
+
+
+def _bundles(tasks: Sequence[Task[R]], n_workers: int) -> Iterator[list[Callable[[], R]]]:
+    """Yield what goes to another process at a time: a task, or neighbours of one group."""
+    most = min(MOST_TOGETHER, -(-len(tasks) // n_workers))
+    for group, members in groupby(tasks, key=lambda task: task.group):
+        size = 1 if group is None else most
+        left = [task.compute for task in members]
+        yield from (left[first : first + size] for first in range(0, len(left), size))
+
+
+def _all_computed(bundle: Sequence[Callable[[], R]]) -> list[R]:
+    return [compute() for compute in bundle]
 
 
 def _prepare_process() -> None:

@@ -95,7 +95,7 @@ def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> Stabil
     )
 
 
-def _attempt(scene: Scene, case: Case) -> Attempt:
+def _attempt(scene: Scene, case: Case) -> Attempt[Solution]:
     # the mesh is made inside: an error there is an answer too
     return attempt(lambda: run(scene, mesh=case.mesh(scene)))
 
@@ -167,7 +167,12 @@ def _reference(axis: Axis, baseline: Solution) -> Solution | None:
 
 
 def _judge(
-    case: Case, reference: Solution | None, first: Attempt, second: Attempt, drift: float, twin: float
+    case: Case,
+    reference: Solution | None,
+    first: Attempt[Solution],
+    second: Attempt[Solution],
+    drift: float,
+    twin: float,
 ) -> tuple[Verdict, str]:
     """Return the verdict and what speaks against the record, if anything does."""
     if first.status != second.status:

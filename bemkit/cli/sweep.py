@@ -1,0 +1,92 @@
+"""The command ``bemkit sweep``."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+
+import click
+
+from bemkit.atomic_files import reserved
+from bemkit.errors import concerning
+from bemkit.results.outputs import JSON_START, Outputs, TextFile, csv_text
+from bemkit.scene.toml import load_scene, with_overrides
+from bemkit.studies.engine import StudyError, compute_with_progress
+from bemkit.studies.sweep.grid import read_variation
+from bemkit.studies.sweep.records import FILE, RESULTS, UNITS
+from bemkit.studies.sweep.report import draw_all, figure_name, print_sweep
+from bemkit.studies.sweep.sweep import run_sweep
+from bemkit.studies.sweep.table import Sweep
+
+NOT_CONVERGED = 1
+DEFAULT_SHOWN = "force_tangential"
+
+
+@click.command()
+@click.argument("scene")
+@click.option("--vary", multiple=True, required=True, metavar="KEY=...", help="A:B:N or A,B,...; several make a grid.")
+@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("--csv", "csv_file", metavar="FILE", help="Write all rows as CSV; - is standard output.")
+@click.option("--json", "json_file", metavar="FILE", help="Write all rows as JSON; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--over", metavar="KEY", help="Abscissa of the figures (the first key).")
+@click.option("--show", multiple=True, metavar="WORD", help=f"What to draw ({DEFAULT_SHOWN}); may be given repeatedly.")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Refine each row until the estimated error is below E.")
+@click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
+@click.option("--cold", is_flag=True, help="Start each solve afresh, not at the solution of the row before.")
+@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Spread the rows over processes (1).")
+@click.option("--on", "cluster", metavar="ADDRESS", help="Spread them over a cluster, such as tcp://10.0.0.1:8786.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
+def sweep(
+    scene: str,
+    vary: tuple[str, ...],
+    output: str | None,
+    csv_file: str | None,
+    json_file: str | None,
+    folder: str | None,
+    over: str | None,
+    show: tuple[str, ...],
+    elements: int | None,
+    accuracy: float | None,
+    discretisation: str | None,
+    cold: bool,
+    jobs: int | None,
+    cluster: str | None,
+    quiet: bool,
+) -> int:
+    """Solve SCENE under several values of its numbers, such as --vary law.friction_coefficient=0:1:11.
+
+    The exit code is 1 if a row has no certified result, or one less accurate than asked for.
+    """
+    if jobs is not None and cluster is not None:
+        raise click.UsageError("--jobs and --on both say where to compute: give one of them")
+    if folder is None and (over is not None or show):
+        raise click.UsageError("--over and --show go with figures: add --plot DIR")
+    pairs = [read_variation(text) for text in vary]
+    values = dict(pairs)
+    repeated = [key for number, (key, _) in enumerate(pairs) if key in [name for name, _ in pairs[:number]]]
+    if repeated:
+        raise StudyError(f"key {repeated[0]!r} is given twice: give all its values at once")
+    abscissa, shown = over or pairs[0][0], show or (DEFAULT_SHOWN,)
+    names = [*values, *UNITS]
+    for name in (abscissa, *shown):
+        if name not in names:
+            raise click.UsageError(f"{name!r} is no column of numbers: give one of {', '.join(names)}")
+    texts = (
+        TextFile(csv_file, "CSV file of a sweep over these keys", csv_text([*values, *RESULTS], ()), Sweep.to_csv),
+        TextFile(json_file, "JSON file", JSON_START, Sweep.to_json),
+    )
+    outputs = Outputs(texts, folder, partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0]))
+    targets = outputs.check(FILE.check(output))
+    own = {path for path in FILE.check(output)}  # reserved by the sweep itself
+    click.get_current_context().with_resource(reserved([path for path in targets if path not in own]))
+    chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation)
+    is_live = not quiet and sys.stderr.isatty()
+    computed = partial(compute_with_progress, name="sweep", is_live=is_live, processes=jobs or 1, cluster=cluster)
+    with concerning(scene):
+        found = run_sweep(chosen, values, computed, file=output, cold=cold)
+    outputs.write(found)
+    if not quiet and not outputs.uses_stdout:
+        print_sweep(found)
+    return 0 if all(row.status == "converged" for row in found.rows) else NOT_CONVERGED

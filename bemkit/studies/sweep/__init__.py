@@ -1,0 +1,1 @@
+"""Sweeps: one scene under many values of some of its numbers."""

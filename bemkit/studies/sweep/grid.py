@@ -1,0 +1,84 @@
+"""Which values of which keys a sweep takes: words of the command line, and all combinations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from bemkit.studies.engine import StudyError
+from bemkit.studies.sweep.keys import Key
+
+MOST_ROWS = 100_000
+_DECIMAL = 12
+"""Characters of a number that somebody has written rather than computed."""
+
+
+def read_variation(text: str) -> tuple[str, tuple[float, ...]]:
+    """Return key and values of ``KEY=FIRST:LAST:COUNT`` or ``KEY=VALUE,VALUE,...``.
+
+    Raises
+    ------
+    StudyError
+        If the text has another form.
+    """
+    key, separator, values = (piece.strip() for piece in text.partition("="))
+    if not separator or not key or not values:
+        raise StudyError(f"vary is {text!r}: give KEY=FIRST:LAST:COUNT or KEY=VALUE,VALUE,...")
+    pieces = values.split(":")
+    if len(pieces) == 1:
+        return key, tuple(_number(value, text) for value in values.split(","))
+    if len(pieces) != 3 or not pieces[2].strip().isdecimal() or int(pieces[2]) < 1:
+        raise StudyError(f"vary is {text!r}: give a range as FIRST:LAST:COUNT, such as 0:1:11 for 0, 0.1, ..., 1")
+    count = min(int(pieces[2]), MOST_ROWS + 1)
+    return key, spaced(_number(pieces[0], text), _number(pieces[1], text), count)
+
+
+def spaced(first: float, last: float, count: int) -> tuple[float, ...]:
+    """Return numbers at equal distances, without the last digit of decimal ones: 0.3 and no 0.30000000000000004."""
+    return tuple(_without_noise(value) for value in np.linspace(first, last, count).tolist())
+
+
+def _without_noise(value: float) -> float:
+    rounded = float(f"{value:.14g}")
+    return rounded if len(repr(rounded)) <= _DECIMAL else value
+
+
+def all_rows(vary: Mapping[str, Sequence[float]]) -> tuple[tuple[Key, ...], list[tuple[float, ...]]]:
+    """Return the keys, and every combination of their values; that of the first key changes last.
+
+    Raises
+    ------
+    StudyError
+        If there is no key or no value, a value is not finite or given twice, or there are too many rows.
+    """
+    if not vary:
+        raise StudyError("vary is empty: give at least one key and its values")
+    columns: list[list[float]] = []
+    for name, given in vary.items():
+        values = [_finite(value, name) for value in given]
+        if not values:
+            raise StudyError(f"{name}: there are no values: give at least one")
+        repeated = next((value for k, value in enumerate(values) if value in values[:k]), None)
+        if repeated is not None:
+            raise StudyError(f"{name}: {repeated:g} is given twice: leave one out")
+        columns.append(values)
+    n_rows = math.prod(map(len, columns))
+    if n_rows > MOST_ROWS:
+        raise StudyError(f"there are {n_rows} rows: give fewer values, {MOST_ROWS} rows at most")
+    return tuple(Key(name) for name in vary), list(product(*columns))
+
+
+def _finite(value: object, name: str) -> float:
+    if isinstance(value, bool | str) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
+        raise StudyError(f"{name}: {value!r} is no finite number: give numbers")
+    return float(value)
+
+
+def _number(text: str, whole: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise StudyError(f"vary is {whole!r}: {text.strip()!r} is no number: give numbers such as 0.5") from None

@@ -1,0 +1,145 @@
+"""Rows of a sweep, and their file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+
+from bemkit.hdf5 import FileFormat
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.record_file import RecordFile
+from bemkit.results.solution import Solution
+from bemkit.studies.engine import Attempt
+
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "force_normal": "N/m",
+        "force_tangential": "N/m",
+        "energy": "J/m",
+        "contact_length": "m",
+        "peak_pressure": "Pa",
+        "largest_slip": "m",
+        "estimated_error": "",
+        "n_elements": "",
+        "n_contact": "",
+        "linear_solves": "",
+        "seconds": "s",
+    }
+)
+"""The numerical results of a row, in the order in which they are shown, with their units."""
+
+
+@dataclass(frozen=True)
+class SweepRow:
+    """One scene of a sweep: the varied numbers, and what came out.
+
+    Parameters
+    ----------
+    values : tuple of float
+        In the order of the keys.
+    status : str
+        Of the solver in small letters, or ``refused`` where the scene is not well posed.
+    certified : int
+        1 if the result is certified; the numbers of all other rows are nan.
+    force_normal, force_tangential : float [N/m]
+        Sums over all contacts.
+    energy : float [J/m]
+    contact_length : float [m]
+        Of all contacts.
+    peak_pressure : float [Pa]
+    largest_slip : float [m]
+    estimated_error : float
+        In the energy norm, relative; nan where there is no estimate.
+    n_elements, n_contact, linear_solves : int
+    seconds : float [s]
+        Of the row alone; the first row of a body bears its assembly.
+    transitions : str
+        Where the contact status changes, such as ``floor: separated-slip at 0.25 (0.25, 0)``: arc length along the
+        part, x and y [m]; semicolons between them.
+    message : str
+        Why there is no result, or why an accuracy was not reached.
+    """
+
+    values: tuple[float, ...]
+    status: str
+    certified: int
+    force_normal: float
+    force_tangential: float
+    energy: float
+    contact_length: float
+    peak_pressure: float
+    largest_slip: float
+    estimated_error: float
+    n_elements: int
+    n_contact: int
+    linear_solves: int
+    seconds: float
+    transitions: str
+    message: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", tuple(self.values))
+
+    @property
+    def key(self) -> tuple[float, ...]:
+        """What tells the rows of one sweep apart."""
+        return self.values
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether there is a result, be it as accurate as was asked for or not."""
+        return bool(self.certified)
+
+
+_MEASURED = tuple(UNITS)[:7]
+RESULTS = tuple(entry.name for entry in fields(SweepRow) if entry.name != "values")
+"""The names of all results of a row."""
+
+
+def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution]) -> SweepRow:
+    """Return the row of a scene that was solved, or was not."""
+    solution = found.solution
+    if solution is None:
+        numbers, n_elements, n_contact, linear_solves = dict.fromkeys(_MEASURED, math.nan), 0, 0, 0
+    else:
+        numbers = _numbers(solution) if solution.is_certified else dict.fromkeys(_MEASURED, math.nan)
+        n_elements = solution.mesh.n_elements if isinstance(solution, Solution) else solution.n_elements
+        n_contact, linear_solves = solution.contact.n_contact, solution.linear_solves
+    return SweepRow(
+        values=values,
+        status=found.status,
+        certified=int(solution is not None and solution.is_certified),
+        n_elements=n_elements,
+        n_contact=n_contact,
+        linear_solves=linear_solves,
+        seconds=found.seconds,
+        transitions=_places(solution) if solution is not None and solution.is_certified else "",
+        message="" if found.is_converged else found.message,
+        **numbers,
+    )
+
+
+def _numbers(solution: Solution | AssemblySolution) -> dict[str, float]:
+    contacts, error = solution.contacts, solution.estimated_error
+    return {
+        "force_normal": solution.force_normal,
+        "force_tangential": solution.force_tangential,
+        "energy": solution.energy,
+        "contact_length": sum(contact.contact_length for contact in contacts),
+        "peak_pressure": max((contact.peak_pressure for contact in contacts), default=0.0),
+        "largest_slip": max((contact.largest_slip for contact in contacts), default=0.0),
+        "estimated_error": math.nan if error is None else error,
+    }
+
+
+def _places(solution: Solution | AssemblySolution) -> str:
+    return "; ".join(
+        f"{place.part}: {place.from_status}-{place.to_status} at {place.s:.9g} ({place.x:.9g}, {place.y:.9g})"
+        for place in solution.transitions
+    )
+
+
+FORMAT = FileFormat("bemkit-sweep", 1, "bemkit sweep file", "bemkit sweep -o")
+FILE = RecordFile(FORMAT, SweepRow, ("scene", "keys", "starts"))

@@ -1,0 +1,124 @@
+"""What ``bemkit sweep`` prints, a line for each row, and draws: any column over any other."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
+from bemkit.results.outputs import plain_table, stdout_console
+from bemkit.studies.sweep.records import UNITS
+from bemkit.studies.sweep.table import Sweep
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_SHOWN = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure")
+_WIDE = ("largest_slip", "estimated_error", "n_elements", "linear_solves", "seconds")
+WIDE = 110
+"""Width of a terminal from which on all results are shown; the files hold them in any case."""
+MOST_PRINTED = 60
+SHORT = {
+    "force_normal": "normal force",
+    "force_tangential": "friction",
+    "contact_length": "length",
+    "peak_pressure": "pressure",
+    "largest_slip": "slip",
+    "estimated_error": "error",
+    "n_elements": "elements",
+    "linear_solves": "solves",
+}
+_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+_LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
+
+
+def print_sweep(sweep: Sweep, console: Console | None = None) -> None:
+    """Print the solved rows as a table, and below it the failed ones, each with its reason."""
+    # into a file or a pipe there is room
+    console = stdout_console(console, width=None if sys.stdout.isatty() else 200)
+    names = [*_SHOWN, *(_WIDE if console.width >= WIDE else ())]
+    console.print(Text(sweep.scene.title, style="bold"))
+    table = plain_table(right=[*_short_keys(sweep.keys), *(SHORT.get(name, name) for name in names)], gap=2)
+    for row in sweep.solved[:MOST_PRINTED]:
+        table.add_row(*(_short(sweep.entry(row, name)) for name in (*sweep.keys, *names)))
+    console.print(table)
+    if len(sweep.solved) > MOST_PRINTED:
+        more = len(sweep.solved) - MOST_PRINTED
+        console.print(Text(f"{more} rows more: write them to a file (-o, --csv, --json)", style="dim"))
+    for row in sweep.failed:
+        values = ", ".join(f"{key} = {value:g}" for key, value in zip(sweep.keys, row.values, strict=True))
+        console.print(Text(f"{values}: {row.status.replace('_', ' ')}: {row.message}", style="red"))
+    inaccurate = [row for row in sweep.solved if row.message]
+    if inaccurate:
+        console.print(Text(f"{len(inaccurate)} rows are less accurate than asked: see their messages", style="yellow"))
+
+
+def _short_keys(keys: Sequence[str]) -> list[str]:
+    """Return the last names of the keys, where these tell them apart."""
+    last = [key.rsplit(".", 1)[-1] for key in keys]
+    return [short if last.count(short) == 1 else key for short, key in zip(last, keys, strict=True)]
+
+
+def _short(value: float) -> str:
+    return "-" if not np.isfinite(value) else f"{value:.6g}"
+
+
+def figure_name(over: str, show: str) -> str:
+    """Return the name of a figure's file without its ending."""
+    return re.sub(r"[^\w.\-]+", "-", f"{show}-over-{over}").strip("-")
+
+
+def draw_sweep(sweep: Sweep, over: str, show: str, axes: Axes | None = None) -> Figure:
+    """Draw a column of the solved rows over another one, a line for each combination of the other keys.
+
+    Parameters
+    ----------
+    sweep : Sweep
+    over, show : str
+        Keys, or names of numerical results.
+    axes : matplotlib Axes, optional
+        Where to draw; by default in a new figure.
+
+    Raises
+    ------
+    InputError
+        If there is no such column of numbers.
+    """
+    x, y = sweep.column(over), sweep.column(show)
+    if axes is None:
+        axes = new_figure(7.0, 4.6).subplots()
+    others = [key for key in sweep.keys if key not in (over, show)]
+    series: dict[tuple[float, ...], list[int]] = {}
+    for number, row in enumerate(sweep.solved):
+        series.setdefault(tuple(sweep.entry(row, key) for key in others), []).append(number)
+    for number, (values, rows) in enumerate(series.items()):
+        label = ", ".join(f"{key} = {value:g}" for key, value in zip(others, values, strict=True))
+        order = np.array(rows)[np.argsort(x[rows], kind="stable")] if over in sweep.keys else np.array(rows)
+        style: dict[str, Any] = {"color": _COLOURS[number % 6], "linestyle": _LINES[number // 6 % 4]}
+        axes.plot(x[order], y[order], marker="o", markersize=3.5, linewidth=1.2, label=label or None, **style)
+    axes.set_xlabel(_named(over), parse_math=False)
+    axes.set_ylabel(_named(show), parse_math=False)
+    failed = f" ({len(sweep.failed)} of {len(sweep.rows)} rows failed)" if sweep.failed else ""
+    axes.set_title(sweep.scene.title + failed, parse_math=False, fontsize=11)
+    show_grid(axes)
+    if others and len(series) <= 24:
+        axes.legend(frameon=False, fontsize="small")
+    figure: Any = axes.get_figure()
+    return figure  # type: ignore[no-any-return]
+
+
+def draw_all(over: str, shown: Sequence[str], sweep: Sweep) -> dict[str, Figure]:
+    """Return a figure for each column that is shown, by the names of their files."""
+    return {figure_name(over, show): draw_sweep(sweep, over, show) for show in shown}
+
+
+def _named(column: str) -> str:
+    unit = UNITS.get(column, "")
+    return f"{column.replace('_', ' ') if column in UNITS else column}{f' [{unit}]' if unit else ''}"

@@ -1,0 +1,165 @@
+"""Solve a scene under all combinations of some of its numbers; bodies that stay the same are factored once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from functools import partial
+from os import cpu_count
+from pathlib import Path
+from typing import Protocol
+
+from bemkit.atomic_files import reserved
+from bemkit.errors import BemkitError
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.runs.run import run
+from bemkit.runs.shared_body import SharedBody
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
+from bemkit.studies.sweep.grid import all_rows
+from bemkit.studies.sweep.keys import Key, VariedScene
+from bemkit.studies.sweep.records import FILE, SweepRow, row_of
+from bemkit.studies.sweep.table import Sweep
+
+Values = tuple[float, ...]
+
+
+class Compute(Protocol):
+    """Computes the rows of tasks; see `bemkit.studies.engine.compute`."""
+
+    def __call__(self, tasks: Sequence[Task[SweepRow]], *, finished: Mapping[object, SweepRow]) -> Iterator[SweepRow]:
+        """Yield the rows as they are ready."""
+
+
+def sweep(
+    scene: Scene | Assembly,
+    vary: Mapping[str, Sequence[float]],
+    *,
+    file: str | Path | None = None,
+    executor: Executor | None = None,
+    cold: bool = False,
+) -> Sweep:
+    """Solve a scene under all combinations of some of its numbers, each as `bemkit.run` would.
+
+    Rows that differ in laws, loads and obstacles alone share their bodies, which are assembled and factored once.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+        Without Python functions: formulas are `Expression`.
+    vary : mapping of str to sequence of float
+        Places in scene files, such as ``"law.friction_coefficient"`` or ``"bodies.punch.placement.shift[0]"``, and the
+        values to take.
+    file : str or Path, optional
+        HDF5 file that holds each row as soon as it is there. Rows that are already in it are not computed again.
+    executor : Executor, optional
+        Such as a `ProcessPoolExecutor`, or that of a `distributed` client. Without one rows are solved in turn.
+    cold : bool
+        Start each solve with every node sticking, as `bemkit.run` does. By default a solve may start at the solution of
+        the row before, which takes fewer steps; it matters for the result only where a scene has several solutions.
+
+    Returns
+    -------
+    Sweep
+        Rows that cannot be solved stand in `Sweep.failed`, with a message each.
+
+    Raises
+    ------
+    StudyError
+        If a key leads to no number of the scene, there are no values, or no row at all is a valid scene.
+    ResultFileError, OutputFileError
+        If the file cannot be written, or holds another sweep.
+    """
+    n_workers = cpu_count() or 1
+    return run_sweep(scene, vary, partial(compute, executor=executor, n_workers=n_workers), file=file, cold=cold)
+
+
+def run_sweep(
+    scene: Scene | Assembly,
+    vary: Mapping[str, Sequence[float]],
+    compute: Compute,
+    *,
+    file: str | Path | None = None,
+    cold: bool = False,
+) -> Sweep:
+    """Solve a scene under all combinations of some of its numbers; see `sweep`."""
+    keys, grid = all_rows(vary)
+    varied = VariedScene(scene)
+    varied.check(keys)
+    names = tuple(key.text for key in keys)
+    labels = {"scene": varied.text, "keys": json.dumps(names), "starts": "cold" if cold else "near"}
+    with reserved(FILE.check(file)):
+        finished = FILE.finished(file, labels)
+        tasks = sweep_tasks(varied, keys, grid, finished=finished, cold=cold)
+        by_key = {row.key: row for row in FILE.keep(file, compute(tasks, finished=finished), finished, labels)}
+    return Sweep(scene, names, tuple(by_key[values] for values in grid))
+
+
+def sweep_tasks(
+    varied: VariedScene,
+    keys: Sequence[Key],
+    grid: Sequence[Values],
+    *,
+    finished: Collection[object] = (),
+    cold: bool = False,
+) -> tuple[Task[SweepRow], ...]:
+    """Return a task for each row, those that share their bodies one after the other.
+
+    Raises
+    ------
+    BemkitError
+        Of the first row, if every row is refused.
+    """
+    scenes: dict[Values, Scene | Assembly] = {}
+    refused: dict[Values, BemkitError] = {}
+    for values in grid:
+        try:
+            scenes[values] = varied.with_values(dict(zip(keys, values, strict=True)))
+        except BemkitError as error:
+            refused[values] = error.with_traceback(None)
+    if not scenes:
+        raise StudyError(f"no row is a valid scene: {refused[grid[0]]}") from refused[grid[0]]
+    groups: dict[Values, list[Values]] = {}
+    for values in scenes:
+        of_body = tuple(value for key, value in zip(keys, values, strict=True) if not key.keeps_bodies)
+        groups.setdefault(of_body, []).append(values)
+    has_one_load = all(key.is_of_law for key in keys if key.keeps_bodies)
+    tasks = []
+    for of_body, rows in groups.items():
+        body = _shared([scenes[values] for values in rows], has_one_load=has_one_load, cold=cold)
+        left = [values for values in rows if values not in finished]
+        for values in rows:
+            solve = partial(run, scenes[values]) if body is None else partial(body.run, scenes[values])
+            done = body.release if body is not None and left and values == left[-1] else None
+            tasks.append(Task(values, _label(keys, values), partial(_solved_row, values, solve, done), of_body))
+    tasks += [
+        Task(values, _label(keys, values), partial(_refused_row, values, str(refused[values]))) for values in refused
+    ]
+    return tuple(tasks)
+
+
+def _shared(scenes: Sequence[Scene | Assembly], *, has_one_load: bool, cold: bool) -> SharedBody | None:
+    """Return the body that scenes share; None of a single scene, and of meshes that follow each solution."""
+    if len(scenes) == 1 or scenes[0].mesh.accuracy is not None:
+        return None
+    return SharedBody(scenes, has_one_load=has_one_load, starts_cold=cold)
+
+
+def _solved_row(
+    values: Values, solve: Callable[[], Solution | AssemblySolution], done: Callable[[], None] | None
+) -> SweepRow:
+    row = row_of(values, attempt(solve))
+    if done is not None:
+        done()
+    return row
+
+
+def _refused_row(values: Values, message: str) -> SweepRow:
+    return row_of(values, Attempt(None, message, 0.0))
+
+
+def _label(keys: Sequence[Key], values: Values) -> str:
+    return ", ".join(f"{key.text} = {value:g}" for key, value in zip(keys, values, strict=True))
