@@ -7,17 +7,20 @@ are much longer than a body is thick it may push back the wrong way, and still s
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.assembled.model import AssembledModel
 from bemkit.model.contact_model import Model
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.solvers.base import ContactSolution, Status
+
+if TYPE_CHECKING:
+    from bemkit.model.assembled.model import AssembledModel
 
 _ROUND_OFF = 1e-10
 """Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
@@ -49,7 +52,7 @@ def with_energies_checked(model: AssembledModel, result: ContactSolution) -> Con
     """
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
-    unknowns = model.body.member_displacements(result.state)
+    unknowns = model.body.member_displacements(result.state)[: len(model.condensed)]  # rigid bodies come last
     bodies = zip(model.prepared.bodies, model.elastic, model.condensed, model.prepared.insides, unknowns, strict=True)
     for body, elastic, condensed, inside, own in bodies:
         displacement, force = condensed.recover(own)

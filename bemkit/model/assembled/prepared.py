@@ -143,12 +143,7 @@ class PreparedAssembly:
         InputError
             If its bodies have other names, a rigid body becomes another one, or a load drives another of its motions.
         """
-        for body, other in zip_longest(self.assembly.rigid, assembly.rigid):
-            if body is None or other is None or _layout(body) != _layout(other):
-                raise InputError(
-                    f"rigid body {(body or other).name!r} changes its shape, its place or what is given of it: change "
-                    "numbers only, or run the assembly on its own"
-                )
+        _check_rigid(self.assembly, assembly)
         return _prepared(assembly, _under(assembly, self.bodies), self.units, self)
 
     def rows_under(self, assembly: Assembly) -> tuple[ContactRows, ...] | None:
@@ -179,6 +174,8 @@ def prepare_assembly_steps(
     bodies = place(assemblies[0], meshes)
     contacts = listed_contacts(assemblies[0], bodies)
     steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
+    for step in steps[1:]:
+        _check_rigid(steps[0], step)
     units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
     first = _prepared(steps[0], _under(steps[0], bodies), units)
     return (first, *(first.under(step) for step in steps[1:]))
@@ -264,6 +261,16 @@ def _prepared(
     rows = (*between, *with_obstacles)
     retained, insides = _retained(bodies, conditions, rows), _insides(bodies, units, before)
     return PreparedAssembly(assembly, bodies, units, retained, tuple(forces), rows, insides)
+
+
+def _check_rigid(first: Assembly, other: Assembly) -> None:
+    """Refuse a load step whose rigid bodies are others than those of the first one."""
+    for body, changed in zip_longest(first.rigid, other.rigid):
+        if body is None or changed is None or _layout(body) != _layout(changed):
+            raise InputError(
+                f"rigid body {(body or changed).name!r} changes its shape, its place or what is given of it: change "
+                "numbers only, or run the assembly on its own"
+            )
 
 
 def _layout(body: RigidBody) -> tuple[object, ...]:
