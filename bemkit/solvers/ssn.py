@@ -31,7 +31,7 @@ _FIRST_SPRING, _WEAKENED, _LAST_SPRING = 3e-2, 0.25, 1e-5
 """Springs of the phase SPRINGS in units of the stiffness scale: the first, each after the last, and the weakest."""
 
 _MOST_WITH_SPRINGS = 90
-"""Steps of that phase; a packing of 200 discs takes 70."""
+"""Steps of that phase; packings of 200 discs take 50 to 70."""
 
 _MOST_OF_ONE = 3
 """Rigid motions of a single body."""

@@ -31,9 +31,3 @@ def test_points_that_face_two_discs_are_why_contacts_have_a_reach() -> None:
     counts = [bk.run(each).contact.n_contact for each in (near, replace(far, touching=bk.Touching(0.02, reach=0.05)))]
     assert counts[0] > counts[1]
     assert bk.run(far).contact.n_contact > 2 * counts[0]
-
-
-@pytest.mark.slow
-def test_a_packing_of_200_discs_rests() -> None:
-    """Full steps free now these discs, now those; springs that become weaker lead to the state where all rest."""
-    check_packing(packing(200, 20.0))
