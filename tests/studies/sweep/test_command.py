@@ -21,6 +21,7 @@ import bemkit as bk
 from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
 from bemkit.hdf5 import ResultFileError
+from bemkit.studies import engine
 from bemkit.studies.engine import MOST_TOGETHER, Task, compute
 from bemkit.studies.sweep.records import FILE
 from bemkit.studies.sweep.report import draw_sweep, figure_name
@@ -146,6 +147,21 @@ def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -
     assert 'a cluster needs distributed: pip install "bemkit[cluster]"' in str(result.exception)
 
 
+def test_a_cluster_is_reached_by_its_address_or_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(engine, "CONNECT_SECONDS", 0.5)
+    arguments = (*FAST, "--vary", f"{FRICTION}=0.1,0.2", "-q", "-o", tmp_path / "table.h5", "--on")
+    message = str(call(*arguments, "tcp://127.0.0.1:1").exception)
+    assert "cluster tcp://127.0.0.1:1: no scheduler answers" in message
+    assert "start one with 'dask scheduler'" in message
+    with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as local:
+        assert "it has no workers" in str(call(*arguments, local.scheduler_address).exception)
+        local.scale(1)
+        local.wait_for_workers(1)
+        assert call(*arguments, local.scheduler_address).return_value == 0
+    assert len(Sweep.read(tmp_path / "table.h5").solved) == 2
+
+
 def test_data_frames_need_their_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     table = bk.sweep(SCENE, {FRICTION: [0.2]})
     for package in ("pandas", "xarray"):
@@ -181,7 +197,7 @@ def test_any_column_is_drawn_over_any_other() -> None:
         [row.force_tangential for row in sorted(table.rows, key=lambda row: row.values) if row.values[1] == ratio]
         for ratio in (0.0, 0.2)
     ]
-    with pytest.raises(BemkitError, match="column 'energi': .*did you mean 'energy'"):
+    with pytest.raises(BemkitError, match=r"column 'energi': .*did you mean 'energy'"):
         draw_sweep(table, FRICTION, "energi")
     assert figure_name('parts."a/b".x', "energy") == "energy-over-parts.-a-b-.x"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -48,7 +47,7 @@ def check_rows(scene: bk.Scene | bk.Assembly, table: Sweep) -> None:
 
 
 @pytest.fixture
-def bodies_made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+def bodies_made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Count the bodies that are assembled for several rows."""
     made: list[str] = []
 
@@ -58,7 +57,7 @@ def bodies_made(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
 
     counted("build_model")
     counted("build_assembled_model")
-    yield made
+    return made
 
 
 @pytest.mark.parametrize(
