@@ -94,13 +94,14 @@ def draw_sweep(sweep: Sweep, over: str, show: str, axes: Axes | None = None) -> 
     x, y = sweep.column(over), sweep.column(show)
     if axes is None:
         axes = new_figure(7.0, 4.6).subplots()
-    others = [key for key in sweep.keys if key not in (over, show)]
+    along = over if over in sweep.keys else sweep.keys[0]  # over a result, lines run along the first key
+    others = [key for key in sweep.keys if key not in (along, show)]
     series: dict[tuple[float, ...], list[int]] = {}
     for number, row in enumerate(sweep.solved):
         series.setdefault(tuple(sweep.entry(row, key) for key in others), []).append(number)
     for number, (values, rows) in enumerate(series.items()):
         label = ", ".join(f"{key} = {value:g}" for key, value in zip(others, values, strict=True))
-        order = np.array(rows)[np.argsort(x[rows], kind="stable")] if over in sweep.keys else np.array(rows)
+        order = np.array(rows)[np.argsort(sweep.column(along)[rows], kind="stable")]
         style: dict[str, Any] = {"color": _COLOURS[number % 6], "linestyle": _LINES[number // 6 % 4]}
         axes.plot(x[order], y[order], marker="o", markersize=3.5, linewidth=1.2, label=label or None, **style)
     axes.set_xlabel(_named(over), parse_math=False)
