@@ -334,6 +334,21 @@ def test_steps_of_motions_and_forces_follow_each_other() -> None:
         bk.run_assembly_history([driven(), longer])
 
 
+def test_load_factors_scale_motions_and_forces() -> None:
+    """Sideways by a motion and down by a force, both in two steps: the last one has the whole of both."""
+    scene = replace(driven(x=1e-2), law=SOME, load_factors=(0.5, 1.0))
+    solution = bk.run(scene)
+    assert solution.is_converged
+    assert solution.assembly.load_factors == (0.5, 1.0)
+    punch = solution.rigid["punch"]
+    assert punch.x == pytest.approx(1e-2, rel=1e-12)
+    assert punch.force_y == pytest.approx(-FORCE, rel=1e-10)
+    assert punch.force_x == pytest.approx(0.3 * FORCE, rel=1e-10)  # all slips
+    half = bk.run(replace(scene, load_factors=(0.5,)))
+    assert half.rigid["punch"].x == pytest.approx(0.5e-2, rel=1e-12)
+    assert half.rigid["punch"].force_y == pytest.approx(-0.5 * FORCE, rel=1e-10)
+
+
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_forces_and_motions_set_the_units(scale: float) -> None:
     """No other load is there to measure by: results are those of another unit of force."""
