@@ -118,7 +118,8 @@ def contact_forces(
         Of the same table.
     """
     return tuple(
-        ContactForce(**vars(resultant), **contact_sizes(table, resultant.name, transitions)) for resultant in resultants
+        ContactForce(**(vars(resultant) | contact_sizes(table, resultant.name, transitions)))
+        for resultant in resultants
     )
 
 
