@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -79,6 +80,11 @@ class ContactProblem:
         """
         return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
 
+    @cached_property
+    def of_body(self) -> dict[str, Any]:
+        """What drivers have found out of the body and its load, to be kept under other laws; see `with_law`."""
+        return {}
+
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response of the body; where it has eliminated the tangent, ``sigma_t = 0`` whatever is asked.
 
@@ -97,6 +103,7 @@ class ContactProblem:
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law."""
         other = replace(self, law=law)
+        other.__dict__["of_body"] = self.of_body
         if "sticking_state" in self.__dict__:  # it does not depend on the law
             other.__dict__["sticking_state"] = self.sticking_state
         return other

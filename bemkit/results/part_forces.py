@@ -119,21 +119,23 @@ def contact_forces(
     transitions : sequence of Transition
         Of the same table.
     """
-    found = []
-    for resultant in resultants:
-        own = table.rows(resultant.name)
-        closed = own & (table.status != NodeStatus.SEPARATED)
-        found.append(
-            ContactForce(
-                **vars(resultant),
-                force_normal=-float(table.weight[own] @ table.sigma_n[own]),
-                force_tangential=float(table.weight[own] @ table.sigma_t[own]),
-                contact_length=_contact_length(table, resultant.name, transitions),
-                peak_pressure=float(np.max(-table.sigma_n[own], initial=0.0)),
-                largest_slip=float(np.abs(table.u_t[closed]).max(initial=0.0)),
-            )
-        )
-    return tuple(found)
+    return tuple(
+        ContactForce(**(vars(resultant) | contact_sizes(table, resultant.name, transitions)))
+        for resultant in resultants
+    )
+
+
+def contact_sizes(table: ContactTable, part: str, transitions: Sequence[Transition]) -> dict[str, float]:
+    """Return what `ContactForce` says of a contact besides its resultant."""
+    own = table.rows(part)
+    closed = own & (table.status != NodeStatus.SEPARATED)
+    return {
+        "force_normal": -float(table.weight[own] @ table.sigma_n[own]),
+        "force_tangential": float(table.weight[own] @ table.sigma_t[own]),
+        "contact_length": _contact_length(table, part, transitions),
+        "peak_pressure": float(np.max(-table.sigma_n[own], initial=0.0)),
+        "largest_slip": float(np.abs(table.u_t[closed]).max(initial=0.0)),
+    }
 
 
 def _contact_length(table: ContactTable, part: str, transitions: Sequence[Transition]) -> float:

@@ -264,7 +264,7 @@ class _Run:
         # Overflow is not warned about: it ends in the status NOT_FINITE.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             try:
-                untouched = untouched_response(self.problem.body)
+                untouched = self._untouched()
                 if untouched is None and (unsolvable := find_unsolvable_load(self.problem)) is not None:
                     return self._nothing_done(Status.UNSOLVABLE_LOAD, unsolvable.description)
                 iterate = self._without_contact(self._first(start, spent=int(untouched is not None)), untouched)
@@ -288,6 +288,14 @@ class _Run:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
         return self._solution(iterate, status, sets, history)
+
+    def _untouched(self) -> FloatingResponse | None:
+        """Return the response without any contact, if there is one; it does not depend on the law."""
+        known = self.problem.of_body
+        if "untouched" not in known:
+            known["untouched"] = untouched_response(self.problem.body)
+        untouched: FloatingResponse | None = known["untouched"]
+        return untouched
 
     def _first(self, start: ContactState | None, spent: int) -> Iterate:
         if start is None:

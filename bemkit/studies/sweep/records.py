@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from bemkit.hdf5 import FileFormat
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.part_forces import contact_sizes
 from bemkit.results.record_file import RecordFile
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt
@@ -122,14 +123,15 @@ def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution
 
 
 def _numbers(solution: Solution | AssemblySolution) -> dict[str, float]:
-    contacts, error = solution.contacts, solution.estimated_error
+    table, error = solution.contact, solution.estimated_error
+    contacts = [contact_sizes(table, part, solution.transitions) for part in table.parts]
     return {
         "force_normal": solution.force_normal,
         "force_tangential": solution.force_tangential,
         "energy": solution.energy,
-        "contact_length": sum(contact.contact_length for contact in contacts),
-        "peak_pressure": max((contact.peak_pressure for contact in contacts), default=0.0),
-        "largest_slip": max((contact.largest_slip for contact in contacts), default=0.0),
+        "contact_length": sum(contact["contact_length"] for contact in contacts),
+        "peak_pressure": max((contact["peak_pressure"] for contact in contacts), default=0.0),
+        "largest_slip": max((contact["largest_slip"] for contact in contacts), default=0.0),
         "estimated_error": math.nan if error is None else error,
     }
 
