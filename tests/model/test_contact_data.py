@@ -226,4 +226,4 @@ def test_solutions_carry_these_warnings() -> None:
 def test_a_support_that_drives_the_body_into_an_obstacle_is_warned_of() -> None:
     press = bk.Part("press", bk.PrescribedDisplacement(x=1e-3, y=0.0), sides=("top",))
     (warning,) = warnings_of(block(WALL_PART, press))
-    assert "Supports push part 'wall' 0.001 m into its obstacle at (1, 1)" in warning
+    assert "Supports push part 'wall' 0.001 into its obstacle at (1, 1)" in warning

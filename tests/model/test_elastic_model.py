@@ -169,9 +169,9 @@ def test_scene_files_say_nothing_of_friction_and_drivers() -> None:
 def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Path) -> None:
     paths = save_figures(bent, tmp_path / "figures")
     assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png"]
-    from bemkit.results.figures import Units, draw_boundary_traction
+    from bemkit.results.figures import draw_boundary_traction
 
-    axes, strip = draw_boundary_traction(bent, units=Units("mm", "MPa")).axes
+    axes, strip = draw_boundary_traction(bent, units=bk.UnitNames("mm", "MPa")).axes
     drawn = {patch.get_label(): patch.get_data().values for patch in axes.patches}
     largest = np.abs(bent.boundary.traction).max()
     assert drawn["normal $t_n$"].max() == pytest.approx(largest, rel=1e-12)
