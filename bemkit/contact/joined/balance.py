@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance
@@ -26,10 +25,10 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
     -------
     Imbalance
         `force` is the largest relative displacement that no deformation and no motion of the members explains, as the
-        force E' it would take, or a force along an eliminated tangent; `moment` the work of load and contact forces on
-        a rigid motion of a member, of largest entry one. The first is relative to the largest force on the lightest
-        loaded member there, the second to the sum of all forces on the member. Members that carry nothing are measured
-        by a thousandth of the largest forces on any.
+        force it would take (E' of the partner that yields more), or a force along an eliminated tangent; `moment` the
+        work of load and contact forces on a rigid motion of a member, of largest entry one. The first is relative to
+        the largest force on the lightest loaded member there, the second to the sum of all forces on the member.
+        Members that carry nothing are measured by a thousandth of the largest forces on any.
     """
     contact = joined.contact_forces(state)
     displacement, missed = joined.recover(state)
@@ -43,7 +42,7 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
     for shape in joined.shapes:
         terms[shape.rows] = shape.column_sizes * np.abs(displacement)[shape.rows]
     reach = abs(joined.relative) @ np.abs(displacement) + np.abs(joined.offset) + np.abs(state.displacement.ravel())
-    per_length = joined.stiffness_scale * np.repeat(joined.weights, 2)
+    per_length = joined.moduli * np.repeat(joined.weights / np.median(joined.weights), 2)
     if not np.abs(joined.load).sum() > 0.0 and total.sum() <= NOISE_FACTOR * eps * terms.sum():
         # nothing but motions: forces are round-off, and no measure
         largest, total = np.maximum.reduceat(terms, first), np.add.reduceat(terms, first)
@@ -52,7 +51,7 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
     largest = np.maximum(largest, _LIGHTEST * largest.max())
     total = np.maximum(total, _LIGHTEST * total.max())
 
-    at_contact = _least_of_partners(joined, largest)
+    at_contact = joined.least_of_partners(largest)
     stray = np.where(joined.tangent_is_eliminated, joined.weights * np.abs(state.sigma_t), 0.0)
     missing = np.abs(missed) * per_length / at_contact
     missing[1::2] = np.maximum(missing[1::2], stray / at_contact[1::2])
@@ -65,11 +64,3 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
         float(np.max(work, initial=0.0)),
         float(max((eps * reach * per_length / at_contact).max(), of_sums.max())),
     )
-
-
-def _least_of_partners(joined: CoupledMembers, largest: FloatArray) -> FloatArray:
-    """Return (2 n_contact,) the smaller of the largest forces on the members that meet in each component."""
-    owners = joined.owners
-    at_contact = np.full(owners.shape[0], largest.max())
-    np.minimum.at(at_contact, np.repeat(np.arange(owners.shape[0]), np.diff(owners.indptr)), largest[owners.indices])
-    return at_contact

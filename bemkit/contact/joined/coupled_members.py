@@ -75,7 +75,8 @@ class CoupledMembers:
         Returns
         -------
         displacement : (n,) array [m]
-            Of all members, one after the other, rigid motions by least squares of what is missed.
+            Of all members, one after the other, rigid motions by least squares of what is missed, weighted by `moduli`:
+            what soft bodies miss is not laid upon two stiff ones.
         missed : (2 n_contact,) array [m]
             Relative displacements of the state less those of the members.
         """
@@ -139,14 +140,22 @@ class CoupledMembers:
         sums = sparse.csr_array((np.ones(of_component.size), where), (of_component.size, len(self.members)))
         return sparse.csr_array(abs(self.relative) @ sums)
 
+    def least_of_partners(self, values: FloatArray) -> FloatArray:
+        """Return (2 n_contact,) the smallest of the values (n_members,) of the members that meet in each component."""
+        owners = self.owners
+        least = np.full(owners.shape[0], values.max())
+        np.minimum.at(least, np.repeat(np.arange(owners.shape[0]), np.diff(owners.indptr)), values[owners.indices])
+        return least
+
+    @cached_property
+    def moduli(self) -> FloatArray:
+        """(2 n_contact,) array: the E' of the partner that yields more, in each component of contact [Pa]."""
+        return self.least_of_partners(np.array([member.modulus for member in self.members]))
+
     @cached_property
     def modulus(self) -> float:
-        """Median over the contact nodes of the E' of the partner that yields more [Pa]."""
-        owners = self.owners
-        moduli = np.array([member.modulus for member in self.members])
-        bounds = owners.indptr[:-1:2], owners.indptr[1::2]
-        least = [moduli[owners.indices[i:j]].min() for i, j in zip(*bounds, strict=True) if j > i]
-        return float(np.median(least)) if least else float(moduli.min())
+        """Median of `moduli` over the contact nodes [Pa]."""
+        return float(np.median(self.moduli[::2]))
 
     @cached_property
     def _motion_fit(self) -> Callable[[FloatArray], FloatArray]:
@@ -154,10 +163,11 @@ class CoupledMembers:
         felt = sparse.csc_array(self.felt_motions.T)
         if not felt.shape[1]:
             return lambda missed: np.zeros(0)
+        weighted = sparse.csc_array(felt.T * (self.moduli / self.modulus))
         factors = sparse.linalg.splu(
-            sparse.csc_array(felt.T @ felt), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+            sparse.csc_array(weighted @ felt), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
         )
-        return lambda missed: np.asarray(factors.solve(felt.T @ missed))
+        return lambda missed: np.asarray(factors.solve(weighted @ missed))
 
     def moving_bodies(self, coefficients: FloatArray) -> str:
         """Name the members that a combination (n_motions,) of the rigid motions moves."""

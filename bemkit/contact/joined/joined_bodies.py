@@ -24,7 +24,7 @@ MOST_DENSE = 2500
 
 _WITHOUT_LOAD = (
     *("shapes", "motions", "felt_motions", "stiffness", "is_symmetric", "_relative_stiffness", "_motion_fit"),
-    *("owners", "modulus", "stiffness_scale", "is_costly"),
+    *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
 )
 """What stays as it is under another load."""
 

@@ -137,6 +137,17 @@ def test_the_compliant_partner_gives_the_scale_of_stiffness():
     assert body.stiffness_scale == pytest.approx(body.modulus / 0.25)
 
 
+def test_where_two_stiff_bodies_meet_their_own_stiffness_judges():
+    """A displacement of 1e-6 is little beside soft bodies, and far from equilibrium between two 1e6 times stiffer."""
+    body = row_of_blocks((1.0, 1e6, 1e6, 1.0))
+    state = body.respond(stick(np.zeros(body.n_contact), np.zeros(body.n_contact)))
+    assert body.imbalance(state).worst < 1e-8
+    owners = body.owners[0::2].toarray() > 0.0
+    for where, share in ((owners[:, 1] & owners[:, 2], 1.0), (owners[:, 0] & owners[:, 1], 1e-6)):
+        moved = state.displacement + 1e-6 * where[:, None] * [1.0, 0.0] * np.cos(np.arange(body.n_contact))[:, None]
+        assert 0.1 * share < body.imbalance(ContactState(moved, state.traction)).worst < 100.0 * share
+
+
 @FORMS
 def test_a_free_motion_is_singular(is_dense):
     body = row_of_blocks((1.0, 3.0, 0.5), is_dense=is_dense)
