@@ -142,3 +142,40 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in solution.warnings)
     assert judge([solution])[0] is Outcome.WARNED
     assert judge([replace(solution, warnings=())])[:2] == (Outcome.WRONG, "hidden_overlap")
+
+
+def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
+    circle, sides = bk.Disk(2.0), ("arc-1", "arc-2", "arc-3", "arc-4")
+    rock = bk.Body(
+        name="rock",
+        shape=bk.ExteriorOf(circle),
+        material=MATERIAL,
+        parts=(bk.Part("wall", bk.Free(), sides),),
+        mesh=bk.MeshOptions(elements=33),
+    )
+    disc = bk.Body(
+        name="disc",
+        shape=circle,
+        material=MATERIAL,
+        parts=(bk.Part("out", bk.Free(), sides),),
+        body_forces=(bk.Gravity(1e-3, (0.0, -1.0)),),
+        mesh=bk.MeshOptions(elements=14),
+    )
+    pair = bk.ContactPair(("rock.wall", "disc.out"))
+    discretisation = bk.Galerkin(3)
+    assembly = bk.Assembly(
+        title="x", bodies=(rock, disc), contacts=(pair,), law=bk.Coulomb(0.5), discretisation=discretisation
+    )
+    solution = bk.run(assembly)
+    placed = solution.bodies["disc"]
+    points, displacement = placed.boundary.points, placed.boundary.displacement
+    strained = float(np.abs(displacement).max())
+    turned = displacement + 1e3 * strained * np.column_stack([-points[:, 1], points[:, 0]])
+
+    def overlap(displacement: np.ndarray) -> float:
+        moved = replace(placed, boundary=replace(placed.boundary, displacement=displacement))
+        return check_assembly(replace(solution, bodies={**solution.bodies, "disc": moved})).hidden_overlap
+
+    assert overlap(displacement) < 0.02
+    assert overlap(turned) < 0.02  # a thousand times the displacements, all along the wall
+    assert overlap(displacement - np.array([0.0, strained])) > 0.2

@@ -19,6 +19,10 @@ _STEP = 1e-4
 """Difference of local coordinates by which slopes are taken."""
 _N_SAMPLES = 33
 """Points on an element of a curved side."""
+_N_NEAREST = 3
+"""Of these, from which the place that a point looks at is sought."""
+_BESIDE = 1e-6
+"""Share of an element by which that place may lie beside the direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,23 +138,32 @@ def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
     xi = np.linspace(-1.0, 1.0, _N_SAMPLES)
     rows = np.repeat(np.arange(two.elements.size), _N_SAMPLES)
     samples = mesh.points(two.elements, xi).reshape(-1, 2)
-    points = boundary.points[one.elements].reshape(-1, 2)
-    normals = boundary.normals[one.elements].reshape(-1, 2)
-    motion = boundary.interpolated(one.body.result.boundary.displacement)[one.elements].reshape(-1, 2)
-    distance, nearest = cKDTree(samples).query(points)
+    every = boundary.points[one.elements].reshape(-1, 2)
+    # an end belongs to two elements, and either may be the one
+    distance, nearest = (np.ravel(found) for found in cKDTree(samples).query(every, k=_N_NEAREST))
+    points = np.repeat(every, _N_NEAREST, axis=0)
+    normals = np.repeat(boundary.normals[one.elements].reshape(-1, 2), _N_NEAREST, axis=0)
+    displacement = boundary.interpolated(one.body.result.boundary.displacement)[one.elements]
+    motion = np.repeat(displacement.reshape(-1, 2), _N_NEAREST, axis=0)
     row, place = rows[nearest], np.tile(xi, two.elements.size)[nearest]
-    direction = normals - two.body.boundary.normals[two.elements].mean(axis=1)[row]
-    faces = (np.hypot(*direction.T) > 1.7) & (distance < reach)  # at most 60 degrees off
+    element = two.elements[row]
+
+    def facing(at: FloatArray) -> FloatArray:
+        return np.asarray(normals - mesh.normals_at(element, at[:, None])[:, 0])
+
+    def beside(at: FloatArray, along: FloatArray) -> FloatArray:
+        offset = mesh.points(element, at[:, None])[:, 0] - points
+        return np.asarray(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0])
+
+    faces = (np.hypot(*facing(place).T) > 1.7) & (distance < reach)  # at most 60 degrees off
+    for _ in range(8):
+        direction = facing(place)
+        direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
+        slope = (beside(place + _STEP, direction) - beside(place - _STEP, direction)) / (2.0 * _STEP)
+        place = np.clip(place - beside(place, direction) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
+    direction = facing(place)
     direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
-
-    def beside(at: FloatArray) -> FloatArray:
-        offset = mesh.points(two.elements[row], at[:, None])[:, 0] - points
-        return np.asarray(direction[:, 0] * offset[:, 1] - direction[:, 1] * offset[:, 0])
-
-    for _ in range(5):
-        slope = (beside(place + _STEP) - beside(place - _STEP)) / (2.0 * _STEP)
-        place = np.clip(place - beside(place) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
-    offset = mesh.points(two.elements[row], place[:, None])[:, 0] - points
-    faces &= np.abs(beside(place)) < 1e-3 * np.maximum(mesh.lengths[two.elements[row]], distance)
+    offset = mesh.points(element, place[:, None])[:, 0] - points
+    faces &= np.abs(beside(place, direction)) < _BESIDE * np.maximum(mesh.lengths[element], distance)
     overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - gap
     return float(np.max(overlap[faces], initial=0.0))
