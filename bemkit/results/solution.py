@@ -91,7 +91,7 @@ class Solution(SolvedBody):
         """Return one line; the fields hold thousands of numbers."""
         nodes = f", {self.contact.n_contact} contact nodes" if self.contact.n_contact else ""
         status = self.status.name.lower().replace("_", " ")
-        return f"Solution({self.scene.title!r}: {status}, {self.mesh.n_elements} elements{nodes})"
+        return f"Solution({self.scene.title!r}: {status}, {self.n_elements} elements{nodes})"
 
     @property
     def is_converged(self) -> bool:
@@ -149,6 +149,11 @@ class Solution(SolvedBody):
     def title(self) -> str:
         """The title of the scene."""
         return self.scene.title
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return self.mesh.n_elements
 
     def part_length(self, part: str) -> float:
         """Return the length of boundary of a part [m]."""
@@ -215,7 +220,7 @@ class Solution(SolvedBody):
             "converged": self.is_converged,
             "certified": self.is_certified,
             "warnings": list(self.warnings),
-            "n_elements": self.mesh.n_elements,
+            "n_elements": self.n_elements,
             "n_contact": self.contact.n_contact,
             **{name: getattr(self, name) for name in ("linear_solves", "outer_steps", "force_normal")},
             **{

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
-from bemkit.results.solution import Solution, with_totals
+from bemkit.results.solution import Solution
+from bemkit.runs.best_mesh import best_last
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.history import run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.scene.mesh_options import MOST_ELEMENTS
 from bemkit.scene.scene import Scene
-from bemkit.solvers.base import Status, StepRecord
+from bemkit.solvers.base import StepRecord
 
 
 def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None = None) -> tuple[Solution, ...]:
@@ -89,7 +89,7 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
                 expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)
                 if now - begin + expected > options.most_seconds:
                     obstacle = f"more than {options.most_seconds:g} s would be needed"
-    return _ending(meshes, solutions, obstacle)
+    return best_last(solutions, obstacle, options.accuracy, error=meshes.error, shown=_errors)
 
 
 def _solved(level: Level, start: Solution | None, callback: Callable[[StepRecord], None] | None) -> Solution:
@@ -109,25 +109,6 @@ def _size(level: Level) -> int:
 def _expected_seconds(solution: Solution, spent: float, scene: Scene, mesh: BoundaryMesh) -> float:
     """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
     return spent * make_plan(scene, mesh).seconds / solution.plan.seconds
-
-
-def _ending(meshes: MeshSequence, solutions: list[Solution], obstacle: str) -> tuple[Solution, ...]:
-    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for."""
-    best = min((solution for solution in solutions if solution.is_converged), key=meshes.error, default=solutions[-1])
-    message, status = (
-        f"{len(solutions)} meshes, the last with {best.mesh.n_elements} elements. {best.message}",
-        best.status,
-    )
-    if obstacle:
-        accuracy = best.scene.mesh.accuracy
-        message = (
-            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {_errors(best)}; allow "
-            f"more elements or time, or ask for less. {message}"
-        )
-        status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
-    names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
-    others = [solution for solution in solutions if solution is not best]
-    return (*others, replace(with_totals(best, solutions, names), status=status, message=message))
 
 
 def _errors(solution: Solution) -> str:

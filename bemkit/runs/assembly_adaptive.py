@@ -13,12 +13,12 @@ from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partition
 from bemkit.geometry.vectors import norms
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
-from bemkit.results.solution import with_totals
 from bemkit.runs.assembly import run_assembly
+from bemkit.runs.best_mesh import best_last
 from bemkit.runs.density import LARGEST_GROWTH, MOST_FOR_TRANSITIONS, SAFETY, SMALLEST_GROWTH, TRANSITION
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.mesh_options import MOST_ELEMENTS
-from bemkit.solvers.base import Status, StepRecord
+from bemkit.solvers.base import StepRecord
 
 
 def run_assembly_adaptive(
@@ -75,7 +75,7 @@ def run_assembly_adaptive(
                 obstacle = f"more than {most_elements} elements a body would be needed"
             elif options.most_seconds is not None and time.perf_counter() - begin + spent > options.most_seconds:
                 obstacle = f"more than {options.most_seconds:g} s would be needed"
-    return _ending(solutions, obstacle, options.accuracy)
+    return best_last(solutions, obstacle, options.accuracy, error=_error, shown=_shown)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,21 +202,9 @@ def _rate(solution: AssemblySolution) -> int:
     return 2 * min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies) + 1
 
 
-def _ending(solutions: list[AssemblySolution], obstacle: str, accuracy: float) -> tuple[AssemblySolution, ...]:
-    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for."""
+def _error(solution: AssemblySolution) -> float:
+    return float("inf") if solution.estimated_error is None else solution.estimated_error
 
-    def error(solution: AssemblySolution) -> float:
-        return float("inf") if solution.estimated_error is None else solution.estimated_error
 
-    best = min((solution for solution in solutions if solution.is_converged), key=error, default=solutions[-1])
-    message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
-    status = best.status
-    if obstacle:
-        message = (
-            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {error(best):.1e}; allow more "
-            f"elements or time, or ask for less. {message}"
-        )
-        status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
-    names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
-    others = [solution for solution in solutions if solution is not best]
-    return (*others, replace(with_totals(best, solutions, names), status=status, message=message))
+def _shown(solution: AssemblySolution) -> str:
+    return f"{_error(solution):.1e}"
