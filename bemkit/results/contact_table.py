@@ -208,6 +208,22 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     return tuple(found)
 
 
+def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:
+    """Return those transitions on whose both sides zones of several nodes lie.
+
+    A zone that a single node stands for is not resolved yet, or it is a node that a support holds.
+    """
+    found = []
+    for part in contact.parts:
+        own = [transition for transition in transitions if transition.part == part]
+        ends = [-np.inf, *(transition.s for transition in own), np.inf]
+        has_several = np.histogram(contact.s[contact.rows(part)], ends)[0] > 1
+        found += [
+            each for each, is_resolved in zip(own, has_several[:-1] & has_several[1:], strict=True) if is_resolved
+        ]
+    return tuple(found)
+
+
 def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -> FloatArray:
     """Put transitions halfway between their nodes where they leave next to nothing of a zone, which has nodes."""
     kept = places.copy()

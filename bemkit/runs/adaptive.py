@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
-from bemkit.runs.best_mesh import best_last
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.history import run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
-from bemkit.scene.mesh_options import MOST_ELEMENTS
+from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -47,71 +45,53 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
     ValueError
         If the scene has no accuracy, or for the reasons of `bemkit.run`.
     """
-    options, begin = scene.mesh, time.perf_counter()
-    if options.accuracy is None:
-        raise InputError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
-    meshes: MeshSequence = (LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes)(options.accuracy)
     contact = [part.name for part in scene.contact_parts]
-    first = options.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
-    level = Level(scene, first)
-    most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
-    solutions: list[Solution] = []
-    obstacle = ""
-    while not obstacle:
-        started = time.perf_counter()
-        start = solutions[-1] if solutions and contact else None
-        try:
-            solution = _solved(level, start, callback)
-        except BemkitError as error:
-            if not solutions:
-                raise
-            obstacle = f"{level.partition.mesh.n_elements} elements cannot be solved ({error})"
-            break
-        solutions.append(solution)
-        now = time.perf_counter()
-        if not solution.is_converged:
-            obstacle = f"the solve on {solution.mesh.n_elements} elements failed"
-        elif meshes.is_enough(solutions):
-            break
-        else:
-            try:
-                following = meshes.following(level, solutions)
-                level = level if following is None else following
-                _ = level.partition.mesh
-            except BemkitError as error:
-                obstacle = f"no finer mesh can be made ({error})"
-                break
-            if following is None:
-                obstacle = "the estimated error no longer falls"
-            elif _size(level) > most_elements:
-                obstacle = f"more than {most_elements} elements would be needed"
-            elif options.most_seconds is not None:
-                expected = _expected_seconds(solution, now - started, level.scene, level.partition.mesh)
-                if now - begin + expected > options.most_seconds:
-                    obstacle = f"more than {options.most_seconds:g} s would be needed"
-    return best_last(solutions, obstacle, options.accuracy, error=meshes.error, shown=_errors)
+    first = scene.mesh.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
+    sequence = LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes
+    return refined(Level(scene, first), _SceneRefinement(sequence(required_accuracy(scene.mesh)), callback), scene.mesh)
 
 
-def _solved(level: Level, start: Solution | None, callback: Callable[[StepRecord], None] | None) -> Solution:
-    """Solve a scene from the solution before, and if that leads nowhere from the beginning."""
-    solution = run_on_mesh(level.scene, level.partition.mesh, start, callback)
-    if start is None or solution.is_converged:
-        return solution
-    return run_on_mesh(level.scene, level.partition.mesh, None, callback)
+@dataclass(frozen=True)
+class _SceneRefinement:
+    meshes: MeshSequence
+    callback: Callable[[StepRecord], None] | None
 
+    def solved(self, level: Level, start: Solution | None) -> Solution:
+        """Solve a scene from the solution before, and if that leads nowhere from the beginning."""
+        scene, mesh = level.scene, level.partition.mesh
+        if start is not None and scene.contact_parts:
+            solution = run_on_mesh(scene, mesh, start, self.callback)
+            if solution.is_converged:
+                return solution
+        return run_on_mesh(scene, mesh, None, self.callback)
 
-def _size(level: Level) -> int:
-    """Return the number of elements; of high degree, of quadratic elements with as many nodes."""
-    degree = level.scene.discretisation.displacement_space(level.partition.mesh).degree
-    return len(level.partition.sides) * max(degree, 2) // 2
+    def error(self, solution: Solution) -> float:
+        return self.meshes.error(solution)
+
+    def shown_error(self, solution: Solution) -> str:
+        energy, tractions = solution.estimated_error, solution.estimated_traction_error
+        of_energy = "unknown" if energy is None else f"{energy:.1e}"
+        return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"
+
+    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+        return self.meshes.is_enough(solutions)
+
+    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
+        following = self.meshes.following(level, solutions)
+        if following is not None:
+            _ = following.partition.mesh  # whatever is wrong with it is said now
+        return following
+
+    def excess(self, level: Level, most_elements: int) -> str:
+        """Compare the number of elements; of high degree, of quadratic elements with as many nodes."""
+        degree = level.scene.discretisation.displacement_space(level.partition.mesh).degree
+        n_elements = len(level.partition.sides) * max(degree, 2) // 2
+        return f"{most_elements} elements" if n_elements > most_elements else ""
+
+    def expected_seconds(self, level: Level, solution: Solution, spent: float) -> float:
+        return _expected_seconds(solution, spent, level.scene, level.partition.mesh)
 
 
 def _expected_seconds(solution: Solution, spent: float, scene: Scene, mesh: BoundaryMesh) -> float:
     """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
     return spent * make_plan(scene, mesh).seconds / solution.plan.seconds
-
-
-def _errors(solution: Solution) -> str:
-    energy, tractions = solution.estimated_error, solution.estimated_traction_error
-    of_energy = "unknown" if energy is None else f"{energy:.1e}"
-    return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"

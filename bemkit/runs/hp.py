@@ -70,9 +70,10 @@ class LayeredMeshes:
         solution, partition = solutions[-1], level.partition
         if self._is_stuck(solutions) or (level.number > 0 and solution.estimated_error is None):
             return None
-        if level.number == 0 and len(solutions) < MOST_LOOKS and len(zone_ends(solution)) < len(solution.transitions):
+        ends = zone_ends(solution)
+        if level.number == 0 and len(solutions) < MOST_LOOKS and len(ends) < len(solution.transitions):
             return DensityMeshes(self.accuracy).following(level, solutions)
-        cuts = zone_cuts(partition, solution)
+        cuts = zone_cuts(partition, ends)
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
             return Level(level.asked, fresh, 1)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.meshing.partition import Partition
+from bemkit.results.contact_table import resolved_transitions
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Scene
 
@@ -36,6 +38,11 @@ class Level:
         """The scene with the discretisation of this level."""
         return replace(self.asked, discretisation=self.asked.discretisation.at_level(self.number))
 
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return self.partition.mesh.n_elements
+
 
 class MeshSequence(Protocol):
     """A rule for better meshes; a frozen dataclass without memory."""
@@ -56,30 +63,34 @@ class MeshSequence(Protocol):
         ...
 
 
-def zone_ends(solution: Solution) -> list[tuple[str, int, float]]:
-    """Return where zones of one status end: the part, the element and the fraction of its length.
+class ZoneEnd(NamedTuple):
+    """Where zones of one status end: in which element of which part, and at which fraction of its length."""
 
-    A zone that a single node stands for is not resolved yet, or it is a node that a support holds: its ends are left
-    alone.
-    """
-    table, mesh = solution.contact, solution.mesh
+    mesh: BoundaryMesh
+    part: str
+    element: int
+    fraction: float
+    body: str = ""
+
+
+def zone_ends(solution: Solution) -> list[ZoneEnd]:
+    """Return where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
+    mesh = solution.mesh
     found = []
-    for part in table.parts:
-        nodes = table.s[table.rows(part)]
-        places = np.array([transition.s for transition in solution.transitions if transition.part == part])
-        zone_sizes = np.histogram(nodes, np.concatenate([[-np.inf], places, [np.inf]]))[0]
-        elements = along_boundary(mesh, mesh.part(part))
+    for transition in resolved_transitions(solution.contact, solution.transitions):
+        elements = along_boundary(mesh, mesh.part(transition.part))
         ends = np.cumsum(mesh.lengths[elements])
-        for place in places[(zone_sizes[:-1] > 1) & (zone_sizes[1:] > 1)].tolist():
-            k = min(int(np.searchsorted(ends, place)), elements.size - 1)
-            found.append((part, int(elements[k]), 1.0 - float((ends[k] - place) / mesh.lengths[elements[k]])))
+        k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
+        fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
+        found.append(ZoneEnd(mesh, transition.part, int(elements[k]), fraction))
     return found
 
 
-def zone_cuts(partition: Partition, solution: Solution) -> dict[int, list[float]]:
+def zone_cuts(partition: Partition, ends: Iterable[ZoneEnd]) -> dict[int, list[float]]:
     """Return where zones of one status end, as parameters by the number of the side."""
     cuts: dict[int, list[float]] = {}
-    for _, element, fraction in zone_ends(solution):
-        start, end = partition.spans[element].tolist()
-        cuts.setdefault(int(partition.sides[element]), []).append(start + fraction * (end - start))
+    for zone_end in ends:
+        start, end = partition.spans[zone_end.element].tolist()
+        side = int(partition.sides[zone_end.element])
+        cuts.setdefault(side, []).append(start + zone_end.fraction * (end - start))
     return cuts

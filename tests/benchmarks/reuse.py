@@ -91,7 +91,7 @@ def nested_levels(scene: bk.Scene) -> list[Level]:
         if meshes.is_enough(solutions):
             return levels
         wanted = meshes.following(mesh_sequence.Level(scene, partition), solutions).partition
-        new = nested_partition(partition, wanted, mesh_sequence.zone_cuts(partition, solution))
+        new = nested_partition(partition, wanted, mesh_sequence.zone_cuts(partition, mesh_sequence.zone_ends(solution)))
         levels.append(Level(bk.run(scene, mesh=new.mesh, start=solution), kept_share(partition, new)))
         partition = new
 

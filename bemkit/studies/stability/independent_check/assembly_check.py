@@ -18,7 +18,7 @@ from bemkit.studies.stability.independent_check.bodies import MeasuredBody
 from bemkit.studies.stability.independent_check.boundary import EPSILON, beyond, largest, trusted_stress
 from bemkit.studies.stability.independent_check.check import Measured, measure, slip_opposition, status_mismatch
 from bemkit.studies.stability.independent_check.joints import Side, measure_flat, sampled_overlap
-from bemkit.studies.stability.independent_check.nodes import _mean_normals, distance_to
+from bemkit.studies.stability.independent_check.nodes import distance_to, mean_normals
 from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Entries
 
 _LIGHTEST = 1e-3
@@ -156,7 +156,7 @@ class Joints:
         for name in pair.sides:
             side = self.side(name)
             nodes = np.unique(side.body.boundary.nodes[side.elements])
-            normals = _mean_normals(side.body.fields.solution, side.body.boundary, name.split(".", 1)[1])[nodes]
+            normals = mean_normals(side.body.fields.solution, side.body.boundary, name.split(".", 1)[1])[nodes]
             apart = np.linalg.norm(points[:, None] - side.body.result.boundary.points[nodes], axis=2)
             facing = np.sum(normals[apart.argmin(axis=1)] * directions, axis=1)
             misses.append(float(apart.min(axis=1).max() / side.body.result.mesh.diameter + np.mean(facing < 0.0)))
@@ -256,7 +256,7 @@ class Joints:
         body, part = name.split(".", 1)
         measured = self.bodies[body]
         nodes = np.linalg.norm(points[:, None] - measured.result.boundary.points, axis=2).argmin(axis=1)
-        normals = _mean_normals(measured.fields.solution, measured.boundary, part)[nodes]
+        normals = mean_normals(measured.fields.solution, measured.boundary, part)[nodes]
         (condition,) = (each.condition for each in measured.result.scene.parts if each.name == part)
         assert isinstance(condition, Contact)
         distance, _ = distance_to(condition.obstacle, points, normals)

@@ -73,7 +73,7 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
     for part in solution.scene.contact_parts:
         own = table.rows(part.name)
         if isinstance(part.condition, Contact) and own.any():
-            normals[own] = _mean_normals(solution, boundary, part.name)[nodes[own]]
+            normals[own] = mean_normals(solution, boundary, part.name)[nodes[own]]
             distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
     facing = np.sum(direction * normals, axis=1)
     frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
@@ -121,7 +121,7 @@ def hidden_overlap(fields: Fields) -> float:
     deepest = 0.0
     for part in solution.scene.contact_parts:
         rows = np.setdiff1d(boundary.nodes[solution.mesh.part(part.name)], nodes.nodes)
-        normals = _mean_normals(solution, boundary, part.name)[rows]
+        normals = mean_normals(solution, boundary, part.name)[rows]
         if isinstance(part.condition, Contact) and rows.size:
             distance, direction = distance_to(part.condition.obstacle, points[rows], normals)
             overlap = np.sum(displacement[rows] * direction, axis=1) - distance
@@ -130,7 +130,7 @@ def hidden_overlap(fields: Fields) -> float:
     return deepest / motion if motion > 0.0 else deepest
 
 
-def _mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArray:
+def mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArray:
     """Return (n_nodes, 2) normals: mean by length of a part's elements that meet at a node, zero elsewhere."""
     elements = solution.mesh.part(part)
     total = np.zeros_like(solution.boundary.points)

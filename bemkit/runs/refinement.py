@@ -1,0 +1,136 @@
+"""Solve on one mesh after the other until the accuracy asked for is reached; of one body or of several."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+from bemkit.errors import BemkitError, InputError
+from bemkit.results.solution import AnySolution, with_totals
+from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
+from bemkit.solvers.base import Status
+
+
+class SizedLevel(Protocol):
+    """What is solved next, by whatever a `Refinement` keeps of it."""
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements, of all bodies."""
+        ...
+
+
+AnyLevel = TypeVar("AnyLevel", bound=SizedLevel)
+
+
+class Refinement(Protocol[AnyLevel, AnySolution]):
+    """How a level is solved, judged and refined."""
+
+    def solved(self, level: AnyLevel, start: AnySolution | None) -> AnySolution:
+        """Solve a level, from the solution of the level before where that helps."""
+        ...
+
+    def error(self, solution: AnySolution) -> float:
+        """Return the estimated error; infinite without an estimate."""
+        ...
+
+    def shown_error(self, solution: AnySolution) -> str:
+        """Return the estimated errors in words."""
+        ...
+
+    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
+        """Tell whether the last of the solutions is as accurate as it shall be."""
+        ...
+
+    def following(self, level: AnyLevel, solutions: Sequence[AnySolution]) -> AnyLevel | None:
+        """Return the next level, its meshes made; None if that would not help."""
+        ...
+
+    def excess(self, level: AnyLevel, most_elements: int) -> str:
+        """Say, for a message, which number of elements a level exceeds; empty if it does not."""
+        ...
+
+    def expected_seconds(self, level: AnyLevel, solution: AnySolution, spent: float) -> float:
+        """Return how long a level will take, after a solution that took `spent` seconds."""
+        ...
+
+
+def required_accuracy(options: MeshOptions) -> float:
+    """Return the accuracy of mesh options; an error without one."""
+    if options.accuracy is None:
+        raise InputError("mesh.accuracy is missing: give one, such as MeshOptions(accuracy=1e-3)")
+    return options.accuracy
+
+
+def refined(
+    first: AnyLevel, refinement: Refinement[AnyLevel, AnySolution], options: MeshOptions
+) -> tuple[AnySolution, ...]:
+    """Solve level after level until the accuracy of the options is reached or cannot be.
+
+    Returns
+    -------
+    tuple of Solution or AssemblySolution
+        One for each mesh, the best one last; see `bemkit.runs.adaptive.run_adaptive`.
+
+    Raises
+    ------
+    ValueError
+        If there is no accuracy, or the first level cannot be solved.
+    """
+    begin, accuracy = time.perf_counter(), required_accuracy(options)
+    most_elements = MOST_ELEMENTS if options.most_elements is None else options.most_elements
+    level, obstacle = first, ""
+    solutions: list[AnySolution] = []
+    while not obstacle:
+        started = time.perf_counter()
+        try:
+            solution = refinement.solved(level, solutions[-1] if solutions else None)
+        except BemkitError as error:
+            if not solutions:
+                raise
+            obstacle = f"{level.n_elements} elements cannot be solved ({error})"
+            break
+        solutions.append(solution)
+        now = time.perf_counter()
+        if not solution.is_converged:
+            obstacle = f"the solve on {solution.n_elements} elements failed"
+        elif refinement.is_enough(solutions):
+            break
+        else:
+            try:
+                following = refinement.following(level, solutions)
+            except BemkitError as error:
+                obstacle = f"no finer mesh can be made ({error})"
+                break
+            if following is None:
+                obstacle = "the estimated error no longer falls"
+                break
+            level = following
+            if excess := refinement.excess(level, most_elements):
+                obstacle = f"more than {excess} would be needed"
+            elif options.most_seconds is not None:
+                expected = refinement.expected_seconds(level, solution, now - started)
+                if now - begin + expected > options.most_seconds:
+                    obstacle = f"more than {options.most_seconds:g} s would be needed"
+    return _best_last(solutions, obstacle, accuracy, refinement)
+
+
+def _best_last(
+    solutions: Sequence[AnySolution], obstacle: str, accuracy: float, refinement: Refinement[AnyLevel, AnySolution]
+) -> tuple[AnySolution, ...]:
+    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for."""
+    converged = (solution for solution in solutions if solution.is_converged)
+    best = min(converged, key=refinement.error, default=solutions[-1])
+    message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
+    status = best.status
+    if obstacle:
+        message = (
+            f"The accuracy {accuracy:g} was not reached: {obstacle}; estimated error {refinement.shown_error(best)}; "
+            f"allow more elements or time, or ask for less. {message}"
+        )
+        status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
+    names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
+    others = [solution for solution in solutions if solution is not best]
+    return (*others, replace(with_totals(best, solutions, names), status=status, message=message))
