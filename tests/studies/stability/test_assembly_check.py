@@ -179,3 +179,28 @@ def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
     assert overlap(displacement) < 0.02
     assert overlap(turned) < 0.02  # a thousand times the displacements, all along the wall
     assert overlap(displacement - np.array([0.0, strained])) > 0.2
+
+
+def beside_one_that_carries_nothing(traction: float) -> AssemblySolution:
+    """A block resting on another without any load, beside those of `solved`, and a traction written between them."""
+    loaded = solved().assembly
+    far = bk.Body(name="far", shape=bk.Rectangle(1.0, 1.0), material=MATERIAL, placement=bk.Placement((0.2, 5.0)))
+    near = bk.Body(
+        name="near",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=MATERIAL,
+        parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
+        placement=bk.Placement((0.0, 4.0)),
+    )
+    pair = bk.ContactPair(("far.bottom", "near.top"), law=bk.Coulomb(0.25))
+    small = [replace(body, mesh=bk.MeshOptions(elements=20)) for body in (far, near)]
+    solution = bk.run(replace(loaded, bodies=(*loaded.bodies, *small), contacts=(*loaded.contacts, pair)))
+    rows = solution.contact.rows(pair.name)
+    table = replace(solution.contact, sigma_n=np.where(rows, traction, solution.contact.sigma_n))
+    return replace(solution, contact=table)
+
+
+def test_bodies_that_carry_nothing_are_not_judged_by_their_round_off() -> None:
+    """A pull of 1e-15 of the load is round-off of the others, beside nothing at all; 1e-6 of it is a fault."""
+    assert check_assembly(beside_one_that_carries_nothing(1e-15)).faults == ()
+    assert "tension" in check_assembly(beside_one_that_carries_nothing(1e-6)).faults

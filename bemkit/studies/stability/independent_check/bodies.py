@@ -23,6 +23,7 @@ from bemkit.studies.stability.independent_check.balance import (
     motions_at,
     negative_energy,
     reciprocity_mismatch,
+    strained_displacement,
     support_mismatch,
 )
 from bemkit.studies.stability.independent_check.boundary import Boundary, Scales, boundary_of, scales_of
@@ -81,6 +82,20 @@ class MeasuredBody:
         boundary = replace(boundary, traction=traction)
         nodes = contact_nodes_of(alone, boundary)
         return cls(result, Fields(alone, None, boundary, nodes, scales_of(alone)), is_touched)
+
+    @property
+    def largest_stress(self) -> float:
+        """The larger of its unit and of what its strains are worth [Pa]: heat strains a free body without tractions."""
+        alone = self.fields.solution
+        strain = float(np.abs(strained_displacement(alone)).max()) / self.result.mesh.diameter
+        return max(self.scales.stress, strain * alone.scene.material.plane_modulus)
+
+    def measured_by(self, least: float) -> MeasuredBody:
+        """Return the body with units of a stress [Pa] at least, and of the displacement that it causes."""
+        scales = self.scales
+        length = least * self.result.mesh.diameter / self.result.scene.material.plane_modulus
+        larger = scales._replace(stress=max(scales.stress, least), length=max(scales.length, length))
+        return replace(self, fields=self.fields._replace(scales=larger))
 
     @property
     def boundary(self) -> Boundary:
@@ -153,6 +168,7 @@ class MeasuredBody:
         work = np.einsum("eqc,eqcm->eqm", forces, motions_at(alone, boundary.points))
         inside = inner_work(alone, boundary)
         size = float(np.abs(forces).sum()) + float(np.abs(inside).sum())
+        size += 1e-6 * self.scales.stress * float(boundary.shares.sum())
         return abs(float(work[..., 2].sum() + inside[2])) / size if size > 0.0 else 0.0
 
 

@@ -1,169 +1,138 @@
-"""Two sides of a contact, measured on each other: distance, relative displacement and overlap, by points of their own.
-
-Where both sides are straight, the mean relative displacement is integrated without error, by pieces on which both
-fields are polynomials. Where they are curved, points are only looked up among many on the other side.
-"""
+"""The contacts of a solved assembly, the bodies that they join, and the units by which both are measured."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.laws import FrictionLaw
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.contact_table import ContactTable
+from bemkit.scene.assembly import ContactPair
 from bemkit.studies.stability.independent_check.bodies import MeasuredBody
+from bemkit.studies.stability.independent_check.boundary import trusted_stress
+from bemkit.studies.stability.independent_check.check import Measured, measure
+from bemkit.studies.stability.independent_check.nodes import mean_normals
+from bemkit.studies.stability.independent_check.sides import Side
 
-_PARALLEL = 1e-9
-_STEP = 1e-4
-"""Difference of local coordinates by which slopes are taken."""
-_N_SAMPLES = 33
-"""Points on an element of a curved side."""
-_N_NEAREST = 3
-"""Of these, from which the place that a point looks at is sought."""
-_BESIDE = 1e-6
-"""Share of an element by which that place may lie beside the direction."""
+LIGHTEST = 1e-3
+"""Bodies that carry less than this share of the largest stress of the assembly are measured by this share."""
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """Elements of one body in a contact."""
-
-    body: MeasuredBody
-    elements: IntArray
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether the elements lie on one line."""
-        mesh, normals = self.body.result.mesh, self._normals
-        return bool(mesh.is_straight[self.elements].all()) and float(np.abs(normals - normals[0]).max()) < _PARALLEL
-
-    @property
-    def _normals(self) -> FloatArray:
-        return self.body.boundary.normals[self.elements].reshape(-1, 2)
-
-    @property
-    def normal(self) -> FloatArray:
-        """(2,) array: of a flat side."""
-        return np.asarray(self._normals.mean(axis=0))
-
-    def displacement(self, row: IntArray, xi: FloatArray) -> FloatArray:
-        """Return displacements (n, 2) at xi (n,) of the elements at the positions `row` (n,)."""
-        result = self.body.result
-        space = result.scene.discretisation.displacement_space(result.mesh)
-        nodal = result.boundary.displacement[space.element_dofs[self.elements[row]]]
-        return np.asarray(np.einsum("ln,nlc->nc", space.basis(xi), nodal))
-
-
-@dataclass(frozen=True)
-class Relative:
-    """What is measured of two flat sides.
+class Joints:
+    """The contacts of an assembly and the bodies that they join.
 
     Parameters
     ----------
-    length : float [m]
-        That both share.
-    distance : float [m]
-    means : (2,) array [m^2]
-        Integral of the displacement of the first side relative to the second one along its normal and tangent.
-    overlap : float [m]
-        The deepest at any point.
+    solution : AssemblySolution
+    bodies : mapping of str to MeasuredBody
+    pairs : mapping of str to ContactPair
+        By name, those between bodies.
+    owner : mapping of str to str
+        The side ``"body.part"`` whose nodes each contact of the table has.
     """
 
-    length: float
-    distance: float
-    means: FloatArray
-    overlap: float
+    solution: AssemblySolution
+    bodies: Mapping[str, MeasuredBody]
+    pairs: Mapping[str, ContactPair]
+    owner: Mapping[str, str]
 
+    @classmethod
+    def of(cls, solution: AssemblySolution) -> Joints:
+        """Measure the bodies of a solution, and find whose nodes the rows of its table are."""
+        pairs = {pair.name: pair for pair in solution.assembly.contacts}
+        touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
+        for pair in pairs.values():
+            for body, part in (side.split(".", 1) for side in pair.sides):
+                touched[body].append(part)
+        alone = {name: MeasuredBody.of(body, tuple(touched[name])) for name, body in solution.bodies.items()}
+        most = max(body.largest_stress for body in alone.values())
+        bodies = {name: body.measured_by(LIGHTEST * most) for name, body in alone.items()}
+        joints = cls(solution, bodies, pairs, {})
+        owner = {name: joints._owner(pairs[name]) if name in pairs else name for name in solution.contact.parts}
+        return cls(solution, bodies, pairs, owner)
 
-def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
-    """Measure two flat sides that face each other; None of others.
+    def _owner(self, pair: ContactPair) -> str:
+        """Return the side on which all nodes of a contact lie, out of whose body the directions point."""
+        table, own = self.solution.contact, self.solution.contact.rows(pair.name)
+        points, directions = np.column_stack([table.x, table.y])[own], self.solution.contact_directions[own]
+        misses = []
+        for name in pair.sides:
+            side = self.side(name)
+            nodes = np.unique(side.body.boundary.nodes[side.elements])
+            normals = mean_normals(side.body.fields.solution, side.body.boundary, name.split(".", 1)[1])[nodes]
+            apart = np.linalg.norm(points[:, None] - side.body.result.boundary.points[nodes], axis=2)
+            facing = np.sum(normals[apart.argmin(axis=1)] * directions, axis=1)
+            misses.append(float(apart.min(axis=1).max() / side.body.result.mesh.diameter + np.mean(facing < 0.0)))
+        return pair.sides[int(np.argmin(misses))]
 
-    Parameters
-    ----------
-    one, two : Side
-    gap : float [m]
-        Added to their distance.
-    """
-    if not (one.is_flat and two.is_flat) or one.normal @ two.normal > -1.0 + _PARALLEL:
-        return None
-    normal = one.normal / np.hypot(*one.normal)
-    tangent = np.array([-normal[1], normal[0]])
-    meshes = one.body.result.mesh, two.body.result.mesh
-    origin = meshes[0].start[one.elements[0]]
-    ends = [
-        (mesh.start[side.elements] - origin, mesh.end[side.elements] - origin)
-        for mesh, side in zip(meshes, (one, two), strict=True)
-    ]
-    places = [(start @ tangent, end @ tangent) for start, end in ends]
-    distance = float((ends[1][0] @ normal).mean())
-    low = max(float(np.min(place)) for place in places)
-    high = min(float(np.max(place)) for place in places)
-    knots = np.unique(np.concatenate([np.concatenate(p) for p in places]))
-    knots = np.concatenate([[low], knots[(knots > low) & (knots < high)], [high]])
-    if not high > low:
-        return None
-    xi, weights = np.polynomial.legendre.leggauss(12)
-    half = 0.5 * np.diff(knots)[:, None]
-    at = (knots[:-1, None] + half * (1.0 + xi)).ravel()
-    shares = (half * weights).ravel()
-    values = []
-    for side, (start, end) in zip((one, two), places, strict=True):
-        first, last = np.minimum(start, end), np.maximum(start, end)
-        order = np.argsort(first)
-        row = order[np.clip(np.searchsorted(first[order], at, side="right") - 1, 0, order.size - 1)]
-        inside = (at >= first[row]) & (at <= last[row] + 1e-9 * (last[row] - first[row]))
-        if not inside.all():
-            return None  # the side has a hole
-        local = 2.0 * (at - start[row]) / (end[row] - start[row]) - 1.0
-        values.append(side.displacement(row, np.clip(local, -1.0, 1.0)))
-    relative = values[0] - values[1]
-    along = np.stack([relative @ normal, relative @ tangent], axis=1)
-    overlap = float(np.max(along[:, 0] - distance - gap, initial=0.0))
-    return Relative(high - low, distance, shares @ along, overlap)
+    def side(self, name: str) -> Side:
+        """Return the side ``"body.part"``."""
+        body, part = name.split(".", 1)
+        return Side(self.bodies[body], self.bodies[body].result.mesh.part(part))
 
+    def partner(self, name: str) -> str | None:
+        """Return the side without the nodes, None of an obstacle."""
+        if name not in self.pairs:
+            return None
+        one, two = self.pairs[name].sides
+        return two if one == self.owner[name] else one
 
-def sampled_overlap(one: Side, two: Side, gap: float, reach: float) -> float:
-    """Return how deep [m] points of one side are in the other one, by the place there that they look at.
+    def _law(self, name: str) -> FrictionLaw:
+        if name in self.pairs:
+            return self.solution.assembly.law_of(self.pairs[name])
+        body, part = name.split(".", 1)
+        return self.solution.bodies[body].scene.laws[part]
 
-    Parameters
-    ----------
-    one, two : Side
-    gap : float [m]
-        Added to their distance.
-    reach : float [m]
-        Points farther apart than this do not face each other.
-    """
-    mesh, boundary = two.body.result.mesh, one.body.boundary
-    xi = np.linspace(-1.0, 1.0, _N_SAMPLES)
-    rows = np.repeat(np.arange(two.elements.size), _N_SAMPLES)
-    samples = mesh.points(two.elements, xi).reshape(-1, 2)
-    every = boundary.points[one.elements].reshape(-1, 2)
-    # an end belongs to two elements, and either may be the one
-    distance, nearest = (np.ravel(found) for found in cKDTree(samples).query(every, k=_N_NEAREST))
-    points = np.repeat(every, _N_NEAREST, axis=0)
-    normals = np.repeat(boundary.normals[one.elements].reshape(-1, 2), _N_NEAREST, axis=0)
-    displacement = boundary.interpolated(one.body.result.boundary.displacement)[one.elements]
-    motion = np.repeat(displacement.reshape(-1, 2), _N_NEAREST, axis=0)
-    row, place = rows[nearest], np.tile(xi, two.elements.size)[nearest]
-    element = two.elements[row]
+    def units(self) -> tuple[FloatArray, FloatArray]:
+        """Return (n_contact,) lengths [m] and stresses [Pa] by which each row is measured."""
+        length, stress = np.ones((2, self.solution.contact.n_contact))
+        for name in self.solution.contact.parts:
+            partner = self.partner(name)
+            sides = [side for side in (self.owner[name], partner) if side is not None]
+            bodies = [self.bodies[side.split(".", 1)[0]] for side in sides]
+            scales = [body.scales for body in bodies]
+            # a body that moves far passes on what is round-off there
+            trusted = max(trusted_stress(body.fields.solution) for body in bodies)
+            rows = self.solution.contact.rows(name)
+            length[rows] = max(each.length for each in scales)
+            stress[rows] = max(min(each.stress for each in scales), trusted)
+        return length, stress
 
-    def facing(at: FloatArray) -> FloatArray:
-        return np.asarray(normals - mesh.normals_at(element, at[:, None])[:, 0])
+    def measured(self, before: AssemblySolution | None) -> Measured:
+        """Return the contact quantities that the laws speak of."""
+        table, units = self.solution.contact, self.units()
+        points = np.column_stack([table.x, table.y])
+        slip = table.u_t if before is None else table.u_t - before.contact.u_t
+        parts = []
+        for name in table.parts:
+            rows = table.rows(name)
+            columns: dict[str, Any] = {key: column[rows] for key, column in table.columns().items()}
+            own = ContactTable((name,) * int(rows.sum()), **columns)
+            law = self._law(name).at(points[rows])
+            supported = self._is_supported(name)
+            parts.append(measure(own, law, own.u_n, slip[rows], supported, (units[0][rows], units[1][rows])))
+        order = np.argsort(np.concatenate([np.flatnonzero(table.rows(name)) for name in table.parts]))
+        entries = ([getattr(part, entry.name) for part in parts] for entry in fields(Measured))
+        return Measured(*(np.concatenate(entry)[order] for entry in entries))
 
-    def beside(at: FloatArray, along: FloatArray) -> FloatArray:
-        offset = mesh.points(element, at[:, None])[:, 0] - points
-        return np.asarray(along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0])
-
-    faces = (np.hypot(*facing(place).T) > 1.7) & (distance < reach)  # at most 60 degrees off
-    for _ in range(8):
-        direction = facing(place)
-        direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
-        slope = (beside(place + _STEP, direction) - beside(place - _STEP, direction)) / (2.0 * _STEP)
-        place = np.clip(place - beside(place, direction) / np.where(slope == 0.0, 1.0, slope), -1.0, 1.0)
-    direction = facing(place)
-    direction /= np.maximum(np.hypot(*direction.T), 0.1)[:, None]
-    offset = mesh.points(element, place[:, None])[:, 0] - points
-    faces &= np.abs(beside(place, direction)) < _BESIDE * np.maximum(mesh.lengths[element], distance)
-    overlap = np.sum((motion - two.displacement(row, place) - offset) * direction, axis=1) - gap
-    return float(np.max(overlap[faces], initial=0.0))
+    def _is_supported(self, name: str) -> BoolArray:
+        """Tell which nodes of a contact a support holds, or another obstacle of the body shares."""
+        side, table = self.side(self.owner[name]), self.solution.contact
+        points = np.column_stack([table.x, table.y])[table.rows(name)]
+        nodes = side.body.supported_nodes()
+        if name not in self.pairs:
+            others = [
+                side.body.boundary.nodes[side.body.result.mesh.part(part.name)].ravel()
+                for part in side.body.result.scene.contact_parts
+                if f"{side.body.result.name}.{part.name}" != name
+            ]
+            nodes = np.unique(np.concatenate([nodes, *others]))
+        at = side.body.result.boundary.points[nodes]
+        apart = np.linalg.norm(points[:, None] - at, axis=2).min(axis=1, initial=np.inf)
+        return np.asarray(apart <= 1e-9 * side.body.result.mesh.diameter)

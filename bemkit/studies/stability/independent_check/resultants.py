@@ -1,0 +1,68 @@
+"""Forces on the sides and bodies of a solved assembly, and its balances of forces and energy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.studies.stability.independent_check.joints import Joints
+
+
+def forces(joints: Joints) -> dict[str, tuple[FloatArray, float]]:
+    """Return the resultant (2,) and size [N/m] of the forces on each side of the table."""
+    table, found = joints.solution.contact, dict[str, tuple[FloatArray, float]]()
+    normal = joints.solution.contact_directions
+    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
+    acting = table.weight[:, None] * (table.sigma_n[:, None] * normal + table.sigma_t[:, None] * tangent)
+    for name in table.parts:
+        own = acting[table.rows(name)]
+        for side, sign in ((joints.owner[name], 1.0), (joints.partner(name), -1.0)):
+            if side is not None:
+                force, size = found.get(side, (np.zeros(2), 0.0))
+                found[side] = force + sign * own.sum(axis=0), size + float(np.abs(own).sum())
+    return found
+
+
+def reaction_mismatch(joints: Joints) -> float:
+    """Return the largest difference [-] of what the elements of a side feel from what its contacts transmit."""
+    worst = [0.0]
+    for name, (force, size) in forces(joints).items():
+        side = joints.side(name)
+        felt, felt_size = side.body.force_on(side.elements)
+        unit = size + felt_size + side.body.scales.stress * float(side.body.boundary.lengths.min())
+        if not np.isin(side.body.boundary.nodes[side.elements], side.body.supported_nodes()).any():
+            worst.append(float(np.abs(felt - force).max()) / unit)
+    return float(np.max(worst))
+
+
+def largest_imbalance(joints: Joints) -> float:
+    """Return the largest resultant on a body [-], of its loads, contacts and forces inside."""
+    total = {name: (np.zeros(2), 0.0) for name in joints.bodies}
+    for name, (force, size) in forces(joints).items():
+        body = name.split(".", 1)[0]
+        total[body] = total[body][0] + force, total[body][1] + size
+    return max(body.imbalance(*total[name]) for name, body in joints.bodies.items())
+
+
+def energy_mismatch(joints: Joints) -> float:
+    """Return the difference [-] of the elastic energy from half the work of loads and contacts.
+
+    As for one body nothing is compared where displacements are given or forces act inside.
+    """
+    work = size = 0.0
+    for body in joints.bodies.values():
+        given = any(np.any(held.values != 0.0) for held in body.boundary.held)
+        if body.result.scene.body_forces or given:
+            return 0.0
+        is_load = ~body.is_touched
+        for elements, _, _ in body.boundary.held:
+            is_load[elements] = False
+        forces = np.where(is_load[:, None], body.boundary.shares, 0.0)[..., None] * body.boundary.traction
+        each = forces * body.boundary.interpolated(body.result.boundary.displacement)
+        work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
+        motion = float(np.abs(body.result.boundary.displacement).max())
+        size += 1e-3 * body.scales.stress * (body.scales.length + 1e-3 * motion) * body.result.mesh.diameter
+    table = joints.solution.contact
+    each = table.weight[:, None] * np.column_stack([table.sigma_n * table.u_n, table.sigma_t * table.u_t])
+    work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
+    return abs(joints.solution.energy - work) / size if size > 0.0 else 0.0
