@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep``.
+"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep | verify``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
-_STUDIES = {"stability": "study", "study": "study", "sweep": "sweep"}
+_STUDIES = {"stability": "study", "study": "study", "sweep": "sweep", "verify": "verify"}
 """Commands that are loaded only when they are asked for, and their modules."""
 
 

@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from bemkit.reference.column import uniaxial_strain_modulus
 from bemkit.reference.compare import Answer, Places, Reference, Zone
 from bemkit.reference.disc import DiscBetweenPlates
 from bemkit.reference.pressure import places_along
@@ -66,9 +67,7 @@ def _uniform_slip(scene: Scene) -> Reference:
 def _gravity_column(scene: Scene) -> Reference:
     """Return the state of uniaxial strain of a column between smooth walls, p = weight * (height - y)."""
     width, height, gap, weight = 2.0, 10.0, 1e-4, 2400.0 * 9.81
-    material = scene.material
-    modulus = 2.0 * material.shear_modulus * (1.0 - material.poisson_ratio) / (1.0 - 2.0 * material.poisson_ratio)
-    energy = width * weight**2 * height**3 / (6.0 * modulus)
+    energy = width * weight**2 * height**3 / (6.0 * uniaxial_strain_modulus(scene.material))
     s, length = places_along(width, ())
     one = np.ones_like(s)
     pressure = weight * height

@@ -1,0 +1,46 @@
+"""The command ``bemkit verify``."""
+
+from __future__ import annotations
+
+import sys
+from functools import partial
+
+import click
+
+from bemkit.atomic_files import reserved
+from bemkit.results.outputs import JSON_START, Outputs, TextFile
+from bemkit.studies.engine import compute_with_progress
+from bemkit.studies.verification.records import FILE, Verification
+from bemkit.studies.verification.report import MARKDOWN_START, print_verification, to_markdown
+from bemkit.studies.verification.verification import verify as verify_cases
+
+MISSED = 1
+
+
+@click.command()
+@click.argument("names", nargs=-1)
+@click.option("--quick", is_flag=True, help="Leave out the finest resolutions: at most one minute.")
+@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
+@click.option("--json", "json_file", metavar="FILE", help="Write the rows as JSON; - is standard output.")
+@click.option("--markdown", metavar="FILE", help="Write the table as Markdown; - is standard output.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor the table.")
+def verify(
+    names: tuple[str, ...], quick: bool, output: str | None, json_file: str | None, markdown: str | None, quiet: bool
+) -> int:
+    """Compare solutions with closed forms and other known answers at several resolutions.
+
+    NAMES choose cases, such as westergaard or 'pin*'; all by default. The exit code is 1 if one is missed.
+    """
+    texts = (
+        TextFile(json_file, "JSON file", JSON_START, Verification.to_json),
+        TextFile(markdown, "Markdown file of a verification", MARKDOWN_START, to_markdown),
+    )
+    outputs = Outputs(texts)
+    click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
+    is_live = not quiet and sys.stderr.isatty()
+    run = partial(compute_with_progress, name="verification", is_live=is_live)
+    found = verify_cases(names, quick=quick, run=run, file=output)
+    outputs.write(found)
+    if not quiet and not outputs.uses_stdout:
+        print_verification(found)
+    return 0 if found.is_met else MISSED

@@ -1,0 +1,1 @@
+"""Every closed form of `bemkit.reference`, solved at several resolutions and compared."""

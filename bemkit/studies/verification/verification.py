@@ -1,0 +1,127 @@
+"""Solve problems with known answers at several resolutions and compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from bemkit.errors import InputError
+from bemkit.formulas import closest
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.studies.engine import Attempt, Task, attempt, compute
+from bemkit.studies.verification.case import Case
+from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.records import FILE, Verification, VerificationRecord, rows_of
+from bemkit.version import __version__
+
+LABELS = {"version": __version__}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All quantities of a case at one resolution: what one task computes."""
+
+    key: tuple[str, float]
+    records: tuple[VerificationRecord, ...]
+
+
+Run = Callable[[Sequence[Task[Comparison]]], Iterable[Comparison]]
+
+
+def verify(
+    names: Sequence[str] = (),
+    *,
+    quick: bool = False,
+    run: Run = compute,
+    file: str | Path | None = None,
+    cases: Mapping[str, Callable[[], Case]] = CASES,
+) -> Verification:
+    """Compare with closed forms and other known answers.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of cases, with ``*`` for any letters; all by default.
+    quick : bool
+        Leave out the finest resolutions.
+    run : callable (tasks) -> records
+        `bemkit.studies.engine.compute`, or with a progress bar `compute_with_progress`.
+    file : str or Path, optional
+        Where records are kept (HDF5) as soon as they exist; those already in it are not computed again.
+    cases : mapping of str to callable
+        What there is to verify, by default all of bemkit's own; each is made when it is needed.
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    InputError
+        If a name fits no case.
+    OutputFileError, ResultFileError
+        If the file cannot be written or read, or is of another version of bemkit.
+    """
+    chosen = {name: cases[name]() for name in selected(names, tuple(cases))}
+    finished = FILE.finished(file, LABELS)
+    tasks = []
+    for name, case in chosen.items():
+        for resolution in case.resolutions[: case.n_quick if quick else None]:
+            keys = [(name, quantity.name, resolution) for quantity in case.quantities]
+            if not all(key in finished for key in keys):
+                tasks.append(
+                    Task((name, resolution), f"{name}, {resolution:g}", partial(compare, name, case, resolution))
+                )
+    known = {key for name, case in chosen.items() for key in _keys(name, case, quick=quick)}
+    records = [record for key, record in finished.items() if key in known]
+    records += FILE.keep(file, _flat(run(tasks)), finished, LABELS)
+    return Verification(rows_of(chosen, records))
+
+
+def selected(names: Sequence[str], known: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the known names that fit one of the names given, all if none is; InputError for a name that fits none."""
+    for name in names:
+        if not any(fnmatchcase(each, name) for each in known):
+            raise InputError(f"{name!r} is no case: the cases are {', '.join(known)}{closest(name, known)}")
+    return tuple(each for each in known if not names or any(fnmatchcase(each, name) for name in names))
+
+
+def compare(name: str, case: Case, resolution: float) -> Comparison:
+    """Solve a case at one resolution and compare all its quantities."""
+    found: Attempt[Solution | AssemblySolution] = attempt(lambda: case.solve(resolution))
+    solution = found.solution
+    is_certified = solution is not None and solution.is_certified
+    records = []
+    for quantity in case.quantities:
+        value = float(quantity.measure(solution)) if is_certified else np.nan
+        error = quantity.error(value)
+        records.append(
+            VerificationRecord(
+                case=name,
+                quantity=quantity.name,
+                resolution=resolution,
+                n_elements=0 if solution is None else solution.n_elements,
+                value=value,
+                error=error if np.isfinite(error) else np.inf,
+                seconds=found.seconds,
+                message="" if is_certified else found.message,
+            )
+        )
+    return Comparison((name, resolution), tuple(records))
+
+
+def _keys(name: str, case: Case, *, quick: bool) -> Iterator[tuple[str, str, float]]:
+    for resolution in case.resolutions[: case.n_quick if quick else None]:
+        for quantity in case.quantities:
+            yield name, quantity.name, resolution
+
+
+def _flat(comparisons: Iterable[Comparison]) -> Iterator[VerificationRecord]:
+    for comparison in comparisons:
+        yield from comparison.records
