@@ -26,6 +26,7 @@ from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
@@ -81,8 +82,8 @@ class Model:
     def under(self, prepared: Prepared) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
-        Only a law with friction where this model's has none, or other directions of contact, make it condense the body
-        anew.
+        Only a law with friction where this model's has none, other directions of contact, or another drive of a
+        half-plane make it condense the body anew.
 
         Parameters
         ----------
@@ -94,7 +95,10 @@ class Model:
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
-        if stays.has_same_directions(self.contact) and not is_new_friction.any():
+        is_driven_alike = True
+        if isinstance(elastic, HalfPlaneElasticity) and prepared.drive != elastic.drive:
+            elastic, is_driven_alike = elastic.driven_by(prepared.drive), False
+        if is_driven_alike and stays.has_same_directions(self.contact) and not is_new_friction.any():
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
             # a node that has lost its friction stays what it is in the condensed body
             prepared = replace(prepared, conditions=body.conditions, contact=replace(stays, nodes=self.nodes))
@@ -148,7 +152,9 @@ class Model:
         return displacement * units.displacement, traction, energy * units.stress * units.displacement * units.length
 
     def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body."""
+        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+        if isinstance(self.elastic, HalfPlaneElasticity):
+            return self.elastic.strain_displacement(force), force
         inside = self.prepared.inside
         return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
 
@@ -196,6 +202,8 @@ def build_model(prepared: Prepared) -> Model:
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
     elastic = discretisation.elastic_map(mesh, prepared.material, prepared.linear_solver.solver)
+    if isinstance(elastic, HalfPlaneElasticity):
+        elastic = elastic.driven_by(prepared.drive)
     if prepared.inside is not None:
         elastic = HeavyElasticity(elastic, prepared.inside)
     body = contact_body(elastic, prepared)

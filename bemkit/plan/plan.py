@@ -134,7 +134,8 @@ def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterat
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
     yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
     if not sizes.n_motions and scene.symmetry is None:
-        yield PlanItem("exterior domain", True, "the body fills the outside of the boundary")
+        where = "outside of the boundary" if scene.shape.outline().surface is None else "half-plane below its surface"
+        yield PlanItem("exterior domain", True, f"the body fills the {where}")
     reason = "not asked for"
     if scene.symmetry is not None:
         reason = f"about {scene.symmetry}: {n} of {sizes.n_sources} elements carry unknowns"

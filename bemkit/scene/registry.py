@@ -110,6 +110,8 @@ SHAPES = Registry(
         "ring": "bemkit.geometry.shapes:Ring",
         "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
         "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
+        "half-plane": "bemkit.geometry.shapes:HalfPlaneBody",
+        "periodic-half-plane": "bemkit.geometry.shapes:PeriodicHalfPlaneBody",
     },
     "bemkit.shapes",
 )

@@ -1,0 +1,36 @@
+"""The elastic map of a half-plane, and what it takes."""
+
+from __future__ import annotations
+
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_work
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+
+_BYTES = 8
+
+
+def half_plane_map(mesh: BoundaryMesh, material: Material) -> HalfPlaneElasticity:
+    """Return the map of the half-plane whose surface the mesh is."""
+    return HalfPlaneElasticity(mesh, material)
+
+
+def half_plane_needs(case: BodyCase) -> BodyNeeds:
+    """Return what the map of a half-plane takes."""
+    n_dofs, n_acting = case.n_displacements, case.n_retained + case.n_fixed
+    of_surface = f"closed form: {n_dofs} x {n_dofs} means of logarithms and signs"
+    items = (
+        PlanItem("flexibility of the surface", True, of_surface),
+        PlanItem("elements inside, around or below", False, "the surface beyond the strip is free in closed form"),
+        PlanItem("double layer, hypersingular operator", False, "they vanish on a straight free surface"),
+        PlanItem("supports", case.n_fixed > 0, "the half-plane is held or driven far away"),
+    )
+    square = _BYTES * n_acting * n_acting
+    return BodyNeeds(
+        items=items,
+        work=half_plane_work(case.mesh.n_elements, n_acting),
+        memory=8 * _BYTES * n_dofs * n_dofs,
+        kept=2 * _BYTES * n_dofs * n_dofs + 2 * square,
+        evaluations=4.0 * case.mesh.n_elements**2,
+        flops=float(n_acting) ** 3 * 4.0 / 3.0,
+    )
