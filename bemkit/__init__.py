@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
     from bemkit.contact.polygon import PolygonalObstacle as PolygonalObstacle
+    from bemkit.contact.rough_profile import Profile as Profile
+    from bemkit.contact.rough_profile import SelfAffineProfile as SelfAffineProfile
     from bemkit.contact.signed_distance import SignedDistance as SignedDistance
     from bemkit.contact.spline import SplineObstacle as SplineObstacle
     from bemkit.errors import BemkitError as BemkitError
@@ -131,6 +133,7 @@ _HOME = {
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
+    "contact.rough_profile": ("Profile", "SelfAffineProfile"),
     "contact.signed_distance": ("SignedDistance",),
     "contact.spline": ("SplineObstacle",),
     "errors": ("BemkitError", "InputError", "NoResultError"),

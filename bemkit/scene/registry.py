@@ -166,6 +166,8 @@ OBSTACLES = Registry(
         "spline": "bemkit.contact.spline:SplineObstacle",
         "signed-distance": "bemkit.contact.signed_distance:SignedDistance",
         "gap": "bemkit.contact.obstacle:Gap",
+        "profile": "bemkit.contact.rough_profile:Profile",
+        "self-affine": "bemkit.contact.rough_profile:SelfAffineProfile",
     },
     "bemkit.obstacles",
 )
