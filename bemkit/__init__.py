@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from bemkit.contact.obstacle import HalfPlane as HalfPlane
     from bemkit.contact.obstacle import Obstacle as Obstacle
     from bemkit.contact.polygon import PolygonalObstacle as PolygonalObstacle
+    from bemkit.contact.rough_profile import Profile as Profile
+    from bemkit.contact.rough_profile import SelfAffineProfile as SelfAffineProfile
     from bemkit.contact.signed_distance import SignedDistance as SignedDistance
     from bemkit.contact.spline import SplineObstacle as SplineObstacle
     from bemkit.errors import BemkitError as BemkitError
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
     from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
+    from bemkit.geometry.shapes import HalfPlaneBody as HalfPlaneBody
+    from bemkit.geometry.shapes import PeriodicHalfPlaneBody as PeriodicHalfPlaneBody
     from bemkit.geometry.shapes import PlateWithHole as PlateWithHole
     from bemkit.geometry.shapes import Polygon as Polygon
     from bemkit.geometry.shapes import Rectangle as Rectangle
@@ -107,6 +111,7 @@ if TYPE_CHECKING:
     from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
     from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
     from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
+    from bemkit.scene.far_field import FarField as FarField
     from bemkit.scene.mesh_options import MeshOptions as MeshOptions
     from bemkit.scene.rigid_body import RigidBody as RigidBody
     from bemkit.scene.scene import Scene as Scene
@@ -128,6 +133,7 @@ _HOME = {
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
+    "contact.rough_profile": ("Profile", "SelfAffineProfile"),
     "contact.signed_distance": ("SignedDistance",),
     "contact.spline": ("SplineObstacle",),
     "errors": ("BemkitError", "InputError", "NoResultError"),
@@ -137,7 +143,10 @@ _HOME = {
     "geometry.meshing.discretise": ("discretise",),
     "geometry.placement": ("Placement",),
     "geometry.selection": ("Selection",),
-    "geometry.shapes": ("Disk", "ExteriorOf", "PlateWithHole", "Polygon", "Rectangle", "Ring", "Sector"),
+    "geometry.shapes": (
+        *("Disk", "ExteriorOf", "HalfPlaneBody", "PeriodicHalfPlaneBody", "PlateWithHole", "Polygon", "Rectangle"),
+        *("Ring", "Sector"),
+    ),
     "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
     "geometry.symmetry": ("Symmetry",),
     "operators.boundary": ("adjoint_double_layer", "assemble", "double_layer", "hypersingular", "mass", "single_layer"),
@@ -166,6 +175,7 @@ _HOME = {
     ),
     "scene.copies": ("CircleCopies", "GridCopies", "ListedCopies"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
+    "scene.far_field": ("FarField",),
     "scene.mesh_options": ("MeshOptions",),
     "scene.rigid_body": ("RigidBody",),
     "scene.scene": ("Scene",),

@@ -13,6 +13,7 @@ from bemkit.geometry.curves import Curve, MovedCurve, as_point, require_positive
 from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
 from bemkit.geometry.validity.loops import swept_areas
@@ -56,6 +57,8 @@ class BoundaryMesh:
         Whether the body is the plane outside of the loops, which then all run clockwise.
     symmetry : Symmetry, optional
         Lines on which the loops end; the rest of the body are images, see `whole`. A part may then be empty.
+    surface : Surface, optional
+        Given if the body is a half-plane, an exterior: its elements are a straight strip.
 
     Raises
     ------
@@ -77,11 +80,12 @@ class BoundaryMesh:
     element_span: FloatArray | None = None
     is_exterior: bool = False
     symmetry: Symmetry | None = None
+    surface: Surface | None = None
 
     def __post_init__(self) -> None:
         nodes = np.array(self.nodes, dtype=float)
         elements = as_index(self.elements, "elements")
-        check_chains(nodes, elements, self.symmetry)
+        check_chains(nodes, elements, self.symmetry, is_strip=self.surface is not None)
         if self.symmetry is not None:
             nodes = self.symmetry.snapped(nodes)
         self._keep("nodes", nodes)
@@ -95,7 +99,9 @@ class BoundaryMesh:
             check_curves(nodes, elements, self.curves, self._curve_index, self._span)
         parts = check_parts(self.parts, len(elements), may_be_empty=self.symmetry is not None)
         object.__setattr__(self, "parts", MappingProxyType(parts))
-        if self.symmetry is None:
+        if self.surface is not None:
+            self.surface.check(nodes, elements, self.is_exterior and self.symmetry is None)
+        elif self.symmetry is None:
             check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
         else:
             check_half(self.symmetry, nodes, elements, self.is_exterior)
@@ -112,7 +118,7 @@ class BoundaryMesh:
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the constructor takes: a mesh from elsewhere is validated like any other."""
         content = self._content._replace(parts=dict(self.parts))
-        return BoundaryMesh, (*content, self.is_exterior, self.symmetry)
+        return BoundaryMesh, (*content, self.is_exterior, self.symmetry, self.surface)
 
     @property
     def whole(self) -> "BoundaryMesh":
@@ -131,7 +137,7 @@ class BoundaryMesh:
 
     @property
     def n_nodes(self) -> int:
-        """Number of nodes: of elements, and one more for each chain of elements between symmetry lines."""
+        """Number of nodes: of elements, and one more for each chain between symmetry lines and for a half-plane."""
         return len(self.nodes)
 
     @property
@@ -157,8 +163,7 @@ class BoundaryMesh:
     @cached_property
     def lengths(self) -> FloatArray:
         """(n_elements,) array [m]: arc lengths."""
-        lengths = self._pieces.chord_length
-        curved = np.flatnonzero(~self.is_straight)
+        lengths, curved = self._pieces.chord_length, np.flatnonzero(~self.is_straight)
         xi, weights = gauss_legendre(_N_LENGTH_POINTS)
         lengths[curved] = self.jacobian(curved, xi) @ weights
         return _frozen(lengths)
@@ -183,7 +188,7 @@ class BoundaryMesh:
     def node_elements(self) -> IntArray:
         """(n_nodes, 2) int array: the element that ends and the element that starts at each node.
 
-        On a symmetry line both are the one element there, whose image goes on.
+        On a symmetry line both are the one element there, whose image goes on, as at the ends of a half-plane.
         """
         pairs = np.empty((self.n_nodes, 2), dtype=np.intp)
         pairs[self.elements] = np.arange(self.n_elements)[:, None, None]
@@ -195,11 +200,12 @@ class BoundaryMesh:
     def loops(self) -> tuple[IntArray, ...]:
         """For each closed loop its elements in order, starting at the smallest, or at a symmetry line.
 
-        Of loops that are images of each other there is one.
+        Of loops that are images of each other there is one; of a half-plane its strip.
         """
-        loops = (
-            follow_loops(self.elements) if self.symmetry is None else restrict_loops(self.whole.loops, self.elements)
-        )
+        if self.surface is not None:
+            return (_frozen(np.arange(self.n_elements)),)
+        symmetric = self.symmetry is not None
+        loops = restrict_loops(self.whole.loops, self.elements) if symmetric else follow_loops(self.elements)
         return tuple(_frozen(loop) for loop in loops)
 
     @cached_property
@@ -291,7 +297,7 @@ class BoundaryMesh:
         -------
         BoundaryMesh
             Both halves take the place of the element in its parts and in the order of elements; curved elements are
-            halved on their curve.
+            halved on their curve. The surface of a half-plane is divided anew instead.
         """
         marked = as_index(marked, "marked")
         if marked.size and not (marked.min() >= 0 and marked.max() < self.n_elements):
@@ -325,7 +331,7 @@ class BoundaryMesh:
             nodes = symmetry.snapped(nodes)
         curves = tuple(MovedCurve(curve, shift, factor) for curve in self.curves)
         content = self._content._replace(nodes=_frozen(nodes), curves=curves)
-        return (*content, self.is_exterior, symmetry)
+        return (*content, self.is_exterior, symmetry, self.surface)
 
     @cached_property
     def unit(self) -> "BoundaryMesh":
@@ -335,7 +341,8 @@ class BoundaryMesh:
 
     def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> "BoundaryMesh":
         """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
-        return _unchecked((*self._content._replace(nodes=_frozen(nodes), curves=curves), self.is_exterior, None))
+        moved = self._content._replace(nodes=_frozen(nodes), curves=curves)
+        return _unchecked((*moved, self.is_exterior, None, self.surface))
 
     @cached_property
     def _unfolded(self) -> "BoundaryMesh":

@@ -8,6 +8,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.surface import Surface
 from bemkit.geometry.validity.chords import RESOLUTION, make_pieces, resolution
 from bemkit.geometry.validity.loops import check_loops
 from bemkit.geometry.vectors import check_magnitude, norms
@@ -48,6 +49,9 @@ class Outline:
         holes run clockwise.
     is_exterior : bool
         Whether the body is the plane outside of the loops, which then all run clockwise.
+    surface : Surface, optional
+        Given if the body is a half-plane: the only loop is then one straight side with the body on its left, and stays
+        open.
 
     Raises
     ------
@@ -58,6 +62,7 @@ class Outline:
 
     loops: tuple[tuple[Side, ...], ...]
     is_exterior: bool = False
+    surface: Surface | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loops", tuple(tuple(loop) for loop in self.loops))
@@ -67,6 +72,10 @@ class Outline:
         for name in names:
             if names.count(name) > 1:
                 raise GeometryError(f"Outline: {names.count(name)} sides are named {name!r}: give each its own name")
+        if self.surface is not None:
+            if len(names) != 1 or not self.sides[0].curve.is_straight:
+                raise GeometryError(f"Outline: a half-plane has the sides {', '.join(names)}: give one straight side")
+            return
         start, end = self._ends()
         loop_of_side = np.repeat(np.arange(len(self.loops)), [len(loop) for loop in self.loops])
         curves = tuple(side.curve for side in self.sides)

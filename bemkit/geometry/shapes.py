@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.geometry.curves import Arc, Segment, as_point, require_positive, reverse_curve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.surface import Surface
 
 _QUADRANTS = np.pi / 2 * np.arange(5)
 
@@ -246,6 +247,68 @@ class ExteriorOf:
         """Return the loop of the shape, reversed."""
         (loop,) = self.shape.outline().loops
         return Outline((_reversed_loop(loop),), is_exterior=True)
+
+
+@dataclass(frozen=True)
+class HalfPlaneBody:
+    """The elastic half-plane y < 0; its only side, surface, is the strip of y = 0 that may carry tractions.
+
+    The rest of its surface is free. The shorter the strip, the more of the elements lie where something happens.
+
+    Parameters
+    ----------
+    left, right : float [m]
+        Ends of the strip; it runs from the right to the left, with the body on its left and the normal upward.
+
+    Notes
+    -----
+    In the plane a force displaces the surface like the logarithm of the distance, without a limit. What is at rest here
+    is the surface at the distance ``right - left`` from a force: any other place differs by a rigid motion.
+    """
+
+    left: float
+    right: float
+
+    def __post_init__(self) -> None:
+        (left, right) = as_point((self.left, self.right), "HalfPlaneBody: left and right")
+        if left >= right:
+            raise GeometryError(f"HalfPlaneBody: left is {left}, not less than right, {right}: give the left end first")
+
+    def outline(self) -> Outline:
+        """Return the strip."""
+        return _strip(self.left, self.right, Surface())
+
+
+@dataclass(frozen=True)
+class PeriodicHalfPlaneBody:
+    """The elastic half-plane y < 0 under what repeats with a period; its only side, surface, is one period of y = 0.
+
+    Parameters
+    ----------
+    period : float [m]
+    left : float [m]
+        Where the period begins.
+
+    Notes
+    -----
+    Far below, the body moves like the mean of its surface: displacements count from there.
+    """
+
+    period: float
+    left: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive("PeriodicHalfPlaneBody", period=self.period)
+        as_point((self.left, self.left + self.period), "PeriodicHalfPlaneBody: left and right end")
+
+    def outline(self) -> Outline:
+        """Return one period."""
+        return _strip(self.left, self.left + self.period, Surface(is_periodic=True))
+
+
+def _strip(left: float, right: float, surface: Surface) -> Outline:
+    side = Side("surface", Segment((right, 0.0), (left, 0.0)))
+    return Outline(((side,),), is_exterior=True, surface=surface)
 
 
 def _polygon_loop(vertices: tuple[tuple[float, float], ...], names: tuple[str, ...]) -> tuple[Side, ...]:

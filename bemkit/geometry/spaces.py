@@ -275,7 +275,8 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
     owner = np.full(mesh.n_elements, -1)
     for number, name in enumerate(mesh.parts):
         owner[mesh.part(name)] = number
-    changes = owner[mesh.node_elements[:, 0]] != owner[mesh.node_elements[:, 1]]
+    before, after = mesh.node_elements.T
+    changes = (owner[before] != owner[after]) | (before == after)  # the same only at the ends of a half-plane
     breaks: BoolArray = corner_nodes(mesh) | changes
     read_only(breaks)
     return breaks

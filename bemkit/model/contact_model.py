@@ -16,6 +16,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
@@ -26,6 +27,8 @@ from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
+from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
@@ -42,7 +45,7 @@ class Model:
     prepared : Prepared
     elastic : SteklovPoincare
         Dimensionless.
-    body : CondensedBody or UntouchedBody
+    body : CondensedBody, PeriodicBody or UntouchedBody
     problem : ContactProblem
         Where supports hold contact nodes along the tangent its law is frictionless; see
         `bemkit.model.solved_contact.with_held_friction`.
@@ -50,7 +53,7 @@ class Model:
 
     prepared: Prepared
     elastic: SteklovPoincare
-    body: CondensedBody | UntouchedBody
+    body: CondensedBody | PeriodicBody | UntouchedBody
     problem: ContactProblem
 
     @property
@@ -81,8 +84,8 @@ class Model:
     def under(self, prepared: Prepared) -> Model:
         """Return the same body under the loads, obstacles and law of another scene; nothing is factored again.
 
-        Only a law with friction where this model's has none, or other directions of contact, make it condense the body
-        anew.
+        Only a law with friction where this model's has none, other directions of contact, or another drive of a
+        half-plane make it condense the body anew.
 
         Parameters
         ----------
@@ -94,7 +97,10 @@ class Model:
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
-        if stays.has_same_directions(self.contact) and not is_new_friction.any():
+        is_driven_alike = True
+        if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity) and prepared.drive != elastic.drive:
+            elastic, is_driven_alike = elastic.driven_by(prepared.drive), False
+        if is_driven_alike and stays.has_same_directions(self.contact) and not is_new_friction.any():
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
             # a node that has lost its friction stays what it is in the condensed body
             prepared = replace(prepared, conditions=body.conditions, contact=replace(stays, nodes=self.nodes))
@@ -148,7 +154,9 @@ class Model:
         return displacement * units.displacement, traction, energy * units.stress * units.displacement * units.length
 
     def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body."""
+        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+            return self.elastic.strain_displacement(force), force
         inside = self.prepared.inside
         return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
 
@@ -196,14 +204,18 @@ def build_model(prepared: Prepared) -> Model:
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
     elastic = discretisation.elastic_map(mesh, prepared.material, prepared.linear_solver.solver)
+    if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity):
+        elastic = elastic.driven_by(prepared.drive)
     if prepared.inside is not None:
         elastic = HeavyElasticity(elastic, prepared.inside)
     body = contact_body(elastic, prepared)
     return Model(prepared, elastic, body, _problem(prepared, body))
 
 
-def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody | UntouchedBody:
+def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody | PeriodicBody | UntouchedBody:
     """Return a body as contact sees it: condensed onto its contact nodes, if there are any."""
+    if isinstance(elastic, PeriodicElasticity):
+        return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
         return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     check_held(prepared)
@@ -211,11 +223,11 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody 
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)
 
 
-def _problem(prepared: Prepared, body: CondensedBody | UntouchedBody) -> ContactProblem:
+def _problem(prepared: Prepared, body: CondensedBody | PeriodicBody | UntouchedBody) -> ContactProblem:
     return ContactProblem(body, prepared.contact.gap / prepared.units.displacement, _law(prepared, body))
 
 
-def _law(prepared: Prepared, body: CondensedBody | UntouchedBody) -> FrictionLaw:
+def _law(prepared: Prepared, body: CondensedBody | PeriodicBody | UntouchedBody) -> FrictionLaw:
     contact = prepared.contact
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return law.scaled(prepared.units.stress)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_model import Model
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
@@ -34,6 +35,8 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         The same unless the condensed stiffness has a negative direction or the work of all forces is negative.
     """
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
+        return result
+    if isinstance(model.body, PeriodicBody):  # positive wave by wave
         return result
     displacement, force = model.map_fields(*model.body.recover(result.state))
     is_symmetric = model.scene.discretisation.is_symmetric

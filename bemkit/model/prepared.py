@@ -7,7 +7,7 @@ p and displacements by p L / E'.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import zip_longest
 
@@ -22,6 +22,7 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.model.particular import particular_solution, stress_of
+from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov
@@ -122,6 +123,10 @@ def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[floa
     """
     loads, motions, gaps = [0.0], [0.0], [0.0]
     loads += [stress_of(force, mesh, scene.material) for force in scene.body_forces]
+    if scene.far is not None:
+        of_turn = np.array([1.0, 1.0, length])
+        loads.append(float(np.abs(scene.far.load / of_turn).max()) / length)
+        motions.append(float(np.abs(scene.far.motion * of_turn).max()))
     places = np.array([-1.0, 0.0, 1.0])
     for part, elements, normals in parts_on(scene, mesh):
         points, normals = mesh.points(elements, places).reshape(-1, 2), np.repeat(normals, places.size, axis=0)
@@ -182,6 +187,18 @@ def dimensionless_load(load: Traction | Pressure, units: Units) -> TractionField
     return field
 
 
+def far_drive(scene: Scene, units: Units) -> FarDrive:
+    """Return how a half-plane moves far away, in the units given; at rest if the scene says nothing of it."""
+    far = scene.far
+    if far is None:
+        return FarDrive()
+    motion = far.motion / (units.displacement, units.displacement, units.displacement / units.length)
+    load = far.load / (units.stress * units.length * np.array([1.0, 1.0, units.length]))
+    centre = (np.array(far.centre) - units.centre) / units.length
+    driven = tuple(np.flatnonzero(far.is_driven).tolist())
+    return FarDrive(driven, *(tuple(each.tolist()) for each in (motion, load, centre)))
+
+
 @dataclass(frozen=True, eq=False)
 class Prepared:
     """What a scene says on a mesh, dimensionless but for the mesh and the columns of the contact data.
@@ -205,6 +222,8 @@ class Prepared:
         Given nodal forces.
     inside : ForcesInside or None
         What acts inside the body; None if nothing does.
+    drive : FarDrive
+        How a half-plane moves far away.
     """
 
     scene: Scene
@@ -216,6 +235,7 @@ class Prepared:
     contact: ContactData
     force: FloatArray
     inside: ForcesInside | None = None
+    drive: FarDrive = field(default_factory=FarDrive)
 
     @property
     def material(self) -> Material:
@@ -302,11 +322,13 @@ def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared,
 
 def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> Prepared:
     candidates = find_contact(scene, mesh, space)
-    conditions, nodes = contact_conditions(space, supports_on(scene, mesh, units, space), candidates.nodes)
+    drive = far_drive(scene, units)
+    supports = supports_on(scene, mesh, units, space)
+    conditions, nodes = contact_conditions(space, supports, candidates.nodes, drive.driven)
     force = nodal_forces(scene, mesh, space, units)
     solution = particular_solution(scene, mesh, units.modulus, units.stress)
     inside = None if solution is None else ForcesInside.of(solution, space)
-    return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside)
+    return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
 
 
 def _check_position(mesh: BoundaryMesh) -> None:
@@ -331,12 +353,18 @@ def check_same_body(scene: Scene, other: Scene) -> None:
     for name in ("shape", "material", "symmetry", "discretisation"):
         if getattr(scene, name) != getattr(other, name):
             raise InputError(f"{name} is {getattr(other, name)}: keep {getattr(scene, name)}, or build a new model")
+    if _driven(scene) != _driven(other):
+        raise InputError("far drives other motions: change numbers only, or build a new model")
     if [type(force) for force in scene.body_forces] != [type(force) for force in other.body_forces]:
         raise InputError("body_forces change their kinds or order: change numbers only, or build a new model")
     for part, changed in zip_longest(scene.parts, other.parts):
         if part is None or changed is None or _layout(part) != _layout(changed):
             name = (part or changed).name
             raise InputError(f"part {name!r} changes its place or its kind: change numbers only, or build a new model")
+
+
+def _driven(scene: Scene) -> list[bool]:
+    return [] if scene.far is None else scene.far.is_driven.tolist()
 
 
 def _layout(part: Part) -> tuple[object, ...]:

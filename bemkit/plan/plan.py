@@ -134,7 +134,8 @@ def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterat
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
     yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
     if not sizes.n_motions and scene.symmetry is None:
-        yield PlanItem("exterior domain", True, "the body fills the outside of the boundary")
+        where = "outside of the boundary" if scene.shape.outline().surface is None else "half-plane below its surface"
+        yield PlanItem("exterior domain", True, f"the body fills the {where}")
     reason = "not asked for"
     if scene.symmetry is not None:
         reason = f"about {scene.symmetry}: {n} of {sizes.n_sources} elements carry unknowns"
@@ -267,6 +268,8 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
 
 def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
     """Return the largest memory: of the body while it is made, or of body and contact system together [bytes]."""
+    if needs.is_matrix_free:
+        return needs.memory
     r, c = sizes.n_open, sizes.n_contact_unknowns
     rows = 2 * sizes.n_contact * c  # the contact system before tangents without friction are taken out
     return max(needs.memory, needs.kept + int(_BYTES * (r * r + r * c + 4.2 * rows)))
@@ -274,6 +277,8 @@ def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
 
 def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
     c, u = sizes.n_contact_unknowns, sizes.n_displacements
+    if needs.is_matrix_free:
+        c = u = 0
     of_step = 2.0 / 3.0 * c**3 + _FLOPS_PER_NUMBER * (60.0 * c * c + u * u) if c else 0.0
     flops = needs.flops + _CONTACT_STEPS * n_steps * of_step
     return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * needs.evaluations + _SECONDS_PER_FLOP * flops
@@ -293,7 +298,8 @@ def check_memory(plan: Plan) -> None:
 def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
-    Memory grows with the square of that number: the plan for a small mesh tells what a large one takes.
+    Memory grows with the square of that number: the plan for a small mesh tells what a large one takes. A periodic
+    half-plane has no matrices.
 
     Raises
     ------
@@ -301,7 +307,8 @@ def check_elements(scene: Scene) -> None:
         As `check_memory`.
     """
     n_elements = scene.mesh.elements
-    if n_elements is None or n_elements <= _MANY:
+    surface = scene.shape.outline().surface
+    if n_elements is None or n_elements <= _MANY or (surface is not None and surface.is_periodic):
         return
     small = replace(scene, mesh=replace(scene.mesh, elements=_FEW))
     plan = make_plan(small, small.build_mesh())

@@ -200,12 +200,14 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     slip = contact.u_t if slip is None else slip
     changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and are_neighbours(contact, i)]
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
-    found = []
-    for i, s in zip(changes, _kept_apart(contact, changes, places).tolist(), strict=True):
-        rows = contact.rows(contact.part[i])
-        x, y = (float(np.interp(s, contact.s[rows], column[rows])) for column in (contact.x, contact.y))
-        found.append(Transition(contact.part[i], x, y, s, words[i], words[i + 1]))
-    return tuple(found)
+    kept, x, y = _kept_apart(contact, changes, places), np.zeros(len(changes)), np.zeros(len(changes))
+    parts = [contact.part[i] for i in changes]
+    for part in dict.fromkeys(parts):
+        own, rows = np.equal(parts, part), contact.rows(part)
+        for place, column in ((x, contact.x), (y, contact.y)):
+            place[own] = np.interp(kept[own], contact.s[rows], column[rows])
+    at = zip(parts, x.tolist(), y.tolist(), kept.tolist(), changes, strict=True)
+    return tuple(Transition(*place, words[i], words[i + 1]) for *place, i in at)
 
 
 def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:

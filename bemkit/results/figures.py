@@ -155,7 +155,7 @@ def draw_body(
 
 
 def outlines(space: BoundarySpace, displacement: FloatArray, factor: float) -> list[FloatArray]:
-    """Return the closed loops (n, 2) of a body moved by a multiple of its displacement, curves as fine as the eye."""
+    """Return the closed loops (n, 2), or the strip, of a body moved by a multiple of its displacement."""
     mesh = space.mesh
     n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
     xi = np.linspace(-1.0, 1.0, n_points)[:-1]
@@ -168,6 +168,9 @@ def outlines(space: BoundarySpace, displacement: FloatArray, factor: float) -> l
         values = np.einsum("pq,epc->eqc", shares, at_start)
     moved = moved + factor * values
     loops = [moved[loop].reshape(-1, 2) for loop in mesh.loops]
+    if mesh.surface is not None:
+        last = mesh.nodes[-1] + factor * at_mesh_nodes(space, displacement)[-1]
+        return [np.concatenate([*loops, [last]])]
     return [np.concatenate([loop, loop[:1]]) for loop in loops]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bemkit.errors import InputError
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
@@ -31,7 +32,14 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
     Displacements and tractions are those of the spaces of the discretisation (constant tractions in files of older
     versions). Inside, their error decays quickly with the distance from the boundary. Within about one element length
     of it, stresses are those of the piecewise data, with peaks at the ends of elements: see `InteriorFields`.
+
+    Raises
+    ------
+    InputError
+        If the body is a half-plane.
     """
+    if solution.mesh.surface is not None:
+        raise InputError("the body is a half-plane, of which only the surface is known: take a block for fields inside")
     mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
     has_dofs = len(boundary.traction_dofs) > mesh.n_elements
     space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))

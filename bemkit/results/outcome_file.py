@@ -12,6 +12,7 @@ from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.hdf5 import Reader, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
@@ -129,7 +130,8 @@ def read_fields(
 def _write_mesh(group: h5py.Group, mesh: BoundaryMesh) -> None:
     lines = {} if mesh.symmetry is None else {"symmetry_x": mesh.symmetry.x, "symmetry_y": mesh.symmetry.y}
     lines = {name: place for name, place in lines.items() if place is not None}
-    group.attrs.update({"is_exterior": int(mesh.is_exterior), **lines})
+    strip = {} if mesh.surface is None else {"is_periodic": int(mesh.surface.is_periodic)}
+    group.attrs.update({"is_exterior": int(mesh.is_exterior), **lines, **strip})
     group["nodes"] = mesh.nodes
     group["elements"] = mesh.elements.astype(np.int64)
     if mesh.element_curve is not None and mesh.element_span is not None:
@@ -157,6 +159,7 @@ def _read_mesh(reader: Reader, place: str, curves: Callable[[], tuple[Curve, ...
         element_span=reader.floats(f"{place}/element_span") if is_curved else None,
         is_exterior=bool(marks["is_exterior"]),
         symmetry=None if x is None and y is None else Symmetry(x=x, y=y),
+        surface=Surface(bool(marks["is_periodic"])) if "is_periodic" in marks else None,
     )
 
 

@@ -18,6 +18,7 @@ from bemkit.geometry.spaces import (
     break_nodes,
     check_degree,
 )
+from bemkit.operators.half_plane import half_plane_map, half_plane_needs
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
@@ -121,12 +122,16 @@ class SymmetricGalerkin(Discretisation, Protocol):
         return True
 
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
-        """Return the Galerkin map of the two spaces."""
+        """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
+        if mesh.surface is not None:
+            return half_plane_map(mesh, material)
         displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
         return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what the Galerkin map takes."""
+        if case.mesh.surface is not None:
+            return half_plane_needs(case)
         degree = self.displacement_space(case.mesh).degree
         return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
 
@@ -136,6 +141,7 @@ class Galerkin(SymmetricGalerkin):
     """Symmetric Galerkin: displacements continuous and of degree p, tractions of degree p - 1 on each element.
 
     Tractions are constant on each element for p = 1, else continuous except at corners and at ends of boundary parts.
+    Half-planes, whose tractions displace their surface in closed form, take p = 1 alone.
     Contact conditions hold at the nodes of the displacements, the Gauss-Lobatto points of each element.
 
     Parameters
@@ -175,7 +181,12 @@ class Galerkin(SymmetricGalerkin):
         return QuadraticGalerkin() if number == 0 and self.takes_layers else self
 
     def displacement_space(self, mesh: BoundaryMesh) -> BoundarySpace:
-        """Return the continuous functions of the degree; the nodes of the mesh are their first dofs."""
+        """Return the continuous functions of the degree; the nodes of the mesh are their first dofs.
+
+        On the surface of a half-plane tractions alone are unknown functions, and displacements their means on elements.
+        """
+        if mesh.surface is not None:
+            return ConstantSpace(mesh)
         return LagrangeSpace(mesh, degree=self.degree)
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:

@@ -47,7 +47,8 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
         bodies = tuple(replace(body, **_scaled(body, factor)) for body in scene.bodies)
         rigid = tuple(body.scaled(factor) for body in scene.rigid)
         return replace(scene, bodies=bodies, rigid=rigid, load_factors=(1.0,))
-    return replace(scene, **_scaled(scene, factor), load_factors=(1.0,))
+    far = None if scene.far is None else scene.far.scaled(factor)
+    return replace(scene, **_scaled(scene, factor), far=far, load_factors=(1.0,))
 
 
 def _scaled(loaded: Scene | Body, factor: float) -> dict[str, Any]:

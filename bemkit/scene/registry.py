@@ -110,6 +110,8 @@ SHAPES = Registry(
         "ring": "bemkit.geometry.shapes:Ring",
         "plate-with-hole": "bemkit.geometry.shapes:PlateWithHole",
         "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
+        "half-plane": "bemkit.geometry.shapes:HalfPlaneBody",
+        "periodic-half-plane": "bemkit.geometry.shapes:PeriodicHalfPlaneBody",
     },
     "bemkit.shapes",
 )
@@ -164,6 +166,8 @@ OBSTACLES = Registry(
         "spline": "bemkit.contact.spline:SplineObstacle",
         "signed-distance": "bemkit.contact.signed_distance:SignedDistance",
         "gap": "bemkit.contact.obstacle:Gap",
+        "profile": "bemkit.contact.rough_profile:Profile",
+        "self-affine": "bemkit.contact.rough_profile:SelfAffineProfile",
     },
     "bemkit.obstacles",
 )

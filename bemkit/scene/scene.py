@@ -27,6 +27,7 @@ from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
+from bemkit.scene.far_field import FarField, check_half_plane
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames
@@ -65,6 +66,8 @@ class Scene:
         x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
     body_forces : tuple of BodyForce
         What acts inside the body: gravity, rotation, heating.
+    far : FarField, optional
+        Of a half-plane: how it moves far away, or what drives it there. It rests there by default.
     discretisation : Discretisation
     linear_solver : LinearSolver or Automatic
         How the displacements of the body away from the contact boundary are solved for.
@@ -93,6 +96,7 @@ class Scene:
     load_factors: tuple[float, ...] = (1.0,)
     symmetry: Symmetry | None = None
     body_forces: tuple[BodyForce, ...] = ()
+    far: FarField | None = None
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
@@ -121,6 +125,7 @@ class Scene:
                 "1e-6, or a fixed degree"
             )
         outline = self.shape.outline()
+        check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "

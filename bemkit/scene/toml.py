@@ -27,7 +27,7 @@ MAX_BYTES = 1_000_000
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "mesh", "parts"),
+    *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "far", "mesh", "parts"),
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),

@@ -140,7 +140,7 @@ class TransformedShape:
             tuple(Side(side.name, _transformed_curve(side.curve, self.affine)) for side in loop)
             for loop in outline.loops
         )
-        return Outline(loops, outline.is_exterior)
+        return Outline(loops, outline.is_exterior, outline.surface)
 
 
 def transformed_scene(

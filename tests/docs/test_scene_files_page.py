@@ -16,6 +16,7 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import registry as kinds
 from bemkit.scene.conditions import Part
+from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
@@ -41,6 +42,7 @@ TABLES = {
     "Units": UnitNames,
     "Material": Material,
     "Parts": Part,
+    "Half-planes": FarField,
     "Symmetry": Symmetry,
     "Mesh": MeshOptions,
 }

@@ -95,7 +95,7 @@ def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatA
 
 
 def contact_conditions(
-    space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes
+    space: BoundarySpace, supports: Sequence[Support], candidates: ContactNodes, driven: tuple[int, ...] = ()
 ) -> tuple[NodalConditions, ContactNodes]:
     """Find what is known at every node of a space: held by a support, retained for contact, or free.
 
@@ -106,6 +106,8 @@ def contact_conditions(
     supports : sequence of Support
     candidates : ContactNodes
         Nodes that may touch, whatever holds them.
+    driven : tuple of int
+        Rigid motions that forces far away drive; see `NodalConditions`.
 
     Returns
     -------
@@ -120,7 +122,7 @@ def contact_conditions(
     ConflictingSupportsError
         If supports contradict each other at a node.
     """
-    conditions = supported(space, supports)
+    conditions = replace(supported(space, supports), driven=driven)
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
     approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
     contact = candidates.take(approach > APPROACH_TOLERANCE)

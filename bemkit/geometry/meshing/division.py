@@ -127,7 +127,7 @@ class Division:
         ends = np.arange(1, after[-1] + 1)
         following = self.following
         ends[after - 1] = (after - counts)[following]
-        loose = np.flatnonzero(following < 0)  # on a symmetry line
+        loose = np.flatnonzero(following < 0)  # on a symmetry line, or at the end of a half-plane
         ends[after[loose] - 1] = after[-1] + np.arange(len(loose))
         nodes += [outline.sides[self.pieces[k].side].curve.point(parameters[k][-1:]) for k in loose.tolist()]
         return BoundaryMesh(
@@ -139,18 +139,22 @@ class Division:
             np.concatenate([np.column_stack([s[:-1], s[1:]]) for s in parameters]) if is_curved.any() else None,
             outline.is_exterior,
             self.symmetry,
+            outline.surface,
         )
 
     @property
     def following(self) -> IntArray:
-        """(n_pieces,) array: the piece that starts where each one ends; -1 on a symmetry line."""
+        """(n_pieces,) array: the piece that starts where each one ends; -1 on a symmetry line or at an end."""
         next_side = following_in_loops(np.array([len(sides) for sides in self.outline.loops]))
         starting = {(piece.side, piece.span[0]): k for k, piece in enumerate(self.pieces)}
         places = [
             (int(next_side[piece.side]), 0.0) if piece.span[1] == 1.0 else (piece.side, piece.span[1])
             for piece in self.pieces
         ]
-        return np.array([starting.get(place, -1) for place in places], dtype=np.intp)
+        following = np.array([starting.get(place, -1) for place in places], dtype=np.intp)
+        if self.outline.surface is not None:
+            following[-1] = -1
+        return following
 
 
 def _crossings(outline: Outline, symmetry: Symmetry) -> dict[int, list[float]]:

@@ -26,8 +26,10 @@ def as_index(values: npt.ArrayLike, name: str) -> IntArray:
     return array.astype(np.intp)
 
 
-def check_chains(nodes: FloatArray, elements: IntArray, symmetry: Symmetry | None = None) -> None:
-    """Raise unless the elements join finite, distinct nodes to chains, closed or between symmetry lines."""
+def check_chains(
+    nodes: FloatArray, elements: IntArray, symmetry: Symmetry | None = None, *, is_strip: bool = False
+) -> None:
+    """Raise unless the elements join finite, distinct nodes to chains: closed, between symmetry lines, or one strip."""
     for name, array in (("nodes", nodes), ("elements", elements)):
         if array.ndim != 2 or array.shape[1] != 2 or not len(array):
             raise GeometryError(f"BoundaryMesh: {name} has shape {array.shape}: give an array of shape (n, 2), n >= 2")
@@ -43,6 +45,8 @@ def check_chains(nodes: FloatArray, elements: IntArray, symmetry: Symmetry | Non
     is_joint = (n_starting == 1) & (n_ending == 1)
     if symmetry is not None:
         is_joint |= (n_starting + n_ending == 1) & symmetry.meets(nodes).any(axis=1)
+    if is_strip:
+        is_joint[[0, -1]] |= (n_starting + n_ending == 1)[[0, -1]]
     for node in np.flatnonzero(~is_joint):
         raise GeometryError(
             f"BoundaryMesh: node {node} at {format_point(nodes[node])} starts {n_starting[node]} and ends "

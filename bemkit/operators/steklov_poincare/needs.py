@@ -111,6 +111,8 @@ class BodyNeeds:
         Of dense linear algebra.
     warnings : tuple of str
         What will be doubtful about the result, one sentence each.
+    is_matrix_free : bool
+        Whether the contact problem has no matrix either: all of its work and memory is counted here.
     """
 
     items: tuple[PlanItem, ...] = ()
@@ -120,6 +122,7 @@ class BodyNeeds:
     evaluations: float = 0.0
     flops: float = 0.0
     warnings: tuple[str, ...] = ()
+    is_matrix_free: bool = False
 
 
 def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:

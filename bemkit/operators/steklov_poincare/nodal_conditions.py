@@ -72,12 +72,16 @@ class NodalConditions:
         The prescribed values, zero elsewhere.
     is_retained : (n_nodes, 2) bool array
         Directions that are kept as unknowns (contact); everything else is free: its force is known.
+    driven : tuple of int
+        Rigid motions (0 along x, 1 along y, 2 the turn) that a body at rest far away makes nevertheless, because forces
+        drive it there; none unless it is a half-plane.
     """
 
     frame: FloatArray
     is_fixed: BoolArray
     displacement: FloatArray
     is_retained: BoolArray
+    driven: tuple[int, ...] = ()
 
     @property
     def is_free(self) -> BoolArray:
@@ -259,12 +263,12 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     Returns
     -------
     (n_motions, n_nodes, 2) array
-        Linearly independent, of sizes about one; combinations of the `admissible_modes`.
+        Linearly independent, of sizes about one; combinations of the `admissible_modes` and of those driven.
     """
     points = dof_points(space)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     motions = rigid_motions(points, centre, float(np.ptp(points, axis=0).max()))
-    motions = motions[:, :, list(admissible_modes(space.mesh))]
+    motions = motions[:, :, [*admissible_modes(space.mesh), *conditions.driven]]
     fixed = np.einsum("nkc,ncm->nkm", conditions.frame, motions)[conditions.is_fixed]
     if fixed.size:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)

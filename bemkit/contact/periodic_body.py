@@ -1,0 +1,236 @@
+"""A periodic half-plane as contact sees it: responses by iterations with Fourier transforms, without a matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.condensation.nodes import ContactNodes, find_tangents
+from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.reduced_conditions import ReducedConditions, as_complex, as_pairs
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.equilibrium import Imbalance
+from bemkit.operators.half_plane.periodic import PeriodicElasticity
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+
+_ROUND_OFF = 4.0 * float(np.finfo(float).eps)
+"""Round-off of a displacement, relative to the largest; the shortest wave takes it for n times the tractions."""
+_LEAST_ACCURACY = 1e-12
+_RESTART, _MOST_RESTARTS = 100, 8
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicBody(LinearBody):
+    """The periodic half-plane with its contact nodes; fulfils `LinearBody`.
+
+    Parameters
+    ----------
+    elastic : PeriodicElasticity
+    conditions : NodalConditions
+        Without fixed directions.
+    nodes : ContactNodes
+    force : (n_nodes, 2) array [N/m]
+        Given nodal forces in x and y, beside the contact nodes.
+
+    Notes
+    -----
+    Unknown are the tractions that no condition gives, and the motions that forces far away drive. GMRES is
+    preconditioned by the tractions that would hold the same displacements of the whole surface, so that the number of
+    iterations depends on the pattern of contact and hardly on the number of nodes.
+    """
+
+    elastic: PeriodicElasticity
+    conditions: NodalConditions
+    nodes: ContactNodes
+    force: FloatArray
+
+    is_costly = True
+
+    @property
+    def weights(self) -> FloatArray:  # type: ignore[override]  # read-only here
+        """(n_contact,) array [m]: lengths of the elements."""
+        return self.nodes.weights
+
+    @property
+    def accuracy(self) -> float:  # type: ignore[override]
+        """What GMRES stops at."""
+        return max(_LEAST_ACCURACY, _ROUND_OFF * self.elastic.mesh.n_elements)
+
+    @property
+    def stiffness_scale(self) -> float:
+        """E' by the length of an element [Pa/m]."""
+        return self.elastic.material.plane_modulus / float(np.median(self.weights))
+
+    @property
+    def is_held(self) -> BoolArray:
+        """(n_contact,) bool array: no node is held by a support."""
+        return np.zeros(self.n_contact, bool)
+
+    @property
+    def work(self) -> OperationCounts:
+        """The order of the contact system, of which no matrix is formed."""
+        n_eliminated = int(np.count_nonzero(find_tangents(self.conditions, self.nodes)))
+        return OperationCounts(contact_unknowns=2 * self.n_contact - n_eliminated)
+
+    def under(self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None) -> PeriodicBody:
+        """Return the same body under other nodal forces."""
+        return replace(self, force=force)
+
+    @cached_property
+    def _turn(self) -> ComplexArray:
+        """(n_contact,) array: the complex number of the tangent of each contact frame."""
+        return self.elastic.to_complex(self.nodes.frame[:, 1])
+
+    def _on_surface(self, numbers: ComplexArray) -> ComplexArray:
+        """Return what contact nodes have in their frames on all elements, zero elsewhere."""
+        field = np.zeros(self.elastic.mesh.n_elements, complex)
+        field[self.nodes.nodes] = numbers * self._turn
+        return field
+
+    def _at_contact(self, field: ComplexArray) -> ComplexArray:
+        """Return a field on all elements at the contact nodes, in their frames."""
+        return np.asarray(field[self.nodes.nodes] * self._turn.conj())
+
+    @cached_property
+    def _motions(self) -> ComplexArray:
+        """(2, n_contact) array: unit motions along x and y."""
+        return self.elastic.axes[:, None] * self._turn.conj()
+
+    @property
+    def _driven(self) -> list[int]:
+        return list(self.elastic.drive.driven)
+
+    @cached_property
+    def _rest(self) -> ComplexArray:
+        """(n_contact,) array [m]: displacements under the given forces and motions alone."""
+        of_force = self.elastic.to_complex(self.elastic.strain_displacement(self.force))
+        motion = np.array(self.elastic.drive.motion[:2])
+        return np.asarray(self._at_contact(of_force) + motion @ self._motions)
+
+    def rigid_motions(self) -> FloatArray:
+        """Return the motions that forces far away drive."""
+        return as_pairs(self._motions[self._driven])
+
+    def rigid_load(self) -> FloatArray:
+        """Return these forces, with those given on the surface."""
+        total = np.array(self.elastic.drive.load[:2]) + self.force.sum(axis=0)
+        return np.asarray(total[self._driven])
+
+    def respond(self, conditions: LinearConditions) -> ContactState:
+        """Return the response by preconditioned GMRES; see `LinearBody.respond`."""
+        if len(conditions.free_motions(self.rigid_motions())):
+            raise SingularResponse("the contact conditions leave a rigid motion free")
+        reduced = ReducedConditions.of(conditions)
+        system = _System(self, reduced)
+        unknowns, motion = system.solved()
+        traction = reduced.tractions(unknowns)
+        displacement = self._rest + self._caused(traction) + motion @ self._motions[self._driven]
+        return ContactState(*reduced.met_exactly(as_pairs(displacement), as_pairs(traction)))
+
+    def _caused(self, traction: ComplexArray) -> ComplexArray:
+        return self._at_contact(self.elastic.displaced(self._on_surface(traction)))
+
+    def imbalance(self, state: ContactState) -> Imbalance:
+        """Return the tractions to be added so that the displacements are held, and the forces that are missing."""
+        traction, motions = as_complex(state.traction), self._motions[self._driven]
+        astray = as_complex(state.displacement) - self._rest - self._caused(traction)
+        if len(motions):
+            rows = np.concatenate([motions.real, motions.imag], axis=1)
+            moved = np.linalg.lstsq(rows.T, np.concatenate([astray.real, astray.imag]), rcond=None)[0]
+            astray = astray - moved @ motions
+        missing = self._at_contact(self.elastic.held(self._on_surface(astray)))
+        force = (self.weights * traction * motions.conj()).real.sum(axis=1) + self.rigid_load()
+        largest = float(np.abs(traction).max())
+        total = float(np.abs(self.weights * traction).sum())
+        if largest == 0.0:
+            return Imbalance(float(np.abs(missing).max() > 0.0), float(np.abs(force).max(initial=0.0) > 0.0))
+        # a uniform traction too much moves the surface as a driven motion does
+        on_motions = float(np.abs(force).max(initial=0.0)) / total
+        return Imbalance(max(float(np.abs(missing).max()) / largest, on_motions), on_motions, self.accuracy)
+
+    def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all elements, in x and y."""
+        lengths = self.elastic.mesh.lengths[:, None]
+        force = self.force + lengths * self.elastic.to_vectors(self._on_surface(as_complex(state.traction)))
+        displacement = self.elastic.strain_displacement(force)
+        astray = as_complex(state.displacement) - self._at_contact(self.elastic.to_complex(displacement))
+        moved = self.elastic.to_vectors(np.array([(astray * self._turn).mean()]))
+        displacement = displacement + moved
+        at_nodes = as_complex(state.displacement) * self._turn
+        displacement[self.nodes.nodes] = self.elastic.to_vectors(at_nodes)
+        return displacement, force
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """The equations for the tractions that no condition gives and for the driven motions, made nearly the identity."""
+
+    body: PeriodicBody
+    reduced: ReducedConditions
+
+    def solved(self) -> tuple[FloatArray, FloatArray]:
+        """Return unknown tractions (n_unknowns,) and driven motions (n_driven,)."""
+        from scipy.sparse.linalg import LinearOperator, gmres
+
+        body, reduced = self.body, self.reduced
+        known = reduced.tractions(np.zeros(reduced.n_unknowns))
+        right = reduced.value - reduced.rows(body._rest + body._caused(known), known)
+        load = -(body.rigid_load() + self._resultants(known))
+        n = reduced.n_unknowns
+        if n == 0:
+            return np.zeros(0), np.zeros(0)
+        right = self._nearly_solved(np.concatenate([right, load]))
+        operator = LinearOperator((right.size, right.size), lambda x: self._nearly_solved(self._left(x)), dtype=float)
+        solution, accuracy = np.zeros(right.size), body.accuracy
+        size = float(np.linalg.norm(right))
+        if size > 0.0:
+            tolerance = 0.1 * accuracy
+            solution, _ = gmres(operator, right, rtol=tolerance, atol=0.0, restart=_RESTART, maxiter=_MOST_RESTARTS)
+            left_over = float(np.linalg.norm(right - operator.matvec(solution))) / size
+            if not left_over <= accuracy:
+                raise SingularResponse(f"the iteration for a response stops at {left_over:.1e} of its right-hand side")
+        return solution[:n], solution[n:]
+
+    @property
+    def _motions(self) -> ComplexArray:
+        return self.body._motions[self.body._driven]
+
+    def _resultants(self, traction: ComplexArray) -> FloatArray:
+        """Return the work of tractions on the driven motions."""
+        return np.asarray((self.body.weights * traction * self._motions.conj()).real.sum(axis=1))
+
+    def _left(self, x: FloatArray) -> FloatArray:
+        """Return the left-hand sides of the equations."""
+        body, reduced = self.body, self.reduced
+        traction = reduced.changes(x[: reduced.n_unknowns])
+        displacement = body._caused(traction) + x[reduced.n_unknowns :] @ self._motions
+        return np.concatenate([reduced.rows(displacement, traction), self._resultants(traction)])
+
+    def _tractions_of(self, right: FloatArray) -> FloatArray:
+        """Return about the unknowns that have the left-hand sides given while no motion is driven."""
+        body, reduced = self.body, self.reduced
+        held = body._at_contact(body.elastic.held(body._on_surface(reduced.displacements(right))))
+        return reduced.unknowns(held, right, body.stiffness_scale)
+
+    @cached_property
+    def _for_motions(self) -> tuple[FloatArray, FloatArray]:
+        """Return tractions (n_unknowns, n_driven) that unit motions take, and the inverse of their work."""
+        reduced, nothing = self.reduced, np.zeros(self.body.n_contact, complex)
+        taken = [self._tractions_of(reduced.rows(motion, nothing)) for motion in self._motions]
+        works = [self._resultants(reduced.changes(each)) for each in taken]
+        return np.array(taken).T, np.asarray(np.linalg.inv(np.array(works).T))
+
+    def _nearly_solved(self, right: FloatArray) -> FloatArray:
+        """Return about the solution for given right-hand sides."""
+        n = self.reduced.n_unknowns
+        unknowns = self._tractions_of(right[:n])
+        if right.size == n:
+            return unknowns
+        taken, inverse = self._for_motions
+        motion = inverse @ (self._resultants(self.reduced.changes(unknowns)) - right[n:])
+        return np.concatenate([unknowns - taken @ motion, motion])

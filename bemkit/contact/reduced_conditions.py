@@ -1,0 +1,147 @@
+"""Two linear conditions a node, reduced to the tractions they leave open and the displacements they ask for.
+
+Pairs (n, t) are complex numbers here: the tangential component is the real part, the normal one the imaginary part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.contact.body import SingularResponse
+from bemkit.contact.conditions import LinearConditions
+
+
+def as_complex(pairs: FloatArray) -> ComplexArray:
+    """Return pairs (..., 2) of normal and tangential components as complex numbers."""
+    return np.asarray(pairs[..., 1] + 1j * pairs[..., 0])
+
+
+def as_pairs(numbers: ComplexArray) -> FloatArray:
+    """Return complex numbers as pairs (..., 2) of normal and tangential components."""
+    return np.stack([numbers.imag, numbers.real], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedConditions:
+    """Tractions ``t = given + sum of direction * unknown``, and one equation for each unknown.
+
+    Parameters
+    ----------
+    conditions : LinearConditions
+    is_of_traction : (n_contact, 2) bool array
+        Conditions that involve no displacement.
+    given : (n_contact,) complex array [Pa]
+        Tractions that such conditions give.
+    node : (n_unknowns,) int array
+        The node of each unknown; those with two unknowns come twice, one after the other.
+    direction : (n_unknowns,) complex array
+    on_displacement, on_traction : (n_unknowns,) complex arrays
+        The equation of each unknown, its factors of displacements of unit size.
+    value : (n_unknowns,) array [m]
+    """
+
+    conditions: LinearConditions
+    is_of_traction: BoolArray
+    given: ComplexArray
+    node: IntArray
+    direction: ComplexArray
+    on_displacement: ComplexArray
+    on_traction: ComplexArray
+    value: FloatArray
+
+    @classmethod
+    def of(cls, conditions: LinearConditions) -> ReducedConditions:
+        """Sort the conditions.
+
+        Raises
+        ------
+        SingularResponse
+            If conditions on the tractions of a node contradict each other or say nothing.
+        """
+        on_u, on_t = conditions.on_displacement, conditions.on_traction
+        is_of_traction = ~(on_u != 0.0).any(axis=2)
+        n_of_traction = is_of_traction.sum(axis=1)
+        given, along = np.zeros(len(on_u), complex), np.zeros(len(on_u), complex)
+        both, one = np.flatnonzero(n_of_traction == 2), np.flatnonzero(n_of_traction == 1)
+        try:
+            given[both] = as_complex(np.asarray(np.linalg.solve(on_t[both], conditions.value[both][..., None]))[..., 0])
+        except np.linalg.LinAlgError as error:
+            raise SingularResponse("two conditions on the traction of a contact node are not independent") from error
+        row = np.argmax(is_of_traction[one], axis=1)
+        factor = as_complex(on_t[one, row])
+        if not np.abs(factor).all():
+            raise SingularResponse("a condition at a contact node involves neither displacement nor traction")
+        given[one] = conditions.value[one, row] * factor / np.abs(factor) ** 2
+        # at right angles to the factor; with a positive normal component where there is one
+        along[one] = 1j * factor / np.abs(factor)
+        along[one] *= np.where(along[one].imag < 0.0, -1.0, 1.0)
+        node, equation = np.nonzero(~is_of_traction)
+        direction = np.where(n_of_traction[node] == 1, along[node], np.where(equation == 0, 1j, 1.0))
+        size = np.hypot(*on_u[node, equation].T)
+        return cls(
+            conditions,
+            is_of_traction,
+            given,
+            node,
+            direction,
+            as_complex(on_u[node, equation]) / size,
+            as_complex(on_t[node, equation]) / size,
+            conditions.value[node, equation] / size,
+        )
+
+    @property
+    def n_unknowns(self) -> int:
+        """Tractions that are left open."""
+        return self.node.size
+
+    def _summed(self, numbers: ComplexArray) -> ComplexArray:
+        """Add up what the unknowns of each node have, (n_contact,)."""
+        n = self.given.size
+        parts = (np.bincount(self.node, part, n) for part in (numbers.real, numbers.imag))
+        real, imaginary = parts
+        return np.asarray(real + 1j * imaginary)
+
+    def changes(self, unknowns: FloatArray) -> ComplexArray:
+        """Return the tractions (n_contact,) of the unknowns alone."""
+        return self._summed(self.direction * unknowns)
+
+    def tractions(self, unknowns: FloatArray) -> ComplexArray:
+        """Return all tractions (n_contact,)."""
+        return self.given + self.changes(unknowns)
+
+    def rows(self, displacement: ComplexArray, traction: ComplexArray) -> FloatArray:
+        """Return the left-hand sides (n_unknowns,) of the equations."""
+        of_displacement = self.on_displacement.conj() * displacement[self.node]
+        return np.asarray((of_displacement + self.on_traction.conj() * traction[self.node]).real)
+
+    def displacements(self, rows: FloatArray) -> ComplexArray:
+        """Return displacements (n_contact,) that have these left-hand sides, as small as they can be."""
+        return self._summed(self.on_displacement * rows)
+
+    def unknowns(self, traction: ComplexArray, rows: FloatArray, stiffness: float) -> FloatArray:
+        """Return the unknowns (n_unknowns,) in tractions that hold displacements with the left-hand sides `rows`.
+
+        Equations that involve tractions, too, are softer, each for itself, at the stiffness [Pa/m] of a node.
+        """
+        own = (self.direction.conj() * traction[self.node]).real
+        softer = (self.on_traction.conj() * self.direction).real
+        return np.asarray(np.where(softer == 0.0, own, rows * stiffness / (1.0 + np.abs(softer) * stiffness)))
+
+    def met_exactly(self, displacement: FloatArray, traction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and tractions (n_contact, 2) that meet conditions on one of them to the digit."""
+        conditions = self.conditions
+        for own in (0, 1):
+            on_u, on_t, value = (
+                conditions.on_displacement[:, own],
+                conditions.on_traction[:, own],
+                conditions.value[:, own],
+            )
+            gives_u = (on_u[:, own] != 0.0) & (on_u[:, 1 - own] == 0.0) & ~(on_t != 0.0).any(axis=1)
+            np.divide(value, on_u[:, own], out=displacement[:, own], where=gives_u)
+            rest = value - on_t[:, 1 - own] * traction[:, 1 - own]
+            gives_t = self.is_of_traction[:, own] & (on_t[:, own] != 0.0)
+            np.divide(rest, on_t[:, own], out=traction[:, own], where=gives_t)
+        return displacement, traction

@@ -1,0 +1,206 @@
+"""The half-plane as an elastic map: its flexibility, inverted where contact or supports act."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import ConstantSpace, dof_points
+from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.flexibility import strip_flexibility
+from bemkit.operators.linear.dense import Cholesky
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
+
+
+@dataclass(frozen=True, eq=False)
+class HalfPlaneElasticity:
+    """Elasticity of a half-plane seen from a strip of its surface; fulfils `SteklovPoincare`.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        The strip, in units of its length.
+    material : Material
+    drive : FarDrive
+        How the half-plane moves far away; it rests unless given.
+    kept : dict
+        The last condensation, to be used again under other loads.
+    """
+
+    mesh: BoundaryMesh
+    material: Material
+    drive: FarDrive = field(default_factory=FarDrive)
+    kept: dict[str, _Condensation] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def displacement_space(self) -> ConstantSpace:
+        """Means over elements."""
+        return ConstantSpace(self.mesh)
+
+    @property
+    def traction_space(self) -> ConstantSpace:
+        """Constants on elements."""
+        return self.displacement_space
+
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """(n_dofs, n_dofs) array [1/Pa]: forces to displacements, in x and y; see `strip_flexibility`."""
+        return strip_flexibility(self.mesh, self.material)
+
+    def driven_by(self, drive: FarDrive) -> HalfPlaneElasticity:
+        """Return the same half-plane under another drive; nothing is integrated or, if it can be, factored again."""
+        other = replace(self, drive=drive)
+        if "flexibility" in self.__dict__:
+            other.__dict__["flexibility"] = self.flexibility
+        return other
+
+    def strain_displacement(self, force: FloatArray) -> FloatArray:
+        """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
+        return np.asarray((self.flexibility @ force.ravel()).reshape(-1, 2))
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Solve for the forces on retained and fixed directions; see `SteklovPoincare.condense`."""
+        condensation = self.kept.get("condensation")
+        if condensation is None or not condensation.is_of(self.drive, conditions):
+            condensation = self.kept["condensation"] = _Condensation.of(self, conditions)
+        condensed = replace(condensation, drive=self.drive).under(force, conditions.displacement)
+        return replace(condensed, work=half_plane_work(self.mesh.n_elements, condensation.acting.size))
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
+        return np.asarray(force / self.mesh.lengths[:, None])[:, None, :]
+
+
+def half_plane_work(n_elements: int, n_acting: int) -> OperationCounts:
+    """Return what a condensation takes with `n_acting` directions that are retained or fixed."""
+    return OperationCounts(
+        element_pairs=n_elements**2,
+        single_layer=Entries.full(2 * n_elements, 2 * n_elements),
+        factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
+        right_hand_sides=n_acting,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Condensation:
+    """A half-plane whose forces on some directions are unknown.
+
+    With the flexibility F, unit motions R and their amounts q the displacements are ``u = F f + R q``. On the acting
+    directions, those retained or fixed, ``f = stiffness (u - F f_given - R q)``, and of the driven motions
+    ``R^T f = -load``.
+
+    Parameters
+    ----------
+    drive : FarDrive
+    conditions : NodalConditions
+    flexibility : (n_dofs, n_dofs) array [1/Pa]
+        In the frames of the nodes.
+    motions : (n_dofs, 3) array
+        In the frames of the nodes.
+    acting, retained : int arrays
+        Numbers of these directions, and which of the acting ones are retained.
+    stiffness : (n_acting, n_acting) array [Pa]
+        Of the acting directions while all motions are given.
+    """
+
+    drive: FarDrive
+    conditions: NodalConditions
+    flexibility: FloatArray
+    motions: FloatArray
+    acting: IntArray
+    retained: IntArray
+    stiffness: FloatArray
+
+    @classmethod
+    def of(cls, elastic: HalfPlaneElasticity, conditions: NodalConditions) -> _Condensation:
+        frame = conditions.frame
+        flexibility = rotate_rows(rotate_columns(elastic.flexibility, frame), frame)
+        motions = np.einsum("nkc,ncm->nkm", frame, elastic.drive.motions_at(dof_points(elastic.displacement_space)))
+        acting = np.flatnonzero(~conditions.is_free)
+        retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
+        stiffness = np.zeros((0, 0))
+        if acting.size:
+            factor = Cholesky(flexibility[np.ix_(acting, acting)], "the flexibility of the half-plane")
+            stiffness = factor.solve(np.eye(acting.size))
+            stiffness = 0.5 * (stiffness + stiffness.T)
+        return cls(elastic.drive, conditions, flexibility, motions.reshape(-1, 3), acting, retained, stiffness)
+
+    def is_of(self, drive: FarDrive, conditions: NodalConditions) -> bool:
+        """Whether other conditions and another drive differ in numbers alone."""
+        own = self.conditions
+        return (
+            (drive.driven, drive.centre) == (self.drive.driven, self.drive.centre)
+            and np.array_equal(conditions.frame, own.frame)
+            and np.array_equal(conditions.is_retained, own.is_retained)
+            and np.array_equal(conditions.is_fixed, own.is_fixed)
+        )
+
+    @property
+    def driven(self) -> FloatArray:
+        """(n_dofs, n_driven) array: the motions that loads drive."""
+        return self.motions[:, list(self.drive.driven)]
+
+    @cached_property
+    def yields(self) -> FloatArray:
+        """(n_acting, n_driven) array [Pa]: forces that unit driven motions take."""
+        return np.asarray(self.stiffness @ self.driven[self.acting])
+
+    @cached_property
+    def _per_load(self) -> FloatArray:
+        """(n_driven, n_driven) array [1/Pa]: driven motions per load."""
+        return np.asarray(np.linalg.inv(self.driven[self.acting].T @ self.yields))
+
+    @cached_property
+    def released(self) -> FloatArray:
+        """(n_acting, n_acting) array [Pa]: the stiffness where driven motions follow."""
+        return np.asarray(self.stiffness - self.yields @ self._per_load @ self.yields.T)
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the map under nodal forces (n_nodes, 2) in x and y and fixed displacements in the frames."""
+        conditions, acting, retained = self.conditions, self.acting, self.retained
+        given = np.where(conditions.is_free, np.einsum("nkc,nc->nk", conditions.frame, force), 0.0).ravel()
+        held = np.where(conditions.is_fixed, displacement, 0.0).ravel()[acting]
+        drive = self.drive
+        rest = self.flexibility @ given + self.motions @ np.array(drive.motion)
+        load = np.array(drive.load)[list(drive.driven)] + self.driven.T @ given
+
+        def acting_forces(held: FloatArray) -> tuple[FloatArray, FloatArray]:
+            """Return the forces on acting directions displaced by `held`, and the driven motions."""
+            motion = self._per_load @ (self.yields.T @ (held - rest[acting]) + load)
+            return self.stiffness @ (held - rest[acting]) - self.yields @ motion, motion
+
+        def response(held: FloatArray) -> tuple[FloatArray, FloatArray]:
+            """Return displacements and forces (n_dofs,) of all directions, in the frames."""
+            forces, motion = acting_forces(held)
+            displaced = rest + self.flexibility[:, acting] @ forces + self.driven @ motion
+            displaced[acting] = held
+            total = given.copy()
+            total[acting] = forces
+            return displaced, total
+
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            at = held.copy()
+            at[retained] = retained_displacement
+            back = conditions.frame.transpose(0, 2, 1)
+            displaced, total = (np.einsum("nck,nk->nc", back, each.reshape(-1, 2)) for each in response(at))
+            return displaced, total
+
+        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
+            by_motion = self._per_load @ self.yields[retained].T
+            follows = self.flexibility[np.ix_(directions, acting)] @ self.released[:, retained]
+            return follows + self.driven[directions] @ by_motion, response(held)[0][directions]
+
+        return CondensedMap(
+            stiffness=self.released[np.ix_(retained, retained)],
+            load=-acting_forces(held)[0][retained],
+            recover=recover,
+            under=self.under,
+            follow=follow,
+        )

@@ -1,0 +1,40 @@
+"""How a half-plane moves far away: as it is told, or as forces drive it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.operators.rigid_modes import rigid_motions
+
+
+@dataclass(frozen=True)
+class FarDrive:
+    """Motion of a half-plane far away along x, along y and as a turn: given, or driven by a load.
+
+    Parameters
+    ----------
+    driven : tuple of int
+        Which of the three motions (0, 1, 2) loads drive.
+    motion : tuple of float [m, m, rad]
+        Zero where driven.
+    load : tuple of float [N/m, N/m, N m/m]
+        On the half-plane; zero where not driven.
+    centre : tuple of float [m]
+        About which it turns, and where its forces act.
+    """
+
+    driven: tuple[int, ...] = ()
+    motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    load: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def motions_at(self, points: FloatArray) -> FloatArray:
+        """Return the displacements (n, 2, 3) of points (n, 2) [m] by the three unit motions."""
+        return rigid_motions(points, np.array(self.centre), 1.0)
+
+    def given_at(self, points: FloatArray) -> FloatArray:
+        """Return the displacements (n, 2) [m] of points (n, 2) [m] by the motion that is given."""
+        return np.asarray(self.motions_at(points) @ np.array(self.motion))

@@ -1,0 +1,114 @@
+"""The flexibility of the surface of a half-plane in closed form [Johnson1985].
+
+With the tangent t and the outward normal n of the surface, s along t, tractions displace it by
+
+    u_t(s) = -2 / (pi E') int log|s - r| t_t(r) dr + c / 2 int sign(s - r) t_n(r) dr,
+    u_n(s) = -2 / (pi E') int log|s - r| t_n(r) dr - c / 2 int sign(s - r) t_t(r) dr,
+
+c = (1 - 2 nu) / ((1 - nu) E'), the compressibility of `Material`. Tractions are constant on each element, and
+displacements their means over elements, so that the flexibility is symmetric: forces of elements to mean displacements.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators.material import Material
+
+_FAR = 20.0
+"""Distance of two centres, in lengths of the longer element, from which on a series has all digits."""
+_APART = 2.0
+"""Distance of the shorter element from the ends of the longer one, in its own lengths, from which Gauss points do."""
+_N_POINTS = 8
+
+
+def strip_flexibility(mesh: BoundaryMesh, material: Material) -> FloatArray:
+    """Return what unit forces, spread evenly over an element each, displace the elements by in the mean.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        The surface of a half-plane in units of its length, at whose distance the surface rests.
+    material : Material
+
+    Returns
+    -------
+    (2 n_elements, 2 n_elements) array [1/Pa]
+        Symmetric, index ``2 element + component`` in x and y; positive definite.
+    """
+    place = np.concatenate([[0.0], np.cumsum(mesh.lengths)])
+    n = mesh.n_elements
+    order = np.arange(n)
+    along = -2.0 / (np.pi * material.plane_modulus) * mean_logarithms(place)
+    across = 0.5 * material.plane_compressibility * np.sign(order[:, None] - order)
+    local = np.array([np.stack([along, across]), np.stack([-across, along])])  # by components t and n
+    axes = np.stack([mesh.tangents[0], mesh.normals[0]])
+    turned = np.einsum("ka,klij,lb->iajb", axes, local, axes, optimize=True)
+    flexibility = turned.reshape(2 * n, 2 * n)
+    return np.asarray(0.5 * (flexibility + flexibility.T))
+
+
+def mean_logarithms(place: FloatArray) -> FloatArray:
+    """Return the means of log|s - r| over all pairs of intervals that follow each other.
+
+    Parameters
+    ----------
+    place : (n + 1,) array
+        Ends of the intervals, increasing.
+
+    Returns
+    -------
+    (n, n) array
+
+    Notes
+    -----
+    In closed form between neighbours; by Gauss points on the shorter interval at some distance; far away by the moments
+    of s - r about the distance of the centres, since differences of large terms would lose their digits there.
+    """
+    length, centre = np.diff(place), 0.5 * (place[:-1] + place[1:])
+    result = np.empty((length.size, length.size))
+    first, second = np.triu_indices(length.size)
+    h, k = length[first], length[second]
+    distance, longer, shorter = centre[second] - centre[first], np.maximum(h, k), np.minimum(h, k)
+    is_far = distance > _FAR * longer
+    is_apart = ~is_far & (distance - 0.5 * longer > _APART * shorter)
+    is_near = ~is_far & ~is_apart
+    values = np.empty(first.size)
+    values[is_far] = _by_moments(distance[is_far], h[is_far], k[is_far])
+    values[is_apart] = _by_points(distance[is_apart], longer[is_apart], shorter[is_apart])
+    begin, end = place[:-1], place[1:]
+    values[is_near] = _closed(begin[first[is_near]], end[first[is_near]], begin[second[is_near]], end[second[is_near]])
+    result[first, second] = result[second, first] = values
+    return result
+
+
+def _by_moments(distance: FloatArray, h: FloatArray, k: FloatArray) -> FloatArray:
+    """Expand the logarithm about the distance of the centres; odd moments vanish."""
+    h, k = (h / distance) ** 2, (k / distance) ** 2
+    second = (h + k) / 12.0
+    fourth = (h**2 + k**2) / 80.0 + h * k / 24.0
+    sixth = (h**3 + k**3) / 448.0 + h * k * (h + k) / 64.0
+    return np.asarray(np.log(distance) - second / 2.0 - fourth / 4.0 - sixth / 6.0)
+
+
+def _by_points(distance: FloatArray, longer: FloatArray, shorter: FloatArray) -> FloatArray:
+    """Integrate over the longer interval in closed form, over the shorter one by Gauss points."""
+    xi, weights = gauss_legendre(_N_POINTS)
+    middle = distance[:, None] + 0.5 * shorter[:, None] * xi
+    before, after = middle - 0.5 * longer[:, None], middle + 0.5 * longer[:, None]
+    inner = (after * np.log(after) - before * np.log(before)) / longer[:, None] - 1.0
+    return np.asarray(inner @ (0.5 * weights))
+
+
+def _closed(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """Return the mean over [a, b] and [c, d], c >= b or the same interval."""
+    sums = _twice_integrated(d - a) - _twice_integrated(d - b) - _twice_integrated(c - a) + _twice_integrated(c - b)
+    return np.asarray(sums / ((b - a) * (d - c)))
+
+
+def _twice_integrated(x: FloatArray) -> FloatArray:
+    """Return x^2 (log|x| - 3/2) / 2, whose second derivative is log|x|."""
+    return np.asarray(0.5 * x * x * (np.log(np.where(x == 0.0, 1.0, np.abs(x))) - 1.5))

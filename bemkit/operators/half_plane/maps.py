@@ -1,0 +1,59 @@
+"""The elastic map of a half-plane, and what it takes."""
+
+from __future__ import annotations
+
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity, half_plane_work
+from bemkit.operators.half_plane.periodic import PeriodicElasticity
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+
+_BYTES = 8
+_BASIS = 120
+"""Vectors that the iteration for a response keeps, all others included."""
+_RESPONSES, _ITERATIONS, _FLOPS_OF_TRANSFORM = 20, 40, 500.0
+"""About, of a rough surface: responses, iterations of each, and work on each node in an iteration."""
+
+
+def half_plane_map(mesh: BoundaryMesh, material: Material) -> HalfPlaneElasticity | PeriodicElasticity:
+    """Return the map of the half-plane whose surface the mesh is."""
+    is_periodic = mesh.surface is not None and mesh.surface.is_periodic
+    return (PeriodicElasticity if is_periodic else HalfPlaneElasticity)(mesh, material)
+
+
+def half_plane_needs(case: BodyCase) -> BodyNeeds:
+    """Return what the map of a half-plane takes."""
+    if case.mesh.surface is not None and case.mesh.surface.is_periodic:
+        return _periodic_needs(case)
+    n_dofs, n_acting = case.n_displacements, case.n_retained + case.n_fixed
+    of_surface = f"closed form: {n_dofs} x {n_dofs} means of logarithms and signs"
+    items = (
+        PlanItem("flexibility of the surface", True, of_surface),
+        PlanItem("elements inside, around or below", False, "the surface beyond the strip is free in closed form"),
+        PlanItem("double layer, hypersingular operator", False, "they vanish on a straight free surface"),
+        PlanItem("supports", case.n_fixed > 0, "the half-plane is held or driven far away"),
+    )
+    square = _BYTES * n_acting * n_acting
+    return BodyNeeds(
+        items=items,
+        work=half_plane_work(case.mesh.n_elements, n_acting),
+        memory=8 * _BYTES * n_dofs * n_dofs,
+        kept=2 * _BYTES * n_dofs * n_dofs + 2 * square,
+        evaluations=4.0 * case.mesh.n_elements**2,
+        flops=float(n_acting) ** 3 * 4.0 / 3.0,
+    )
+
+
+def _periodic_needs(case: BodyCase) -> BodyNeeds:
+    n = case.mesh.n_elements
+    items = (
+        PlanItem("flexibility of the surface", True, f"one number for each of {n} waves, by Fourier transforms"),
+        PlanItem("elements inside, around or below", False, "waves die out below the surface in closed form"),
+        PlanItem(
+            "matrices", False, f"each response is found by GMRES, with {_BASIS} vectors of {case.n_retained} numbers"
+        ),
+        PlanItem("supports", False, "the half-plane is held or driven far away"),
+    )
+    kept = _BYTES * _BASIS * case.n_retained
+    flops = _RESPONSES * _ITERATIONS * n * (_FLOPS_OF_TRANSFORM + 4.0 * _ITERATIONS)
+    return BodyNeeds(items=items, memory=kept, kept=kept, flops=flops, is_matrix_free=True)

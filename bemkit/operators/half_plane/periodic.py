@@ -1,0 +1,140 @@
+"""The flexibility of a periodic half-plane: one number for each wave, by fast Fourier transforms.
+
+Tractions and displacements are complex numbers, along the tangent and, as the imaginary part, along the normal. A
+traction wave exp(i q s) displaces the surface by 2 / (E' |q|) - c / q times itself, c the compressibility of
+`bemkit.operators.half_plane.flexibility` [Johnson1985]; of tractions constant on elements and displacements that are
+their means the waves q, q + 2 pi / h, ... look alike, and their shares add up to zeta functions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import ConstantSpace
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.protocol import CondensedMap
+
+_EQUAL = 1e-6
+"""Relative difference of the lengths of equal elements: numbers hold those of a million elements to 1e-10."""
+
+
+def wave_flexibility(n_elements: int, period: float, material: Material) -> FloatArray:
+    """Return the displacement per traction of each wave on equal elements.
+
+    Parameters
+    ----------
+    n_elements : int
+    period : float [m]
+    material : Material
+
+    Returns
+    -------
+    (n_elements,) array [m/Pa]
+        Positive, in the order of `numpy.fft.fftfreq`. The uniform wave displaces like the longest one, by
+        period / (pi E'): a choice, since nothing is at rest below.
+    """
+    from scipy.special import zeta
+
+    share = np.arange(1, n_elements) / n_elements
+    above, below = zeta(3.0, share), zeta(3.0, 1.0 - share)
+    modulus, compressibility = material.plane_modulus, material.plane_compressibility
+    of_wave = (above + below) / modulus - 0.5 * compressibility * (above - below)
+    of_wave *= period / (np.pi**3 * n_elements) * np.sin(np.pi * share) ** 2
+    return np.concatenate([[period / (np.pi * modulus)], of_wave])
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicElasticity:
+    """Elasticity of a periodic half-plane seen from equal elements of its surface; no matrix is ever formed.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        One period, in units of its length.
+    material : Material
+    drive : FarDrive
+        How the half-plane moves far away.
+
+    Raises
+    ------
+    InputError
+        If elements are not of equal lengths.
+    """
+
+    mesh: BoundaryMesh
+    material: Material
+    drive: FarDrive = field(default_factory=FarDrive)
+
+    def __post_init__(self) -> None:
+        lengths = self.mesh.lengths
+        if float(np.ptp(lengths)) > _EQUAL * float(lengths.mean()):
+            raise InputError(
+                f"elements of a periodic half-plane have lengths from {lengths.min():.4g} to {lengths.max():.4g} of a "
+                "period: leave out the grading, and let parts end where equal elements do"
+            )
+
+    @cached_property
+    def displacement_space(self) -> ConstantSpace:
+        """Means over elements."""
+        return ConstantSpace(self.mesh)
+
+    @property
+    def traction_space(self) -> ConstantSpace:
+        """Constants on elements."""
+        return self.displacement_space
+
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """(n_elements,) array [m/Pa]: see `wave_flexibility`."""
+        return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
+
+    @cached_property
+    def axes(self) -> ComplexArray:
+        """(2,) array: the directions x and y as complex numbers."""
+        return np.asarray(self.mesh.tangents[0] + 1j * self.mesh.normals[0])
+
+    def driven_by(self, drive: FarDrive) -> PeriodicElasticity:
+        """Return the same half-plane under another drive."""
+        other = replace(self, drive=drive)
+        other.__dict__["flexibility"] = self.flexibility
+        return other
+
+    def displaced(self, traction: ComplexArray) -> ComplexArray:
+        """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
+        from scipy.fft import fft, ifft
+
+        return np.asarray(ifft(self.flexibility * fft(traction)))
+
+    def held(self, displacement: ComplexArray) -> ComplexArray:
+        """Return the tractions (n_elements,) [Pa] that hold displacements (n_elements,) [m]."""
+        from scipy.fft import fft, ifft
+
+        return np.asarray(ifft(fft(displacement) / self.flexibility))
+
+    def to_complex(self, vectors: FloatArray) -> ComplexArray:
+        """Return vectors (n, 2) in x and y as complex numbers (n,)."""
+        return np.asarray(vectors @ self.axes)
+
+    def to_vectors(self, numbers: ComplexArray) -> FloatArray:
+        """Return complex numbers (n,) as vectors (n, 2) in x and y."""
+        return np.asarray((numbers[:, None] * self.axes.conj()).real)
+
+    def strain_displacement(self, force: FloatArray) -> FloatArray:
+        """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
+        return self.to_vectors(self.displaced(self.to_complex(force / self.mesh.lengths[:, None])))
+
+    def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
+        """Refuse to form a matrix; see `bemkit.contact.periodic_body`."""
+        raise InputError("a periodic half-plane is no body of an assembly: give it a scene of its own")
+
+    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
+        return np.asarray(force / self.mesh.lengths[:, None])[:, None, :]
