@@ -57,7 +57,7 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
             "external_work": ("energy", "work of loads, moving supports and obstacles in the step"),
             "elastic_energy": ("energy", "elastic energy at the end of the step"),
             "dissipation": ("energy", "work that friction takes up in the step"),
-            "closing_work": ("energy", "work of pressures on clearances that close within increments"),
+            "increment_work": ("energy", "work of tractions on clearances that open or close within increments"),
             "n_increments": ("", "increments in which the step was gone"),
             "linear_solves": ("", "linear systems solved in the step"),
             "slip": ("length", "length of the path that each contact node has slipped"),

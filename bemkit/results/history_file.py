@@ -25,7 +25,7 @@ from bemkit.scene.toml import MAX_BYTES, scene_from_toml, scene_to_toml
 if TYPE_CHECKING:
     import h5py
 
-_WORK = ("external_work", "dissipation", "closing_work")
+_WORK = ("external_work", "dissipation", "increment_work")
 _FLOATS = ("time", "elastic_energy", *_WORK)
 _COUNTS = ("n_increments", "linear_solves")
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")

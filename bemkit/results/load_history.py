@@ -27,27 +27,27 @@ class StepWork:
         Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
         heat it is what the other entries leave.
     dissipation : float [J/m]
-        What friction takes up.
-    closing_work : float [J/m]
-        Of pressures on clearances that close (positive) or open (negative) within an increment; it vanishes as
-        increments become smaller.
+        What friction takes up, at nodes that are closed at both ends of an increment; never negative.
+    increment_work : float [J/m]
+        What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
+        turns back under a falling friction bound. It vanishes as increments become smaller.
 
     Notes
     -----
     All by the trapezoidal rule on each increment, with which, for a body with a symmetric stiffness, ``external_work =
-    change of elastic energy + dissipation + closing_work`` but for round-off.
+    change of elastic energy + dissipation + increment_work`` but for round-off.
     """
 
     external_work: float = 0.0
     dissipation: float = 0.0
-    closing_work: float = 0.0
+    increment_work: float = 0.0
 
     def __add__(self, other: StepWork) -> StepWork:
         """Return the work in both."""
         return StepWork(
             self.external_work + other.external_work,
             self.dissipation + other.dissipation,
-            self.closing_work + other.closing_work,
+            self.increment_work + other.increment_work,
         )
 
 
@@ -103,7 +103,7 @@ class LoadStep:
             "external_work": self.work.external_work,
             "elastic_energy": self.elastic_energy,
             "dissipation": self.work.dissipation,
-            "closing_work": self.work.closing_work,
+            "increment_work": self.work.increment_work,
             "force_normal": self.force_normal,
             "force_tangential": self.force_tangential,
             "mean_displacement": self.mean_displacement,

@@ -208,7 +208,7 @@ def _loading(
     work, end = reached.work, reached.end
     if model.has_body_forces:
         change = solution.energy - (steps[-1].elastic_energy if steps else 0.0)
-        work = replace(work, external_work=change + work.dissipation + work.closing_work)
+        work = replace(work, external_work=change + work.dissipation + work.increment_work)
     step = LoadStep(
         time=end.motion.time,
         work=work,
