@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 from bemkit.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from bemkit.contact.history_laws import RateStrengthening as RateStrengthening
+    from bemkit.contact.history_laws import SlipWeakening as SlipWeakening
     from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
     from bemkit.contact.laws import Coulomb as Coulomb
     from bemkit.contact.laws import FrictionLaw as FrictionLaw
@@ -81,6 +83,7 @@ if TYPE_CHECKING:
     from bemkit.results.result_file import write_result as write_result
     from bemkit.results.solution import Solution as Solution
     from bemkit.runs.assembly import run_assembly_history as run_assembly_history
+    from bemkit.runs.checkpoint import run_to_file as run_to_file
     from bemkit.runs.collapse import largest_load_factor as largest_load_factor
     from bemkit.runs.history import run_history as run_history
     from bemkit.runs.nested import run_cascade as run_cascade
@@ -115,6 +118,7 @@ if TYPE_CHECKING:
     from bemkit.scene.mesh_options import MeshOptions as MeshOptions
     from bemkit.scene.rigid_body import RigidBody as RigidBody
     from bemkit.scene.scene import Scene as Scene
+    from bemkit.scene.steps import Step as Step
     from bemkit.scene.toml import load_scene as load_scene
     from bemkit.scene.toml import scene_from_toml as scene_from_toml
     from bemkit.scene.toml import scene_to_toml as scene_to_toml
@@ -130,6 +134,7 @@ if TYPE_CHECKING:
     from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
+    "contact.history_laws": ("RateStrengthening", "SlipWeakening"),
     "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
@@ -163,6 +168,7 @@ _HOME = {
     "results.result_file": ("read_result", "write_result"),
     "results.solution": ("Solution",),
     "runs.assembly": ("run_assembly_history",),
+    "runs.checkpoint": ("run_to_file",),
     "runs.collapse": ("largest_load_factor",),
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
@@ -179,6 +185,7 @@ _HOME = {
     "scene.mesh_options": ("MeshOptions",),
     "scene.rigid_body": ("RigidBody",),
     "scene.scene": ("Scene",),
+    "scene.steps": ("Step",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),
     "scene.unit_names": ("UnitNames",),
     "solvers.alm": ("AugmentedLagrangian",),

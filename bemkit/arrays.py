@@ -36,3 +36,9 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
         return [(slice(0, indices.size), indices)]
     edges = [0, *breaks.tolist(), indices.size]
     return [(slice(i, j), slice(int(indices[i]), int(indices[i]) + j - i)) for i, j in itertools.pairwise(edges)]
+
+
+def blended(one: FloatArray, two: FloatArray, share: float) -> FloatArray:
+    """Return values a share of the way from one to another; equal ones, infinite ones among them, stay."""
+    with np.errstate(invalid="ignore"):
+        return np.where(one == two, two, one + share * (two - one))

@@ -275,6 +275,8 @@ class _Compiler:
     def name(self, node: ast.expr, name: str) -> _Value:
         if name in _FUNCTIONS or name == "where":
             self.refuse(node, "a function without arguments", f"write {name}(...)")
+        if name == "t":
+            self.refuse(node, "the time is not known here", "write formulas of t among the changes of [[steps]]")
         if name not in _NAMES:
             self.refuse(node, "unknown name", f"the names are x, y, pi and e{closest(name, _NAMES)}")
         if name in _CONSTANTS:

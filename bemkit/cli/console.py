@@ -163,6 +163,7 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
     else:
         yield "contact", "none"
     yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
+    yield from _history_rows(solution)
     if solution.estimated_error is not None:
         tractions = solution.estimated_traction_error
         of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
@@ -203,6 +204,7 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
     if len(solution.rigid) > _MANY_CONTACTS:
         yield "", f"and {len(solution.rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
     yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
+    yield from _history_rows(solution)
     if solution.estimated_error is not None:
         yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"
     yield "transitions", "\n".join(_transition_lines(solution))
@@ -211,6 +213,15 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
     round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
     yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
     yield "time", _time(solution)
+
+
+def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
+    loading = solution.loading
+    if loading is not None:
+        work, unit = loading.total(), unit_of("energy", solution.units)
+        yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
+        yield "external work", f"{_amount(work.external_work, unit)}  in all steps"
+        yield "friction took", f"{_amount(work.dissipation, unit)}  in all steps"
 
 
 def _status(solution: Solution | AssemblySolution) -> Text:

@@ -157,11 +157,11 @@ def run(
         if explain:
             _start_tracing()
         try:
-            solution = _solve(chosen, cascade=cascade, is_live=is_live)
+            solution = _solve(chosen, cascade=cascade, is_live=is_live, history_file=_history_file(chosen, output))
         finally:
             tracemalloc.stop()
     begin = time.perf_counter()
-    if output is not None:
+    if output is not None and _history_file(chosen, output) is None:
         from bemkit.results.export import export_result
 
         export_result(output, solution)
@@ -182,7 +182,9 @@ def run(
 
 @commands.command()
 @click.argument("result")
-@click.option("--csv", "table", type=click.Choice(["contact", "boundary", "history"]), help="Print a table as CSV.")
+@click.option(
+    "--csv", "table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Print a table as CSV."
+)
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
@@ -288,14 +290,15 @@ def _outputs(
 
     def figures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
         from bemkit.results.assembly_solution import AssemblySolution
+        from bemkit.results.history_figures import history_figures
 
         if isinstance(solution, AssemblySolution):
             from bemkit.results.assembly_figures import all_assembly_figures
 
-            return all_assembly_figures(solution)
+            return {**all_assembly_figures(solution), **history_figures(solution)}
         from bemkit.results.figures import all_figures
 
-        return all_figures(solution)
+        return {**all_figures(solution), **history_figures(solution)}
 
     texts = (
         TextFile(json_file, "JSON file", JSON_START, as_json),
@@ -312,7 +315,15 @@ def _result_target(output: str | None) -> list[Path]:
     return [format_of(output).check(Path(output))]
 
 
-def _solve(scene: Scene | Assembly, *, cascade: bool, is_live: bool) -> Solution | AssemblySolution:
+def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
+    """Return the result file of a load history on one mesh, which is written step by step; None of other runs."""
+    is_stepwise = scene.n_steps > 1 and scene.mesh.accuracy is None
+    return output if is_stepwise and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+
+
+def _solve(
+    scene: Scene | Assembly, *, cascade: bool, is_live: bool, history_file: str | None
+) -> Solution | AssemblySolution:
     from bemkit.runs.run import run as solve_scene
 
     callback = None
@@ -325,6 +336,10 @@ def _solve(scene: Scene | Assembly, *, cascade: bool, is_live: bool) -> Solution
         from bemkit.scene.toml import single_body
 
         return run_cascade(single_body(scene, scene.title), callback=callback)[-1]
+    if history_file is not None:
+        from bemkit.runs.checkpoint import run_to_file
+
+        return run_to_file(scene, history_file, callback=callback)
     return solve_scene(scene, callback=callback)
 
 

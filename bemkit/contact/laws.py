@@ -11,21 +11,19 @@ Coefficients may vary along the boundary: as numbers per contact node, or as for
 which `FrictionLaw.at` turns into numbers per node.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, fields, replace
-from typing import ClassVar, Protocol, Self, TypeAlias, runtime_checkable
+from typing import ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, read_only
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.coefficients import Coefficient as Coefficient
+from bemkit.contact.coefficients import LawError as LawError
+from bemkit.contact.coefficients import checked_coefficient, evaluated_coefficient, is_zero, numbers_of
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
-from bemkit.formulas import ScalarField, check_field, evaluate_field
-
-Coefficient: TypeAlias = ScalarField | FloatArray
-"""A number, a formula or function of x and y, or one number per contact node."""
-
-
-class LawError(InputError):
-    """A friction law failed or returned what no bound can be; the message names the law."""
 
 
 @runtime_checkable
@@ -44,6 +42,26 @@ class FrictionLaw(Protocol):
         return False
 
     @property
+    def needs_history(self) -> bool:
+        """Whether the bound depends on slip or time, so that a scene has to have steps; see `at_slip`."""
+        return False
+
+    def at_slip(self, motion: SlipHistory) -> FrictionLaw:
+        """Return the law for one load step, whose bound depends on the normal traction alone.
+
+        Parameters
+        ----------
+        motion : SlipHistory
+            What the contact nodes have slipped, and the time.
+
+        Returns
+        -------
+        FrictionLaw
+            By default this law itself.
+        """
+        return self
+
+    @property
     def acts_across_gap(self) -> bool | BoolArray:
         """Whether ``bound(0)`` also holds at open nodes (for all nodes, or node by node).
 
@@ -52,7 +70,7 @@ class FrictionLaw(Protocol):
         """
         return False
 
-    def at(self, points: FloatArray) -> "FrictionLaw":
+    def at(self, points: FloatArray) -> FrictionLaw:
         """Return the law for given contact nodes: every formula or function of the coordinates is evaluated.
 
         Parameters
@@ -100,12 +118,12 @@ class FrictionLaw(Protocol):
         """
         ...
 
-    def scaled(self, stress_scale: float) -> "FrictionLaw":
+    def scaled(self, stress_scale: float) -> FrictionLaw:
         """Return the same law for stresses measured in units of `stress_scale` [Pa]."""
         return RescaledLaw(self, stress_scale)
 
 
-class _LawOfCoefficients(FrictionLaw):
+class LawOfCoefficients(FrictionLaw):
     """A law whose fields are coefficients: checked, evaluated, rescaled and compared in one way.
 
     Two are equal if their classes and coefficients are; arrays are compared as a whole. `stresses` names the
@@ -116,39 +134,40 @@ class _LawOfCoefficients(FrictionLaw):
     may_be_infinite: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        for name, value in self._coefficients.items():
-            value = _coefficient(name, value, may_be_infinite=name in self.may_be_infinite)
+        for name, value in self.coefficients.items():
+            value = checked_coefficient(name, value, may_be_infinite=name in self.may_be_infinite)
             object.__setattr__(self, name, value)
 
     def scaled(self, stress_scale: float) -> Self:
         """Return the law with its stresses in units of `stress_scale`."""
         _check_scale(stress_scale)
-        values = {name: _numbers(name, self._coefficients[name]) / stress_scale for name in self.stresses}
+        values = {name: numbers_of(name, self.coefficients[name]) / stress_scale for name in self.stresses}
         return replace(self, **values) if values else self  # type: ignore[type-var]
 
     def at(self, points: FloatArray) -> Self:
         """Return the law with its coefficients evaluated at (n_contact, 2) points [m]."""
-        values = {name: _evaluated(name, value, points) for name, value in self._coefficients.items()}
+        values = {name: evaluated_coefficient(name, value, points) for name, value in self.coefficients.items()}
         return replace(self, **values) if values else self  # type: ignore[type-var]
 
     @property
-    def _coefficients(self) -> dict[str, Coefficient]:
+    def coefficients(self) -> dict[str, Coefficient]:
+        """The coefficients by name."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}  # type: ignore[arg-type]
 
     def _compared(self) -> tuple[object, ...]:
         """Return class and coefficients in a form that compares and hashes."""
-        values = self._coefficients.values()
+        values = self.coefficients.values()
         return type(self), *(tuple(value.tolist()) if isinstance(value, np.ndarray) else value for value in values)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _LawOfCoefficients) and self._compared() == other._compared()
+        return isinstance(other, LawOfCoefficients) and self._compared() == other._compared()
 
     def __hash__(self) -> int:
         return hash(self._compared())
 
 
 @dataclass(frozen=True, eq=False)
-class Frictionless(_LawOfCoefficients):
+class Frictionless(LawOfCoefficients):
     """No tangential traction at all."""
 
     @property
@@ -166,7 +185,7 @@ class Frictionless(_LawOfCoefficients):
 
 
 @dataclass(frozen=True, eq=False)
-class Tresca(_LawOfCoefficients):
+class Tresca(LawOfCoefficients):
     """Given friction: a bound that does not depend on the pressure.
 
     Parameters
@@ -187,7 +206,7 @@ class Tresca(_LawOfCoefficients):
     @property
     def is_frictionless(self) -> bool:
         """Whether the given bound is zero."""
-        return _is_zero(self.bound_value)
+        return is_zero(self.bound_value)
 
     @property
     def acts_across_gap(self) -> bool:
@@ -196,7 +215,7 @@ class Tresca(_LawOfCoefficients):
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return the given bound."""
-        return np.broadcast_to(_numbers("bound_value", self.bound_value), sigma_n.shape).astype(float)
+        return np.broadcast_to(numbers_of("bound_value", self.bound_value), sigma_n.shape).astype(float)
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return zeros."""
@@ -204,7 +223,7 @@ class Tresca(_LawOfCoefficients):
 
 
 @dataclass(frozen=True, eq=False)
-class Coulomb(_LawOfCoefficients):
+class Coulomb(LawOfCoefficients):
     """Coulomb's law: ``bound = s |sigma_n|``, equations (7) and (8) of the paper.
 
     Parameters
@@ -218,21 +237,21 @@ class Coulomb(_LawOfCoefficients):
     @property
     def is_frictionless(self) -> bool:
         """Whether the friction coefficient is zero."""
-        return _is_zero(self.friction_coefficient)
+        return is_zero(self.friction_coefficient)
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``s |sigma_n|`` (zero under tension, which no solution contains)."""
-        s = _numbers("friction_coefficient", self.friction_coefficient)
+        s = numbers_of("friction_coefficient", self.friction_coefficient)
         return np.asarray(s * np.maximum(-sigma_n, 0.0))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``-s`` (zero under tension)."""
-        s = _numbers("friction_coefficient", self.friction_coefficient)
+        s = numbers_of("friction_coefficient", self.friction_coefficient)
         return np.where(sigma_n <= 0.0, -np.asarray(s), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class CohesiveCoulomb(_LawOfCoefficients):
+class CohesiveCoulomb(LawOfCoefficients):
     """Coulomb's law with cohesion and cap: ``bound = min(c + s |sigma_n|, tau_max)``.
 
     Parameters
@@ -267,20 +286,20 @@ class CohesiveCoulomb(_LawOfCoefficients):
     @property
     def is_frictionless(self) -> bool:
         """Whether friction coefficient and cohesion are zero, or the cap is."""
-        return _is_zero(self.cap) or (_is_zero(self.friction_coefficient) and _is_zero(self.cohesion))
+        return is_zero(self.cap) or (is_zero(self.friction_coefficient) and is_zero(self.cohesion))
 
     def bound(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``min(c + s |sigma_n|, tau_max)``."""
-        return np.minimum(self._uncapped(sigma_n), _numbers("cap", self.cap))
+        return np.minimum(self._uncapped(sigma_n), numbers_of("cap", self.cap))
 
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
-        is_rising = (self._uncapped(sigma_n) < _numbers("cap", self.cap)) & (sigma_n <= 0.0)
-        return np.where(is_rising, -np.asarray(_numbers("friction_coefficient", self.friction_coefficient)), 0.0)
+        is_rising = (self._uncapped(sigma_n) < numbers_of("cap", self.cap)) & (sigma_n <= 0.0)
+        return np.where(is_rising, -np.asarray(numbers_of("friction_coefficient", self.friction_coefficient)), 0.0)
 
     def _uncapped(self, sigma_n: FloatArray) -> FloatArray:
-        s = _numbers("friction_coefficient", self.friction_coefficient)
-        return np.asarray(_numbers("cohesion", self.cohesion) + s * np.maximum(-sigma_n, 0.0))
+        s = numbers_of("friction_coefficient", self.friction_coefficient)
+        return np.asarray(numbers_of("cohesion", self.cohesion) + s * np.maximum(-sigma_n, 0.0))
 
 
 @dataclass(frozen=True)
@@ -306,6 +325,15 @@ class RescaledLaw(FrictionLaw):
         return self.law.is_frictionless
 
     @property
+    def needs_history(self) -> bool:
+        """What the law says."""
+        return self.law.needs_history
+
+    def at_slip(self, motion: SlipHistory) -> FrictionLaw:
+        """Return the law for one load step, in the same unit of stress."""
+        return self.law.at_slip(motion).scaled(self.stress_scale)
+
+    @property
     def acts_across_gap(self) -> bool | BoolArray:
         """What the law says."""
         return self.law.acts_across_gap
@@ -321,56 +349,6 @@ class RescaledLaw(FrictionLaw):
     def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
         """Return ``bound_derivative(sigma_n * stress_scale)``."""
         return self.law.bound_derivative(sigma_n * self.stress_scale)
-
-
-def _coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:
-    """Check a coefficient and return it as a float, a read-only array of its own, or the formula it is."""
-    if callable(value):
-        check_field(value, name)
-        return value
-    array = np.array(value, dtype=float)
-    if array.ndim > 1:
-        raise InputError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
-    is_wrong = np.isnan(array) | (array < 0.0) | (False if may_be_infinite else np.isinf(array))
-    if np.any(is_wrong):
-        where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
-        raise InputError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
-    if array.ndim == 0:
-        return float(array)
-    read_only(array)
-    return array
-
-
-def _numbers(name: str, value: Coefficient) -> float | FloatArray:
-    """Return a coefficient that is known in numbers."""
-    if callable(value):
-        raise InputError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
-    return value
-
-
-def _is_zero(value: Coefficient) -> bool:
-    """Whether a coefficient is known to vanish everywhere."""
-    return not callable(value) and not np.any(value)
-
-
-def _evaluated(name: str, value: Coefficient, points: FloatArray) -> Coefficient:
-    """Return a coefficient in numbers, evaluated at (n_contact, 2) points [m] if it is a formula or function."""
-    if isinstance(value, np.ndarray) and len(value) != len(points):
-        raise LawError(
-            f"{name} has {len(value)} values for {len(points)} contact nodes: give one number, one for each node, or a "
-            "formula of x and y"
-        )
-    if not callable(value):
-        return value
-    values = evaluate_field(value, points)
-    if np.any(values < 0.0):
-        node = int(np.argmin(values))
-        x, y = points[node]
-        raise LawError(
-            f"{name} = {value!r} is {values[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); it must be zero or positive on "
-            "the whole contact part"
-        )
-    return values
 
 
 def _check_scale(stress_scale: float) -> None:

@@ -1,5 +1,7 @@
 """Different friction laws on different parts of the contact boundary."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,6 +10,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw, RescaledLaw
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
 
 
@@ -41,6 +44,15 @@ class PiecewiseLaw(FrictionLaw):
         """Whether all the laws are."""
         return all(law.is_frictionless for law in self.laws)
 
+    @property
+    def needs_history(self) -> bool:
+        """Whether one of the laws does."""
+        return any(law.needs_history for law in self.laws)
+
+    def at_slip(self, motion: SlipHistory) -> PiecewiseLaw:
+        """Return the laws for one load step."""
+        return PiecewiseLaw([law.at_slip(motion.of(nodes)) for law, nodes in self._pairs], self.nodes)
+
     @cached_property
     def acts_across_gap(self) -> BoolArray:
         """(n_contact,) bool array: what the law of each node says."""
@@ -55,7 +67,7 @@ class PiecewiseLaw(FrictionLaw):
         """Return the derivative by the law of each node."""
         return self._assembled([law.bound_derivative(sigma_n[nodes]) for law, nodes in self._pairs])
 
-    def scaled(self, stress_scale: float) -> "PiecewiseLaw":
+    def scaled(self, stress_scale: float) -> PiecewiseLaw:
         """Return the laws in units of `stress_scale`."""
         return PiecewiseLaw([law.scaled(stress_scale) for law in self.laws], self.nodes)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
@@ -32,8 +32,10 @@ from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
+from bemkit.solvers.base import ContactSolver
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,11 @@ class Model:
     elastic: SteklovPoincare
     body: CondensedBody | PeriodicBody | UntouchedBody
     problem: ContactProblem
+
+    @property
+    def solver(self) -> ContactSolver:
+        """The driver."""
+        return self.scene.solver
 
     @property
     def scene(self) -> Scene:
@@ -107,6 +114,28 @@ class Model:
         else:
             body = contact_body(elastic, prepared)
         return Model(prepared, elastic, body, _problem(prepared, body))
+
+    def between(self, before: Model, share: float) -> ContactProblem:
+        """Return the problem at a share of the way from the loads and gaps of a step before to those of this model."""
+        if share == 1.0:
+            return self.problem
+        one, two = before.prepared, self.prepared
+        displacement = blended(one.conditions.displacement, two.conditions.displacement, share)
+        inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
+        body = self.body.under(displacement, blended(one.force, two.force, share), inside)
+        return replace(self.problem, body=body, gap=blended(before.problem.gap, self.problem.gap, share))
+
+    def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return the forces [N/m] of loads and supports on all nodes, and the displacements [m] on which they work."""
+        displacement, force = self.body.recover(state)
+        units, conditions = self.units, self.prepared.conditions
+        acting = supporting_forces(conditions, self.prepared.force, force)
+        return acting * (units.stress * units.length), displacement.ravel() * units.displacement
+
+    @property
+    def has_body_forces(self) -> bool:
+        """Whether something acts inside the body."""
+        return self.prepared.inside is not None
 
     def with_law(self, scene: Scene) -> Model:
         """Return the same body under the same loads; the scene differs in its solver and the numbers of its law alone.

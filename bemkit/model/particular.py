@@ -21,7 +21,6 @@ from bemkit.operators.particular_solutions import (
 )
 from bemkit.operators.steklov_poincare.forces_inside import projected_tractions
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
-from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
 
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
@@ -116,9 +115,9 @@ class ParticularFields:
 
     @classmethod
     def of(cls, scene: Scene, mesh: BoundaryMesh) -> ParticularFields | None:
-        """Return that of the last load step of a scene; None without body forces."""
+        """Return that of a scene with a single load; None without body forces."""
         modulus = scene.material.plane_modulus
-        solution = particular_solution(load_steps(scene)[-1], mesh, modulus, modulus) if scene.body_forces else None
+        solution = particular_solution(scene, mesh, modulus, modulus) if scene.body_forces else None
         return None if solution is None else cls(solution, mesh, modulus)
 
     def displacement(self, points: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.model.contact_model import Model
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.active_sets import NodeStatus
@@ -27,7 +28,9 @@ SMALLEST_OVERLAP = 1e-6
 """Share of the largest displacement below which an overlap is round-off of coordinates and prescribed motions."""
 
 
-def with_held_friction(model: Model, state: ContactState, node_status: IntArray) -> tuple[ContactState, IntArray]:
+def with_held_friction(
+    model: Model, state: ContactState, node_status: IntArray, motion: SlipHistory | None = None
+) -> tuple[ContactState, IntArray]:
     """Complete a solution of the contact problem by the friction at nodes that supports hold.
 
     Parameters
@@ -36,6 +39,8 @@ def with_held_friction(model: Model, state: ContactState, node_status: IntArray)
     state : ContactState
         Dimensionless; at these nodes without tangential traction.
     node_status : (n_contact,) array of `NodeStatus` values
+    motion : SlipHistory, optional
+        For laws that depend on slip or time.
 
     Returns
     -------
@@ -47,6 +52,7 @@ def with_held_friction(model: Model, state: ContactState, node_status: IntArray)
     if not held.any():
         return state, node_status
     law, is_closed = model.law, node_status != NodeStatus.SEPARATED
+    law = law if motion is None else law.at_slip(motion)
     sigma_n = np.minimum(state.sigma_n, 0.0)
     bound = np.where(is_closed | np.asarray(law.acts_across_gap), law.bound(sigma_n), 0.0)
     has_friction = held & ((bound > 0.0) | (law.bound_derivative(sigma_n) != 0.0))

@@ -238,7 +238,7 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
     from bemkit.runs.adaptive import run_adaptive
     from bemkit.runs.run import run
 
-    if len(scene.load_factors) == 1:
+    if scene.n_steps == 1:
         options = MeshOptions(accuracy=FINEST, most_elements=most_elements)
         return list(run_adaptive(replace(scene, discretisation=HpGalerkin(), mesh=options)))
     scene, counts = replace(scene, discretisation=QuadraticGalerkin()), (most_elements // 2, most_elements)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
@@ -66,7 +67,8 @@ class AssemblySolution:
     Parameters
     ----------
     assembly : Assembly
-        With all contacts listed, those found by `Assembly.touching` among them.
+        With all contacts listed, those found by `Assembly.touching` among them; of a load history that of its last
+        step.
     bodies : mapping of str to BodyResult
         By name, in the order of the assembly.
     status : Status
@@ -92,6 +94,8 @@ class AssemblySolution:
     rigid : mapping of str to RigidResult
         How each rigid body moved and what acts on it, by name.
     warnings : tuple of str
+    loading : LoadHistory, optional
+        Of a load history the steps up to this one.
     """
 
     assembly: Assembly
@@ -113,6 +117,7 @@ class AssemblySolution:
     memory: Mapping[str, int] = field(default_factory=dict)
     rigid: Mapping[str, RigidResult] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    loading: LoadHistory | None = None
 
     def __repr__(self) -> str:
         """Return one line; the fields hold thousands of numbers."""
@@ -122,8 +127,8 @@ class AssemblySolution:
 
     @property
     def stated(self) -> Assembly:
-        """What was asked: the assembly."""
-        return self.assembly
+        """What was asked: the assembly, with all its load steps."""
+        return self.assembly if self.loading is None else cast(Assembly, self.loading.asked)
 
     @property
     def units(self) -> UnitNames | None:
@@ -214,4 +219,5 @@ class AssemblySolution:
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),
             "memory": dict(self.memory),
+            "steps": step_rows(self.loading),
         }

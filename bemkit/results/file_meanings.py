@@ -52,6 +52,18 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
             "direction_y": ("", "direction of contact, second component"),
             "friction_bound": ("stress", "largest tangential traction that the law allows"),
         },
+        "steps": {
+            "time": ("", "time at the end of the step"),
+            "external_work": ("energy", "work of loads, moving supports and obstacles in the step"),
+            "elastic_energy": ("energy", "elastic energy at the end of the step"),
+            "dissipation": ("energy", "work that friction takes up in the step"),
+            "increment_work": ("energy", "work of tractions on clearances that open or close within increments"),
+            "n_increments": ("", "increments in which the step was gone"),
+            "linear_solves": ("", "linear systems solved in the step"),
+            "slip": ("length", "length of the path that each contact node has slipped"),
+            "last_slip": ("length", "what the last increment has added to it"),
+            "state": ("", "dimensionless displacement and traction of the contact nodes"),
+        },
         "transitions": {
             **_POINTS,
             "part": ("", "contact part"),

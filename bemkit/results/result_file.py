@@ -20,11 +20,12 @@ stranger runs no code. The layout, version 2:
 Every array has an attribute `meaning` and, where the scene names its units, `unit`; see `bemkit.results.file_meanings`.
 
 Of an assembly /assembly, /bodies and /contacts take the place of /scene, /mesh and /boundary; see
-`bemkit.results.assembly_file`.
+`bemkit.results.assembly_file`. Of a load history there are also /asked and /steps; see `bemkit.results.history_file`.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ from bemkit.hdf5 import FileFormat, Reader, ResultFileError, write_text
 from bemkit.results.assembly_file import read_assembly, write_assembly
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.file_meanings import annotate
+from bemkit.results.history_file import read_history, write_history
 from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
 from bemkit.results.outputs import STDOUT
 from bemkit.results.solution import Solution
@@ -74,6 +76,8 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
         with FORMAT.created(path) as file:
             write_text(file, "assembly", text)
             write_assembly(file, solution)
+            if solution.loading is not None:
+                write_history(file, solution.loading)
             annotate(file, solution.units)
         return
     text = scene_to_toml(solution.scene)
@@ -85,6 +89,8 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
         write_forces(file, "parts", solution.part_forces)
         write_forces(file, "contacts", solution.contacts)
         write_fields(file, solution.mesh, solution.boundary)
+        if solution.loading is not None:
+            write_history(file, solution.loading)
         annotate(file, solution.units)
 
 
@@ -108,7 +114,8 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
         except SceneError as error:
             raise reader.error(str(error)) from error
         try:
-            return read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
+            solution = read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
+            return replace(solution, loading=read_history(reader, solution.contact))
         except (ValueError, KeyError, OverflowError, RecursionError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
 

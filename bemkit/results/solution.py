@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at
+from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
@@ -32,6 +33,7 @@ from bemkit.solvers.base import Status, StepRecord
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.scene.assembly import Assembly
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +43,7 @@ class Solution(SolvedBody):
     Parameters
     ----------
     scene : Scene
+        Of a load history that of its last step.
     mesh : BoundaryMesh
     status : Status
     certificate : Certificate
@@ -65,6 +68,8 @@ class Solution(SolvedBody):
         Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
     warnings : tuple of str
         What is doubtful about the result, one sentence each; see `bemkit.results.warnings`.
+    loading : LoadHistory, optional
+        Of a load history the steps up to this one.
     """
 
     scene: Scene
@@ -86,6 +91,7 @@ class Solution(SolvedBody):
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    loading: LoadHistory | None = None
 
     def __repr__(self) -> str:
         """Return one line; the fields hold thousands of numbers."""
@@ -137,8 +143,8 @@ class Solution(SolvedBody):
 
     @property
     def stated(self) -> Scene:
-        """What was asked: the scene."""
-        return self.scene
+        """What was asked: the scene, with all its load steps."""
+        return self.scene if self.loading is None else cast(Scene, self.loading.asked)
 
     @property
     def units(self) -> UnitNames | None:
@@ -163,7 +169,8 @@ class Solution(SolvedBody):
     def friction_bound(self) -> FloatArray | None:
         """(n_contact,) array [Pa]: the largest friction at each contact node; None if there is none anywhere."""
         table = self.contact
-        return bound_at(table, self.scene.law_at(table.part, np.stack([table.x, table.y], axis=1)))
+        law = self.scene.law_at(table.part, np.stack([table.x, table.y], axis=1))
+        return bound_at(table, law if self.loading is None else law.at_slip(self.loading.motion))
 
     @cached_property
     def contacts(self) -> tuple[ContactForce, ...]:
@@ -210,7 +217,7 @@ class Solution(SolvedBody):
             ``estimated_traction_error`` (None without an estimate),
             ``parts`` (resultants of the tractions on each part), ``contacts`` (what each contact part feels),
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
-            ``work``, ``memory`` [bytes].
+            ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`).
         """
         return {
             "title": self.scene.title,
@@ -236,6 +243,7 @@ class Solution(SolvedBody):
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),
             "memory": dict(self.memory),
+            "steps": step_rows(self.loading),
         }
 
 
@@ -251,7 +259,7 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
     for name, solution in zip(names, solutions, strict=True):
         first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
         for record in solution.history:
-            message = f"{name}; {record.message}".rstrip("; ")
+            message = "; ".join(filter(None, (name, record.message)))
             total = spent + record.linear_solves
             records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
     return replace(
@@ -264,22 +272,29 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
     )
 
 
-def as_one(solutions: Sequence[AnySolution], n_steps: int) -> AnySolution:
-    """Return the last step of a load history with the steps, solves, times, memory and warnings of all.
+def following(
+    so_far: AnySolution | None, solution: AnySolution, asked: Scene | Assembly, number: int, n_steps: int
+) -> AnySolution:
+    """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
 
     Parameters
     ----------
-    solutions : sequence of Solution or AssemblySolution
-        As many as were reached.
-    n_steps : int
-        As many as there were to be.
+    so_far : Solution or AssemblySolution, optional
+        What this function returned for the step before.
+    solution : Solution or AssemblySolution
+        Of the step.
+    asked : Scene or Assembly
+        With all steps.
+    number, n_steps : int
+        Of the step, counted from 1, and of all.
     """
     if n_steps == 1:
-        return solutions[0]
-    names = [f"load step {number} of {n_steps}" for number in range(1, len(solutions) + 1)]
-    last = solutions[-1]
-    return replace(
-        with_totals(last, solutions, names),
-        message=f"{names[-1]}: {last.message}",
-        warnings=tuple(dict.fromkeys(warning for step in reversed(solutions) for warning in step.warnings)),
-    )
+        return solution
+    name = f"load step {number} of {n_steps}"
+    before = () if so_far is None else (so_far,)
+    total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
+    warnings = dict.fromkeys((*solution.warnings, *(text for each in before for text in each.warnings)))
+    loading = None if solution.loading is None else replace(solution.loading, asked=asked)
+    message = f"{name}: {solution.message}"
+    whole: AnySolution = replace(total, message=message, warnings=tuple(warnings), loading=loading)
+    return whole

@@ -15,13 +15,19 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.load_history import step_rows
 from bemkit.results.outputs import csv_text
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
 
-TABLES = ("contact", "boundary", "history")
+TABLES = ("contact", "boundary", "history", "steps")
 CSV_STARTS: Mapping[str, str] = MappingProxyType(
-    {"contact": "x,y,s,u_n,", "boundary": "element,part,x,", "history": "step,linear_solves,"}
+    {
+        "contact": "x,y,s,u_n,",
+        "boundary": "element,part,x,",
+        "history": "step,linear_solves,",
+        "steps": "time,external_work,",
+    }
 )
 """How the first line of each table begins, by which its files are recognised."""
 
@@ -38,12 +44,12 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
     solution : Solution or AssemblySolution
     table : str
         ``"contact"``: one row per contact node; ``"boundary"``: one row per element, values at its centre;
-        ``"history"``: one row per step of the solver.
+        ``"history"``: one row per step of the solver; ``"steps"``: one row per step of the load history.
 
     Raises
     ------
     InputError
-        If there is no table of that name.
+        If there is no table of that name, or no load history.
     """
     if table not in TABLES:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
@@ -85,6 +91,11 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
             if isinstance(solution, AssemblySolution):
                 return _columns_of_bodies(solution)
             return _boundary_columns(solution)
+        case "steps":
+            rows = step_rows(solution.loading)
+            if not rows:
+                raise InputError("the result has no load history: give [[steps]] or several load_factors")
+            return {name: [row[name] for row in rows] for name in rows[0]}
         case _:
             columns = dict(history_columns(solution.history))
             columns["worst"] = np.array([record.certificate.worst for record in solution.history])

@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import IntArray
 from bemkit.contact.body import ContactState
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
@@ -25,14 +26,13 @@ from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
 from bemkit.results.part_forces import contact_forces, nodal_resultants
 from bemkit.results.rigid_result import RigidResult
-from bemkit.results.solution import BoundaryFields, as_one
+from bemkit.results.solution import BoundaryFields
 from bemkit.results.warnings import find_assembly_warnings
-from bemkit.runs.history import UnsolvableSceneError
-from bemkit.runs.load_increments import reach_load
+from bemkit.runs.steps import History, Kind, joined, solve_steps
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
-from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
+from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 
 def run_assembly(
@@ -54,8 +54,7 @@ def run_assembly(
     Returns
     -------
     AssemblySolution
-        Of a load history the last step, with the linear solves and records of all; its assembly has the load factors
-        that were reached.
+        Of a load history the last step, with the linear solves and records of all.
 
     Raises
     ------
@@ -64,17 +63,7 @@ def run_assembly(
     ValueError
         If the assembly is not well posed; the message names the body or the contact.
     """
-    steps = run_assembly_history([assembly], meshes=meshes, callback=callback)
-    n_steps = len(assembly.load_factors)
-    if n_steps == 1:
-        return steps[0]
-    n_reached = max(1, sum(step.is_converged for step in steps))
-    stated = replace(steps[0].assembly, bodies=assembly.bodies, load_factors=assembly.load_factors[:n_reached])
-    bodies = {
-        body.name: replace(body, scene=stated.scene_of(placed))
-        for body, placed in zip(steps[-1].bodies.values(), stated.placed_bodies, strict=True)
-    }
-    return replace(as_one(steps, n_steps), assembly=stated, bodies=bodies)
+    return joined(*solved_assemblies([assembly], meshes, callback))
 
 
 def run_assembly_history(
@@ -86,13 +75,13 @@ def run_assembly_history(
     """Solve assemblies that follow each other in time, slip counting from the end of the step before.
 
     Every body is factored once for all steps. Where the jump to a load stalls, it is gone in halves; see
-    `bemkit.runs.load_increments.reach_load`.
+    `bemkit.runs.load_path.reach`.
 
     Parameters
     ----------
     assemblies : sequence of Assembly
-        The same bodies and contacts under changing loads, motions, gaps or laws; one with several load factors stands
-        for as many steps.
+        The same bodies and contacts under changing loads, motions, gaps or laws; one with several steps or load factors
+        stands for as many.
     meshes, callback : optional
         As for `run_assembly`.
 
@@ -107,9 +96,21 @@ def run_assembly_history(
     UnsolvableSceneError
         If no contact tractions can balance the first load.
     """
+    return solved_assemblies(assemblies, meshes, callback)[1]
+
+
+def solved_assemblies(
+    assemblies: Sequence[Assembly],
+    meshes: Mapping[str, BoundaryMesh] | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+    done: AssemblySolution | None = None,
+    finished: Callable[[AssemblySolution], None] | None = None,
+) -> tuple[History[AssemblySolution], tuple[AssemblySolution, ...]]:
+    """Solve assemblies as `run_assembly_history`; see `History` for what is done and who hears of finished steps."""
     scenes = [step for each in assemblies for step in load_steps(each)]
     if not scenes:
         raise InputError("assemblies is empty: give at least one assembly")
+    history: History[AssemblySolution] = History.of(assemblies[-1], scenes, done, finished)
     clock = StageClock.start()
     steps = prepare_assembly_steps(scenes, meshes)
     if not steps[0].n_contact:
@@ -121,63 +122,22 @@ def run_assembly_history(
         with assembly_time() as assembly:
             model = build_assembled_model(steps[0])
         clock = clock.closed_build(assembly)
-        result = with_energies_checked(model, _first_solved(model, callback=callback))
-        clock = clock.closed(Stage.SOLVE)
-        solutions = [_solution(model, result, plan, clock)]
-        for step in steps[1:]:
-            if not result.is_converged:
-                break
-            clock = StageClock.start()
-            before, model = model, model.under(step)
-            clock = clock.closed(Stage.CONDENSE)
-            reached = reach_load(before, model, result.state, callback)
-            model = replace(model, problem=reached.problem)
-            result = with_energies_checked(model, reached.result)
-            clock = clock.closed(Stage.SOLVE)
-            is_there = result.is_converged
-            solutions.append(
-                _solution(model, result, plan, clock) if is_there else _not_reached(solutions[-1], result, clock)
-            )
-    return tuple(solutions)
+        return history, solve_steps(SEVERAL_BODIES, model, steps, plan, history, clock=clock, callback=callback)
 
 
-def solved_assembly(
-    model: AssembledModel, plan: Plan, clock: StageClock, start: ContactState | None = None
-) -> tuple[AssemblySolution, ContactState]:
-    """Solve a model under a single load; return the physical fields, and the state that others may start from."""
-    result = with_energies_checked(model, _first_solved(model, start))
-    return _solution(model, result, plan, clock.closed(Stage.SOLVE)), result.state
+def explained(model: AssembledModel, result: ContactSolution) -> str:
+    """Say why nothing can balance the load."""
+    load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+    remedy = "hold what moves by a support, raise the friction, or change the loads"
+    return result.message if load is None else f"{load.description}: {remedy}"
 
 
-def _first_solved(
-    model: AssembledModel, start: ContactState | None = None, callback: Callable[[StepRecord], None] | None = None
-) -> ContactSolution:
-    solver = model.prepared.assembly.solver
-    result = solve(model.problem, solver, start=start, throw=False, callback=callback)
-    if not result.history:
-        load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-        remedy = "hold what moves by a support, raise the friction, or change the loads"
-        raise UnsolvableSceneError(result.message if load is None else f"{load.description}: {remedy}")
-    return result
-
-
-def _not_reached(before: AssemblySolution, result: ContactSolution, clock: StageClock) -> AssemblySolution:
-    """Return what stands for a step that failed: the fields of the step before, and why they are the last."""
-    return replace(
-        before,
-        status=result.status,
-        message=f"{result.message} The fields are those of the step before.",
-        history=result.history,
-        linear_solves=result.linear_solves,
-        outer_steps=result.steps,
-        timings=clock.timings,
-        memory=clock.memory,
-        warnings=before.plan.warnings,
-    )
-
-
-def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock: StageClock) -> AssemblySolution:
+def assembly_solution(
+    model: AssembledModel, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
+) -> AssemblySolution:
+    """Turn what the driver found into the physical fields of all bodies; the slip is for laws that depend on it."""
     prepared = model.prepared
+    law = prepared.law if motion is None else prepared.law.at_slip(motion)
     table = _contact_table(model, result.state, result.node_status)
     slip = table.u_t - model.problem.slip_origin * prepared.units.displacement
     transitions = find_transitions(table, slip)
@@ -209,7 +169,7 @@ def _solution(model: AssembledModel, result: ContactSolution, plan: Plan, clock:
         certificate=result.certificate,
         contact=table,
         contact_directions=prepared.frame[:, 0].copy(),
-        friction_bound=bound_at(table, prepared.law),
+        friction_bound=bound_at(table, law),
         contacts=contact_forces(table, nodal_resultants(table, prepared.frame, prepared.acting_at), transitions),
         history=result.history,
         linear_solves=result.linear_solves,
@@ -243,3 +203,6 @@ def _contact_table(model: AssembledModel, state: ContactState, node_status: IntA
         status=np.asarray(node_status).copy(),
         weight=prepared.column("weights"),
     )
+
+
+SEVERAL_BODIES: Kind[AssembledModel, AssemblySolution] = Kind(with_energies_checked, assembly_solution, explained)

@@ -13,7 +13,7 @@ from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.runs.history import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
-from bemkit.scene.load_history import with_scaled_loads
+from bemkit.scene.load_history import load_steps, with_scaled_loads
 
 
 def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh] | None = None) -> float:
@@ -42,7 +42,7 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
     The static theorem of limit analysis on the contact nodes, by one linear programme: nothing is said of stresses
     inside the bodies. Of Coulomb friction this is a bound from above, see `bemkit.contact.limit_load.largest_factor`.
     """
-    assembly = replace(assembly, load_factors=(1.0,))
+    assembly = load_steps(replace(assembly, load_factors=(1.0,)))[-1]
     loaded, constant = prepare_assembly_steps([assembly, with_scaled_loads(assembly, 0.0)], meshes)
     if not loaded.n_contact:
         raise InputError("no two bodies are in contact: list contacts")

@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
@@ -19,22 +20,19 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_held_friction
-from bemkit.model.untouched_body import certified
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, check_elements, check_memory, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions
-from bemkit.results.solution import BoundaryFields, Solution, as_one
+from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.warnings import find_warnings
+from bemkit.runs.steps import History, Kind, joined, solve_steps
+from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.runs.warm_start import state_on
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
-from bemkit.solvers.base import ContactSolution, Status, StepRecord, solve
-
-
-class UnsolvableSceneError(InputError):
-    """The scene has no solution; the message says why."""
+from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 
 def run_history(
@@ -46,34 +44,51 @@ def run_history(
 ) -> tuple[Solution, ...]:
     """Solve scenes that follow each other in time, slip counting from the end of the step before.
 
-    The body is factored once for all steps.
+    The body is factored once for all steps. Where the jump to a load fails, it is gone in halves; see
+    `bemkit.runs.load_path.reach`.
 
     Parameters
     ----------
     scenes : sequence of Scene
-        One body under changing loads, obstacles or laws; a scene with several load factors stands for as many steps.
+        One body under changing loads, obstacles or laws; a scene with several steps or load factors stands for as many.
     mesh, start, callback : optional
         As for `run`.
 
     Returns
     -------
     tuple of Solution
-        One for each step, up to the first that does not converge.
+        One for each step, up to the first that does not converge. If that is not the first one, its fields are those of
+        the step before, the last state that is certified; status, message and history are its own.
 
     Raises
     ------
     UnsolvableSceneError, ValueError
         As for `run`, also if the scenes differ by more than numbers.
     """
+    return solved_history(scenes, mesh, start, callback)[1]
+
+
+def solved_history(
+    scenes: Sequence[Scene],
+    mesh: BoundaryMesh | None = None,
+    start: Solution | None = None,
+    callback: Callable[[StepRecord], None] | None = None,
+    done: Solution | None = None,
+    finished: Callable[[Solution], None] | None = None,
+) -> tuple[History[Solution], tuple[Solution, ...]]:
+    """Solve scenes as `run_history`; see `History` for what is done and who hears of finished steps."""
     steps = [step for scene in scenes for step in load_steps(scene)]
     if not steps:
         raise InputError("scenes is empty: give at least one scene")
+    history: History[Solution] = History.of(scenes[-1], steps, done, finished)
     prepared, plan, clock = prepared_and_planned(steps, mesh)
     with blas_threads_for(plan.sizes.n_displacements):
         if start is not None and not steps[0].contact_parts:
             raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
         model, clock = built(prepared[0], clock)
-        return solve_in_turn(model, prepared, plan, start=start, callback=callback, clock=clock)
+        guess = None if start is None else state_on(model, start)
+        solved = solve_steps(ONE_BODY, model, prepared, plan, history, clock=clock, guess=guess, callback=callback)
+        return history, solved
 
 
 def prepared_and_planned(
@@ -97,39 +112,7 @@ def run_on_mesh(
     callback: Callable[[StepRecord], None] | None = None,
 ) -> Solution:
     """Solve a scene on one mesh; of a load history return the last step with the solves, records and times of all."""
-    return last_step(scene, run_history([scene], mesh=mesh, start=start, callback=callback))
-
-
-def last_step(scene: Scene, steps: Sequence[Solution]) -> Solution:
-    """Return the last load step of a scene with the solves, records and times of all."""
-    return steps[0] if len(scene.load_factors) == 1 else replace(as_one(steps, len(scene.load_factors)), scene=scene)
-
-
-def solve_in_turn(
-    model: Model,
-    steps: Sequence[Prepared],
-    plan: Plan,
-    *,
-    start: Solution | None = None,
-    callback: Callable[[StepRecord], None] | None = None,
-    clock: StageClock,
-) -> tuple[Solution, ...]:
-    """Solve load steps with the model of the first one, up to one that does not converge; see `run_history`."""
-    state = None if start is None else state_on(model, start)
-    solutions: list[Solution] = []
-    for step in steps:
-        if solutions and state is not None:
-            model = model.under(step)
-            model = replace(model, problem=replace(model.problem, reference_slip=state.u_t))
-        clock = clock.closed(Stage.CONDENSE)
-        result = with_energy_checked(model, _solved(model, state, callback))
-        clock = clock.closed(Stage.SOLVE)
-        solutions.append(solution_of(model, result, plan, clock))
-        clock = StageClock.start()
-        state = result.state
-        if not result.is_converged:
-            break
-    return tuple(solutions)
+    return joined(*solved_history([scene], mesh, start, callback))
 
 
 def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
@@ -139,19 +122,17 @@ def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
     return model, clock.closed_build(assembly)
 
 
-def _solved(model: Model, start: ContactState | None, callback: Callable[[StepRecord], None] | None) -> ContactSolution:
-    if not model.problem.n_contact:
-        return certified(model.problem.body, callback)
-    result = solve(model.problem, model.scene.solver, start=start, throw=False, callback=callback)
-    if not result.history:
-        load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-        raise UnsolvableSceneError(result.message if load is None else describe(model.prepared, load))
-    return result
+def explained(model: Model, result: ContactSolution) -> str:
+    """Say why nothing can balance the load."""
+    load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+    return result.message if load is None else describe(model.prepared, load)
 
 
-def solution_of(model: Model, result: ContactSolution, plan: Plan, clock: StageClock) -> Solution:
-    """Turn what the driver found into physical fields."""
-    state, node_status = with_held_friction(model, result.state, result.node_status)
+def solution_of(
+    model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
+) -> Solution:
+    """Turn what the driver found into physical fields; the slip is for laws that depend on it."""
+    state, node_status = with_held_friction(model, result.state, result.node_status, motion)
     displacement, traction_dofs, energy = model.boundary_fields(state)
     table = _contact_table(model, state, node_status, displacement)
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
@@ -210,3 +191,6 @@ def _contact_table(
         status=np.asarray(node_status).copy(),
         weight=model.nodes.weights * units.length,
     )
+
+
+ONE_BODY: Kind[Model, Solution] = Kind(with_energy_checked, solution_of, explained)

@@ -51,8 +51,8 @@ def run_cascade(
         raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
     if not scene.contact_parts:
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
-    if len(scene.load_factors) > 1:
-        raise CascadeError(f"a load history of {len(scene.load_factors)} steps cannot cascade: run it on one mesh")
+    if scene.n_steps > 1:
+        raise CascadeError(f"a load history of {scene.n_steps} steps cannot cascade: run it on one mesh")
     if scene.mesh.accuracy is not None:
         return run_adaptive(scene, callback=callback)
     check_elements(scene)

@@ -133,8 +133,8 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     """
     if not scene.contact_parts:
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
-    if len(scene.load_factors) > 1:
-        raise LoadHistoryError(f"a load history of {len(scene.load_factors)} steps cannot be probed: give one factor")
+    if scene.n_steps > 1:
+        raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
     (prepared,), plan, clock = prepared_and_planned(load_steps(scene), mesh)
     with blas_threads_for(plan.sizes.n_displacements):
         model, clock = built(prepared, clock)

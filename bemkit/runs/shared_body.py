@@ -21,10 +21,12 @@ from bemkit.plan import check_memory
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.assembly import solved_assembly
-from bemkit.runs.history import last_step, prepared_and_planned, solve_in_turn
+from bemkit.runs.assembly import SEVERAL_BODIES, assembly_solution
+from bemkit.runs.history import ONE_BODY, prepared_and_planned
 from bemkit.runs.run import run
+from bemkit.runs.steps import History, joined, solve_steps, solved_once
 from bemkit.runs.timing import Stage, StageClock
+from bemkit.runs.warm_start import state_on
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
@@ -140,7 +142,11 @@ class _OneBody:
         with blas_threads_for(self._plan.sizes.n_displacements):
             model, steps = self._under(scene)
             clock = clock.closed(Stage.CONDENSE)
-            solution = last_step(scene, solve_in_turn(model, steps, self._plan, start=start, clock=clock))
+            history: History[Solution] = History.of(scene, [step.scene for step in steps])
+            guess = None if start is None else state_on(model, start)
+            solution = joined(
+                history, solve_steps(ONE_BODY, model, steps, self._plan, history, clock=clock, guess=guess)
+            )
         if solution.is_converged and len(steps) == 1 and scene.contact_parts:
             self._last = solution
         return solution
@@ -166,7 +172,7 @@ class _SeveralBodies:
     """The bodies of an assembly under several loads, gaps and laws."""
 
     def __init__(self, base: Assembly) -> None:
-        prepared = prepare_assembly(replace(base, load_factors=(1.0,)))
+        prepared = prepare_assembly(load_steps(base)[0])
         if not prepared.n_contact:
             raise InputError("no two bodies are in contact")
         self._plan = plan_assembly([prepared])
@@ -183,7 +189,7 @@ class _SeveralBodies:
         if not isinstance(scene, Assembly):
             return run(scene)
         clock, base = StageClock.start(), self._model.prepared
-        if scene.load_factors != (1.0,):  # a history of its own
+        if scene.load_factors != (1.0,) or scene.steps:  # a history of its own
             return run(scene)
         prepared = base.under(scene.with_contacts(base.assembly.contacts) if scene.touching else scene)
         if not _has_same_rows(prepared, base):  # an obstacle that has turned, say
@@ -191,9 +197,10 @@ class _SeveralBodies:
         with self._threads(base):
             model = self._model.under(prepared)
             clock, start = clock.closed(Stage.CONDENSE), None if is_cold else self._last
-            solution, state = solved_assembly(model, self._plan, clock, start)
+            reached = solved_once(SEVERAL_BODIES, model, start)
+            solution = assembly_solution(model, reached, self._plan, clock.closed(Stage.SOLVE))
         if solution.is_converged:
-            self._last = state
+            self._last = reached.state
         return solution
 
     def _threads(self, prepared: PreparedAssembly) -> AbstractContextManager[None]:

@@ -19,6 +19,7 @@ from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -144,8 +145,10 @@ class Assembly:
     law : FrictionLaw
         In all contacts that have no law of their own, with bodies and with rigid obstacles.
     load_factors : tuple of float
-        All loads, given displacements and body forces that are not constant times these numbers, one step after the
-        other; slip counts from the end of the step before. Gaps and obstacles stay as they are.
+        The short way to say a load history: all loads, given displacements and body forces that are not constant times
+        these numbers, at the times 1, 2, 3 and so on. Gaps and obstacles stay as they are.
+    steps : tuple of Step
+        The load history: what changes from step to step; slip counts from the end of the step before.
     discretisation : Discretisation
         Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
@@ -161,8 +164,9 @@ class Assembly:
     ------
     InputError
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
-        listed twice, a rigid body takes part in no contact, a load factor is missing or not finite, or an accuracy is
-        asked of collocation or goes with elements of a body or with load factors.
+        listed twice, a rigid body takes part in no contact, a load factor is missing or not finite, times do not
+        increase, a law needs slip or time without steps, or an accuracy is asked of collocation or goes with elements
+        of a body or with a load history.
     """
 
     title: str
@@ -172,6 +176,7 @@ class Assembly:
     touching: Touching | None = None
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
+    steps: tuple[Step, ...] = ()
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
     mesh: MeshOptions = field(default_factory=MeshOptions)
@@ -181,17 +186,17 @@ class Assembly:
     reference: str = ""
 
     def __post_init__(self) -> None:
-        if not self.title or not self.title.isprintable():
-            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        object.__setattr__(self, "steps", tuple(self.steps))
+        check_stated(self.title, self.load_factors, self.steps)
         if not self.bodies:
             raise InputError("bodies is empty: give at least one body")
         names = Counter([*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)])
         repeated = [name for name, count in names.items() if count > 1]
         if repeated:
             raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
-        object.__setattr__(self, "load_factors", tuple(self.load_factors))
-        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
-            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        own = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
+        check_laws({"law": self.law, **own}, self.steps)
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
         for pair in self.contacts:
             if pairs[frozenset(pair.sides)] > 1:
@@ -205,9 +210,9 @@ class Assembly:
             _ = self.scene_of(body)  # parts and sides are checked
 
     def _check_accuracy(self, accuracy: float) -> None:
-        if len(self.load_factors) > 1:
+        if self.n_steps > 1:
             raise InputError(
-                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
+                f"mesh.accuracy is {accuracy} with a load history of {self.n_steps} steps, whose memory "
                 "belongs to one mesh: give elements"
             )
         for body in self.bodies:
@@ -226,6 +231,11 @@ class Assembly:
                 raise InputError(
                     f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
                 )
+
+    @property
+    def n_steps(self) -> int:
+        """Number of load steps, increments counted."""
+        return n_steps(self.load_factors, self.steps)
 
     def _check_rigid(self) -> None:
         known = [body.name for body in self.rigid]
@@ -326,7 +336,7 @@ class Assembly:
                 parts=parts,
                 body_forces=body.body_forces,
                 law=self.law if touches_obstacle else Frictionless(),
-                load_factors=self.load_factors,
+                steps=self.steps,
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,
                 mesh=self.mesh if body.mesh is None else body.mesh,

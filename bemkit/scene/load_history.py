@@ -1,4 +1,4 @@
-"""Load histories: one scene after the other, with slip counted from the end of the step before.
+"""Load histories: one scene after the other in time, with slip counted from the end of the step before.
 
 The static law judges slip by the total displacement, as if the whole load came at once. Real loads grow, and friction
 remembers: under the incremental law a point that stuck under the first tenth of the load keeps that place as its new
@@ -7,32 +7,95 @@ origin. For a cylinder pressed into a block the two laws differ by a factor of t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from bemkit.arrays import FloatArray
-from bemkit.formulas import Expression, ScalarField
+from bemkit.errors import InputError
+from bemkit.formulas import Expression, ExpressionError, ScalarField
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
+from bemkit.scene.places import Place, with_value
 from bemkit.scene.scene import Scene
+from bemkit.scene.steps import Step, TimeValue
+
+_TIME, _COORDINATES = re.compile(r"\bt\b"), re.compile(r"\b[xy]\b")
 
 AnyScene = TypeVar("AnyScene", Scene, Assembly)
 
 
 def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
-    """Return the steps of a load history, each a scene or an assembly of its own with a single load.
+    """Return the steps of a load history, each a scene or an assembly of its own.
 
     Returns
     -------
     tuple of Scene or of Assembly
-        As many as there are load factors.
+        One for each increment of each step, or for each load factor. Each has a single load and, in a history, a single
+        step that only says its time.
+
+    Raises
+    ------
+    PlaceError
+        If a step names a place that the scene does not have, or a value that does not fit there.
     """
-    if scene.load_factors == (1.0,):
+    if not scene.steps and len(scene.load_factors) == 1:
+        (factor,) = scene.load_factors
+        return (scene,) if factor == 1.0 else (with_scaled_loads(scene, factor),)
+    if len(scene.steps) == 1 and scene.steps[0].is_plain:
         return (scene,)
-    return tuple(with_scaled_loads(scene, factor) for factor in scene.load_factors)
+    factors = enumerate(scene.load_factors, start=1)
+    steps = scene.steps or [Step(float(number), load_factor=factor) for number, factor in factors]
+    base: AnyScene = replace(scene, load_factors=(1.0,), steps=(Step(steps[-1].time),))
+    states: list[AnyScene] = []
+    changes: dict[str, Any] = {}
+    load_factor: TimeValue = 1.0
+    last = 0.0
+    for number, step in enumerate(steps):
+        changes = {**{place: value for place, value in changes.items() if place not in step.changes}, **step.changes}
+        load_factor = load_factor if step.load_factor is None else step.load_factor
+        for increment in range(1, step.increments + 1):
+            time = (
+                step.time if increment == step.increments else last + (step.time - last) * increment / step.increments
+            )
+            try:
+                states.append(_at_time(base, changes, load_factor, time))
+            except ValueError as error:
+                raise type(error)(f"steps[{number}]: {error}") if scene.steps else error from error
+        last = step.time
+    return tuple(states)
+
+
+def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> AnyScene:
+    """Return a scene at a time of its history, under the changes that hold there."""
+    for place, value in changes.items():
+        scene = with_value(scene, Place(place), _value(value, time))
+    scaled = _value(factor, time)
+    if not isinstance(scaled, int | float) or not math.isfinite(scaled):
+        raise InputError(f"load_factor is {scaled!r} at t = {time:g}: give a number, or a formula of t alone")
+    return replace(with_scaled_loads(scene, float(scaled)), steps=(Step(time),))
+
+
+def _value(value: Any, time: float) -> Any:
+    """Return a value at a time: formulas know t, and those without x and y are numbers."""
+    if isinstance(value, Expression) or not (callable(value) or isinstance(value, str)):
+        return value
+    if not isinstance(value, str):
+        return value(time)
+    text = _TIME.sub(f"({time!r})", value)
+    if _COORDINATES.search(text):
+        return text
+    try:
+        formula = Expression(text)
+    except ExpressionError:
+        if text != value:
+            raise
+        return value  # a word
+    return text if formula.is_condition else float(formula(0.0, 0.0))
 
 
 def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
@@ -43,6 +106,8 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
     Scene or Assembly
         With the load factor 1; obstacles, gaps, laws, and body forces that are constant are unchanged.
     """
+    if factor == 1.0 and scene.load_factors == (1.0,):
+        return scene
     if isinstance(scene, Assembly):
         bodies = tuple(replace(body, **_scaled(body, factor)) for body in scene.bodies)
         rigid = tuple(body.scaled(factor) for body in scene.rigid)

@@ -179,6 +179,8 @@ LAWS = Registry(
         "tresca": "bemkit.contact.laws:Tresca",
         "coulomb": "bemkit.contact.laws:Coulomb",
         "cohesive-coulomb": "bemkit.contact.laws:CohesiveCoulomb",
+        "slip-weakening": "bemkit.contact.history_laws:SlipWeakening",
+        "rate-strengthening": "bemkit.contact.history_laws:RateStrengthening",
     },
     "bemkit.laws",
 )

@@ -29,6 +29,7 @@ from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.far_field import FarField, check_half_plane
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
@@ -58,9 +59,11 @@ class Scene:
     law : FrictionLaw
         On all contact parts that have no law of their own.
     load_factors : tuple of float
-        The load history: all tractions, pressures, prescribed displacements and body forces times these numbers, one
-        step after the other. A single number (the default is 1) is the static law, which judges slip by the total
-        displacement; with several, slip counts from the end of the step before (the incremental law).
+        The short way to say a load history: all tractions, pressures, prescribed displacements and body forces times
+        these numbers, at the times 1, 2, 3 and so on.
+    steps : tuple of Step
+        The load history: what changes from step to step. Without one, or with a single step, slip counts from the
+        undeformed body (the static law); with several, from the end of the step before (the incremental law).
     symmetry : Symmetry, optional
         Lines about which the scene, which describes the whole body, is symmetric. Only the elements on the side
         x <= a, y <= b carry unknowns, the others are their images; results are those of that side.
@@ -82,8 +85,9 @@ class Scene:
     ------
     ValueError
         If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
-        finite, body forces act in an exterior, an accuracy is asked of collocation or of a load history, conjugate
-        gradients are asked of collocation, or a law with friction or a solver is given without any contact.
+        finite, times do not increase, a law needs slip or time without steps, body forces act in an exterior, an
+        accuracy is asked of collocation, conjugate gradients are asked of collocation, or a law with friction or a
+        solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
     """
@@ -94,6 +98,7 @@ class Scene:
     parts: tuple[Part, ...]
     law: FrictionLaw = field(default_factory=Frictionless)
     load_factors: tuple[float, ...] = (1.0,)
+    steps: tuple[Step, ...] = ()
     symmetry: Symmetry | None = None
     body_forces: tuple[BodyForce, ...] = ()
     far: FarField | None = None
@@ -106,15 +111,15 @@ class Scene:
     reference: str = ""
 
     def __post_init__(self) -> None:
-        if not self.title or not self.title.isprintable():
-            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        object.__setattr__(self, "steps", tuple(self.steps))
+        check_stated(self.title, self.load_factors, self.steps)
         repeated = [name for name, count in Counter(part.name for part in self.parts).items() if count > 1]
         if repeated:
             raise InputError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
         if not self.contact_parts:
             self._check_without_contact()
-        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
-            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
         if isinstance(self.linear_solver, Krylov):
             self._check_krylov(self.linear_solver)
         if self.mesh.accuracy is not None:
@@ -167,11 +172,11 @@ class Scene:
                 f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
                 "discretisation 'quadratic' or 'linear', or give elements"
             )
-        if len(self.load_factors) > 1:
-            raise InputError(
-                f"mesh.accuracy is {accuracy} with a load history of {len(self.load_factors)} steps, whose memory "
-                "belongs to one mesh: give elements"
-            )
+
+    @property
+    def n_steps(self) -> int:
+        """Number of load steps, increments counted."""
+        return n_steps(self.load_factors, self.steps)
 
     @property
     def contact_parts(self) -> tuple[Part, ...]:

@@ -160,7 +160,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
         for entry, content in _written_fields(value, keep_defaults)
     }
-    registry = _registry(declared)
+    registry = _registry(FrictionLaw if isinstance(value, FrictionLaw) else declared)
     if registry is None:
         return table
     try:

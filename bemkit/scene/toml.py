@@ -27,11 +27,11 @@ MAX_BYTES = 1_000_000
 # the order of keys in files that are written, as a reader wants it
 _SCENE_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "symmetry", "law", "shape", "material", "body_forces", "far", "mesh", "parts"),
+    *("load_factors", "steps", "symmetry", "law", "shape", "material", "body_forces", "far", "mesh", "parts"),
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "law", "touching", "mesh", "bodies", "rigid", "contacts"),
+    *("load_factors", "steps", "law", "touching", "mesh", "bodies", "rigid", "contacts"),
 )
 _BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
 _RIGID_KEYS = ("obstacle", "centre", "x", "y", "turn", "force_x", "force_y", "moment")

@@ -40,6 +40,10 @@ class Status(Enum):
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
     )
+    UNFINISHED = (
+        "The load history has not come to its end; run its scene with the same result file again to go on from the "
+        "last step that is finished."
+    )
     TOO_COSTLY = (
         "This driver asks for several responses for each contact node, and those of this body are costly; use "
         "SemismoothNewton, AugmentedLagrangian or FixedPoint."

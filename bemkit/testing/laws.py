@@ -4,6 +4,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.testing.failure import CheckFailed, demand, evaluated
 
 
@@ -36,8 +37,31 @@ def check_law(law: FrictionLaw, *, stress_scale: float = 1.0, n_contact: int = 5
         demand(bool(is_local), f"{name}.bound at node 0 depends on the pressure at other nodes")
         _check_scaling(law, name, sigma_n)
     _check_values(law, name, np.zeros(n_contact))
+    if law.needs_history:
+        _check_history(law, name, stress_scale, n_contact, random)
     acts = np.asarray(law.acts_across_gap)
     demand(acts.dtype == bool and acts.shape in ((), (n_contact,)), f"{name}.acts_across_gap is no bool")
+
+
+def _check_history(
+    law: FrictionLaw, name: str, stress_scale: float, n_contact: int, random: np.random.Generator
+) -> None:
+    """Check the laws of single load steps: each a law without history, at each node by the slip of that node."""
+    sigma_n = np.full(n_contact, -stress_scale)
+    for _ in range(5):
+        slip = 10.0 ** random.uniform(-6.0, 1.0, n_contact)
+        motion = SlipHistory(2.0, 0.5, slip, 0.3 * slip)
+        present = law.at_slip(motion)
+        demand(not present.needs_history, f"{name}.at_slip returns a law that needs a history itself")
+        _check_values(present, f"{name}.at_slip(...)", sigma_n)
+        _check_derivative(present, f"{name}.at_slip(...)", sigma_n)
+        unit = 1e6
+        scaled = unit * law.scaled(unit).at_slip(motion).bound(sigma_n / unit)
+        agrees = np.allclose(scaled, present.bound(sigma_n), rtol=1e-12, atol=0.0)
+        demand(agrees, f"{name}.scaled({unit:g}).at_slip is not the law in that unit")
+        other = SlipHistory(2.0, 0.5, np.append(slip[:1], 3.0 * slip[1:]), 0.3 * np.append(slip[:1], 3.0 * slip[1:]))
+        is_local = law.at_slip(other).bound(sigma_n)[0] == present.bound(sigma_n)[0]
+        demand(bool(is_local), f"{name}.at_slip at node 0 depends on the slip of other nodes")
 
 
 def _check_values(law: FrictionLaw, name: str, sigma_n: FloatArray) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,10 @@ def test_friction_remembers() -> None:
     np.testing.assert_allclose(released.contact.u_t[slips], pushed.contact.u_t[slips], rtol=1e-9)
     assert released.force_tangential == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(UnsolvableSceneError, match="slides the body to the right"):
-        bk.run(block(push=0.3, press=-0.5, load_factors=(0.0, 1.0)))
+        bk.run(block(push=0.3, press=-0.5, load_factors=(1.0, 0.0)))
+    unheld = bk.run(block(push=0.3, press=-0.5, load_factors=(0.0, 1.0)))
+    assert unheld.status is bk.Status.UNSOLVABLE_LOAD
+    assert re.search("slides the body to the right.* Finished: 1 of 2 steps, up to t = 1", unheld.message)
 
 
 def test_an_elastic_step_back_and_forth_changes_nothing() -> None:
@@ -153,6 +157,7 @@ def test_scaling_of_loads() -> None:
     scene = dataclasses.replace(scene, parts=(scene.parts[0], pressure, clamp), load_factors=(0.5, 1.0))
     steps = load_steps(scene)
     assert [step.load_factors for step in steps] == [(1.0,), (1.0,)]
+    assert [step.steps for step in steps] == [(bk.Step(1.0),), (bk.Step(2.0),)]
     assert steps[0].parts[1].condition == bk.Pressure(1.0, 2.0)
     assert steps[0].parts[2].condition == bk.PrescribedDisplacement(y=0.25)
     assert steps[1].parts == scene.parts
@@ -168,7 +173,8 @@ def test_the_summary_covers_all_steps() -> None:
     assert [record.step for record in whole.history] == list(range(len(records)))
     assert whole.message.startswith("load step 3 of 3: ")
     assert whole.history[0].message.startswith("load step 1 of 3")
-    assert whole.scene.load_factors == factors
+    assert whole.stated == block(load_factors=factors)
+    assert whole.scene == load_steps(whole.stated)[-1]
     np.testing.assert_array_equal(whole.contact.sigma_n, steps[-1].contact.sigma_n)
     history_item = next(item for item in whole.plan.items if item.name == "load history")
     assert history_item.is_needed

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, blended
 from bemkit.contact.body import ContactState
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
@@ -19,13 +19,15 @@ from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
 from bemkit.model.boundary_tractions import insert_loads
+from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import NotConvergedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity, condensed_under
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes, supporting_forces
+from bemkit.solvers.base import ContactSolver
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,53 @@ class AssembledModel:
             body = replace(body, tangent_is_eliminated=is_eliminated)
         spent = sum((condensed[group[0]].work for group in groups(prepared.bodies)), OperationCounts())
         return AssembledModel(prepared, elastic, condensed, body, _problem(prepared, body), self.work + spent)
+
+    @property
+    def units(self) -> Units:
+        """The physical size of one dimensionless unit."""
+        return self.prepared.units
+
+    @property
+    def solver(self) -> ContactSolver:
+        """The driver."""
+        return self.prepared.assembly.solver
+
+    @property
+    def has_body_forces(self) -> bool:
+        """Whether something acts inside a body."""
+        return any(inside is not None for inside in self.prepared.insides)
+
+    def between(self, before: AssembledModel, share: float) -> ContactProblem:
+        """Return the problem at a share of the way from the loads and gaps of a step before to those of this model.
+
+        Notes
+        -----
+        Condensed loads, relative displacements that supports prescribe, and gaps are affine in what is given, so that
+        these are interpolated, and no formula.
+        """
+        if share == 1.0:
+            return self.problem
+        pairs = zip(before.body.members, self.body.members, strict=True)
+        loads = [blended(one.load, two.load, share) for one, two in pairs]
+        body = self.body.under(loads, blended(before.body.offset, self.body.offset, share))
+        return replace(self.problem, body=body, gap=blended(before.problem.gap, self.problem.gap, share))
+
+    def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return the forces of loads and supports on all bodies, and the displacements on which they work.
+
+        On the nodes of all elastic bodies [N/m] and [m], then on the motions of rigid bodies.
+        """
+        prepared, forces, displacements = self.prepared, [np.zeros(0)], [np.zeros(0)]
+        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
+        bodies = zip(prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True)
+        for conditions, given, condensed, own in bodies:
+            displacement, force = condensed.recover(own)
+            forces.append(supporting_forces(conditions, given, force) * prepared.force_unit)
+            displacements.append(displacement.ravel() * prepared.units.displacement)
+        rigid = self.rigid_bodies(state)
+        forces += [reaction for _, reaction in rigid]
+        displacements += [motion for motion, _ in rigid]
+        return np.concatenate(forces), np.concatenate(displacements)
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.material import Material
@@ -57,6 +57,16 @@ class ForcesInside:
             force=force,
             volume_force=-np.array([*force.sum(axis=0), moment]),
             inner_force=float(np.abs(force).sum()) + solution.material.plane_modulus * strained_length,
+        )
+
+    def blended(self, other: ForcesInside, share: float) -> ForcesInside:
+        """Return what nodes see a share of the way to other forces; its solution is that of the other ones."""
+        return replace(
+            other,
+            displacement=blended(self.displacement, other.displacement, share),
+            force=blended(self.force, other.force, share),
+            volume_force=blended(self.volume_force, other.volume_force, share),
+            inner_force=max(self.inner_force, other.inner_force),
         )
 
     def add_to(self, weightless: CondensedMap, conditions: NodalConditions) -> CondensedMap:

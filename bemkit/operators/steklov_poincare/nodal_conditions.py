@@ -131,6 +131,20 @@ class GivenData:
         return factor if np.all(np.abs(own - factor * other) <= _FACTOR_TOLERANCE * np.abs(own)) else None
 
 
+def supporting_forces(conditions: NodalConditions, given: FloatArray, total: FloatArray) -> FloatArray:
+    """Return the forces (2 n_nodes,) [N/m] of loads and supports, in x and y.
+
+    Parameters
+    ----------
+    conditions : NodalConditions
+    given, total : (n_nodes, 2) arrays [N/m]
+        The given forces, and all that act on the boundary of the body.
+    """
+    local, own = (np.einsum("nkc,nc->nk", conditions.frame, each) for each in (total, given))
+    acting = np.where(conditions.is_fixed, local, own)
+    return np.asarray(np.einsum("nkc,nk->nc", conditions.frame, acting)).ravel()
+
+
 def integrate_traction(space: BoundarySpace, elements: IntArray, field: TractionField) -> FloatArray:
     """Return the consistent nodal forces (n_nodes, 2) [N/m] of tractions on some elements.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.scene.toml import SceneError
+from bemkit.scene.places import PlaceError
 from bemkit.studies.engine import StudyError
 from bemkit.studies.sweep.grid import all_rows, read_variation
 from bemkit.studies.sweep.keys import Key, VariedScene
@@ -54,7 +54,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
         (SCENE, "shape.corner[2]", r"shape\.corner\[2\]: unknown entry: shape\.corner has 2, counted from 0"),
         (SCENE, "law[0]", r"law is no list: leave \[0\] out"),
         (SCENE, "material.plane", "material.plane is a word: only numbers can be varied"),
-        (SCENE, "symmetry.x", "symmetry is left out in the scene: write it there, then vary it"),
+        (SCENE, "symmetry.x", "symmetry is left out in the scene: write it there first"),
         (SCENE, "law..x", "give a place in a scene file, such as law.friction_coefficient"),
         (BODIES, "bodies.uper.material.youngs_modulus", "bodies.uper: unknown key: .*did you mean 'upper'"),
         (BODIES, "contacts[1].gap", r"contacts\[1\]: unknown entry: contacts has 1"),
@@ -62,14 +62,14 @@ def test_numbers_of_several_bodies_are_changed() -> None:
     ],
 )
 def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Assembly, key: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(PlaceError, match=message):
         VariedScene(scene).check([Key(key)])
 
 
 def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
-    with pytest.raises(SceneError, match=r"^material: poisson_ratio is 0\.7"):
+    with pytest.raises(PlaceError, match=r"^material: poisson_ratio is 0\.7"):
         changed(SCENE, "material.poisson_ratio", 0.7)
-    with pytest.raises(SceneError, match=r"^mesh\.elements: 40\.5 does not fit: give a whole number"):
+    with pytest.raises(PlaceError, match=r"^mesh\.elements: 40\.5 does not fit: give a whole number"):
         changed(SCENE, "mesh.elements", 40.5)
 
 
@@ -93,7 +93,7 @@ def test_which_keys_keep_the_bodies(key: str, keeps: bool) -> None:
 
 
 def test_names_with_dots_stand_in_quotation_marks() -> None:
-    assert Key('parts."a.b".condition.y').steps == ("parts", "a.b", "condition", "y")
+    assert Key('parts."a.b".condition.y').names == ("parts", "a.b", "condition", "y")
 
 
 def test_words_of_the_command_line() -> None:

@@ -129,7 +129,7 @@ def _tractions(solution: Solution, points: FloatArray, normals: FloatArray) -> F
         elements = solution.mesh.part(part.name)
         if isinstance(part.condition, Traction | Pressure):
             load = part.condition.at(points[elements].reshape(-1, 2), normals[elements].reshape(-1, 2))
-            traction[elements] = solution.scene.load_factors[-1] * load.reshape(traction[elements].shape)
+            traction[elements] = load.reshape(traction[elements].shape)
         elif not isinstance(part.condition, Contact):
             traction[elements] = solution.boundary.traction[elements][:, None]
     return traction
@@ -144,7 +144,7 @@ def _held(solution: Solution, node_points: FloatArray, node_normals: FloatArray)
             case Clamped():
                 given, components = np.zeros_like(points), [0, 1]
             case PrescribedDisplacement(is_prescribed=is_prescribed) as condition:
-                given = solution.scene.load_factors[-1] * condition.at(points.reshape(-1, 2)).reshape(points.shape)
+                given = condition.at(points.reshape(-1, 2)).reshape(points.shape)
                 components = np.flatnonzero(is_prescribed).tolist()
             case Roller():
                 yield Held(elements, node_normals[elements], np.zeros(points.shape[:2]))

@@ -225,7 +225,7 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
         return IndependentCheck(**{**unknown, "numbers": float("inf")})
     parts = Fields.of(solution, before)
     measured = measured_contact(parts)
-    has_history = before is None and len(solution.scene.load_factors) > 1
+    has_history = before is None and solution.loading is not None and len(solution.loading.steps) > 1
     return IndependentCheck(
         numbers=0.0,
         obstacle=obstacle_mismatch(parts),

@@ -11,7 +11,6 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.results.solution import Solution
 from bemkit.scene.body_forces import Gravity, Heating, Rotation
-from bemkit.scene.load_history import load_steps
 from bemkit.studies.stability.independent_check.boundary import Boundary
 
 
@@ -25,7 +24,7 @@ def inner_work(solution: Solution, boundary: Boundary) -> FloatArray:
     area = 0.5 * float(np.sum(arms * measure))
     moments = 0.5 * np.sum(arms**2 * measure, axis=(0, 1))
     work = np.zeros(3)
-    for force in load_steps(solution.scene)[-1].body_forces:
+    for force in solution.scene.body_forces:
         match force:
             case Gravity(density, acceleration):
                 density_of_force = density * np.array(acceleration, dtype=float)

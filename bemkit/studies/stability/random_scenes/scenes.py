@@ -33,6 +33,7 @@ from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_scenes.bodies import Body, random_body
 from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.histories import pressed_and_sheared
 from bemkit.studies.stability.random_scenes.inside import random_body_forces
 from bemkit.studies.stability.random_scenes.parts import random_actions, random_contact, random_law
 from bemkit.testing.lemke import LemkePivoting
@@ -75,7 +76,7 @@ def random_case(seed: int, index: int) -> RandomCase:
         layout = {"shape": body.shape, "parts": parts, "law": law}
     layout |= _inside(index, seed, layout, modulus)
     scene = _scene(draw, f"random scene {index} of seed {seed}", modulus, layout)
-    return RandomCase(seed, index, _history(draw, scene))
+    return RandomCase(seed, index, pressed_and_sheared(seed, index, scene) or _history(draw, scene))
 
 
 def _inside(index: int, seed: int, layout: dict[str, Any], modulus: float) -> dict[str, Any]:

@@ -1,0 +1,160 @@
+"""What a result says of the steps of a load history: forces, status and work of each, and where the last one stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.slip_history import SlipHistory
+from bemkit.results.contact_table import ContactTable
+
+if TYPE_CHECKING:
+    from bemkit.scene.assembly import Assembly
+    from bemkit.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class StepWork:
+    """Work in one step, or in several.
+
+    Parameters
+    ----------
+    external_work : float [J/m]
+        Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
+        heat it is what the other entries leave.
+    dissipation : float [J/m]
+        What friction takes up, at nodes that are closed at both ends of an increment; never negative.
+    increment_work : float [J/m]
+        What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
+        turns back under a falling friction bound. It vanishes as increments become smaller.
+
+    Notes
+    -----
+    All by the trapezoidal rule on each increment, with which, for a body with a symmetric stiffness, ``external_work =
+    change of elastic energy + dissipation + increment_work`` but for round-off.
+    """
+
+    external_work: float = 0.0
+    dissipation: float = 0.0
+    increment_work: float = 0.0
+
+    def __add__(self, other: StepWork) -> StepWork:
+        """Return the work in both."""
+        return StepWork(
+            self.external_work + other.external_work,
+            self.dissipation + other.dissipation,
+            self.increment_work + other.increment_work,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LoadStep:
+    """One finished step of a load history.
+
+    Parameters
+    ----------
+    time : float [s]
+        At its end.
+    work : StepWork
+        In this step.
+    elastic_energy : float [J/m]
+        At its end.
+    n_increments : int
+        One, or the increments in which the step was gone because one jump failed.
+    linear_solves : int
+    contact : ContactTable
+    slip : (n_contact,) array [m]
+        Length of the path that each node has slipped so far.
+    """
+
+    time: float
+    work: StepWork
+    elastic_energy: float
+    n_increments: int
+    linear_solves: int
+    contact: ContactTable
+    slip: FloatArray
+
+    @property
+    def force_normal(self) -> float:
+        """Total pressing force [N/m], positive."""
+        return -float(self.contact.weight @ self.contact.sigma_n)
+
+    @property
+    def force_tangential(self) -> float:
+        """Integral of sigma_t [N/m]."""
+        return float(self.contact.weight @ self.contact.sigma_t)
+
+    @property
+    def mean_displacement(self) -> float:
+        """Mean tangential displacement of the contact nodes [m]."""
+        table = self.contact
+        return float(table.weight @ table.u_t) / float(table.weight.sum()) if table.n_contact else 0.0
+
+    def as_dict(self) -> dict[str, float | int]:
+        """Return the numbers by the names of the JSON output."""
+        words = self.contact.status_words()
+        return {
+            "time": self.time,
+            "external_work": self.work.external_work,
+            "elastic_energy": self.elastic_energy,
+            "dissipation": self.work.dissipation,
+            "increment_work": self.work.increment_work,
+            "force_normal": self.force_normal,
+            "force_tangential": self.force_tangential,
+            "mean_displacement": self.mean_displacement,
+            **{f"n_{word}": words.count(word) for word in ("separated", "slip", "stick")},
+            "n_increments": self.n_increments,
+            "linear_solves": self.linear_solves,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class LoadHistory:
+    """The finished steps of a load history.
+
+    Parameters
+    ----------
+    asked : Scene or Assembly
+        With all steps; the scene of a solution is that of its own step.
+    n_steps : int
+        As many as there are to be.
+    steps : tuple of LoadStep
+    state : ContactState
+        Dimensionless, at the end of the last one.
+    motion : SlipHistory
+        At the end of the last increment.
+    """
+
+    asked: Scene | Assembly
+    n_steps: int
+    steps: tuple[LoadStep, ...]
+    state: ContactState
+    motion: SlipHistory
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all steps are finished."""
+        return len(self.steps) == self.n_steps
+
+    @property
+    def times(self) -> FloatArray:
+        """(n_finished,) array [s]: the ends of the steps."""
+        return np.array([step.time for step in self.steps])
+
+    def total(self, first: int = 0, last: int | None = None) -> StepWork:
+        """Return the work in the steps from `first` (counted from 0) up to, not including, `last`."""
+        return sum((step.work for step in self.steps[first:last]), StepWork())
+
+    def where(self) -> str:
+        """Say in words how far the history has come."""
+        return f"Finished: {len(self.steps)} of {self.n_steps} steps, up to t = {self.steps[-1].time:.6g}."
+
+
+def step_rows(loading: LoadHistory | None) -> list[dict[str, float | int]]:
+    """Return the numbers of each step; none without a load history."""
+    return [] if loading is None else [step.as_dict() for step in loading.steps]

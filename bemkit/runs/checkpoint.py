@@ -1,0 +1,76 @@
+"""Load histories that are written step by step, and go on from the last step in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import overload
+
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.result_file import check_result_target, read_result, write_result
+from bemkit.results.solution import Solution
+from bemkit.runs.assembly import solved_assemblies
+from bemkit.runs.history import solved_history
+from bemkit.runs.steps import joined
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.scene.toml import scene_to_toml
+from bemkit.solvers.base import StepRecord
+
+
+@overload
+def run_to_file(
+    scene: Scene, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
+) -> Solution: ...
+@overload
+def run_to_file(
+    scene: Assembly, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
+) -> AssemblySolution: ...
+def run_to_file(
+    scene: Scene | Assembly, path: str | Path, *, callback: Callable[[StepRecord], None] | None = None
+) -> Solution | AssemblySolution:
+    """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
+
+    A file that holds the beginning of the same history, because a run was killed or a step failed, is continued; the
+    numbers are those of a run without interruption, to the last bit, but for times.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+        On one mesh. It is compared with that in the file by what a scene file says.
+    path : str or Path
+        The result file, ``.h5``. Until the last step is there its status is UNFINISHED.
+    callback : callable, optional
+        Receives a record of every step of the solver.
+
+    Returns
+    -------
+    Solution or AssemblySolution
+        Of the last step, as `bemkit.run` returns it.
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written.
+    SceneError
+        If the scene holds a Python function.
+    ValueError
+        As `bemkit.run`.
+    """
+    text, target = scene_to_toml(scene), check_result_target(path)
+    known = read_result(target) if target.exists() else None
+    is_begun = known is not None and known.loading is not None and not known.loading.is_complete
+    done = known if is_begun and scene_to_toml(known.stated) == text else None
+
+    def write(solution: Solution | AssemblySolution) -> None:
+        write_result(target, solution)
+
+    solution: Solution | AssemblySolution
+    if isinstance(scene, Assembly):
+        begun = done if isinstance(done, AssemblySolution) else None
+        solution = joined(*solved_assemblies([scene], None, callback, begun, write))
+    else:
+        begun_one = done if isinstance(done, Solution) else None
+        solution = joined(*solved_history([scene], None, None, callback, begun_one, write))
+    write_result(target, solution)
+    return solution

@@ -1,0 +1,301 @@
+"""From one load step to the next: slip from the last converged state, smaller increments where a jump fails, work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
+from bemkit.contact.slip_history import SlipHistory
+from bemkit.model.prepared import Units
+from bemkit.model.untouched_body import certified
+from bemkit.results.load_history import StepWork
+from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
+
+MOST_HALVINGS = 6
+"""Times that an increment is halved before a step counts as out of reach."""
+MOST_LAWS = 60
+"""Solves of one increment under a law that depends on its slip."""
+_SETTLED = 1e-10
+"""Change of such a law, relative to the largest bound, that counts as none: below the tolerance of the certificate."""
+
+_HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
+"""What smaller increments do not change."""
+
+Callback = Callable[[StepRecord], None] | None
+
+
+class StepModel(Protocol):
+    """A model as its load history sees it: `Model` and `AssembledModel` are some."""
+
+    @property
+    def problem(self) -> ContactProblem:
+        """The problem under the loads of the step; slip counts from the undeformed bodies."""
+
+    @property
+    def units(self) -> Units:
+        """The physical size of one dimensionless unit."""
+
+    @property
+    def solver(self) -> ContactSolver:
+        """The driver."""
+
+    @property
+    def has_body_forces(self) -> bool:
+        """Whether something acts inside a body."""
+
+    def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return the forces of loads and supports, and the displacements on which they work."""
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """The end of an increment.
+
+    Parameters
+    ----------
+    state : ContactState
+        Dimensionless.
+    motion : SlipHistory
+    gap : (n_contact,) array
+        Dimensionless.
+    forces, displacements : (n,) arrays [N/m], [m]
+        See `StepModel.acting`.
+    """
+
+    state: ContactState
+    motion: SlipHistory
+    gap: FloatArray
+    forces: FloatArray
+    displacements: FloatArray
+
+    @classmethod
+    def at_rest(cls, model: StepModel) -> Standing:
+        """Return what is before any load: obstacles that overlap with the body have not come yet."""
+        n, (forces, displacements) = model.problem.n_contact, model.acting(_no_state(model.problem.n_contact))
+        nothing = np.zeros_like(forces), np.zeros_like(displacements)
+        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), *nothing)
+
+    @classmethod
+    def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> Standing:
+        """Return the end of a step of a model."""
+        return cls(state, motion, model.problem.gap, *model.acting(state))
+
+    def work_from(self, before: Standing, model: StepModel) -> StepWork:
+        """Return the work from another end to this one, by the trapezoidal rule."""
+        units = model.units
+        unit = units.stress * units.displacement * units.length
+        weights = 0.5 * unit * model.problem.body.weights
+        sigma = weights[:, None] * (before.state.traction + self.state.traction)
+        moved = self.state.displacement - before.state.displacement
+        with np.errstate(invalid="ignore"):  # infinite gaps, whose nodes carry nothing
+            approached = np.where(np.isfinite(self.gap), self.gap - before.gap, 0.0)
+        # a node that opens or closes is carried by other forces for a part of its way, and so is one that turns back
+        # under a falling bound: there the rule says nothing of friction
+        is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
+        of_friction = -sigma[:, 1] * moved[:, 1]
+        taken = np.where(is_held, np.maximum(of_friction, 0.0), 0.0)
+        of_forces = 0.5 * float((before.forces + self.forces) @ (self.displacements - before.displacements))
+        return StepWork(
+            external_work=of_forces + float(sigma[:, 0] @ approached),
+            dissipation=float(taken.sum()),
+            increment_work=float(sigma[:, 0] @ (approached - moved[:, 0]) + (of_friction - taken).sum()),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ReachedStep:
+    """Where the increments to a load step have led.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        Of the last increment, slip counting from the one before, the law that of its slip.
+    result : ContactSolution
+        Of the last increment, with the records and linear solves of all; its message says what was done.
+    end : Standing
+        Of the last increment that converged.
+    work : StepWork
+        Up to there.
+    n_increments : int
+        Of those that converged.
+    """
+
+    problem: ContactProblem
+    result: ContactSolution
+    end: Standing
+    work: StepWork
+    n_increments: int
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The way from the loads of one step to those of the next.
+
+    Parameters
+    ----------
+    model : StepModel
+        Of the step.
+    start : Standing
+        Where the step before has ended, or rest.
+    time : float [s]
+        At the end of the step.
+    before : StepModel, optional
+        Of the step before; without one there is a single increment.
+    between : callable, optional
+        Share of the way -> the problem there.
+    """
+
+    model: StepModel
+    start: Standing
+    time: float
+    before: StepModel | None
+    between: Callable[[float], ContactProblem]
+
+    def time_at(self, share: float) -> float:
+        """Return the time at a share of the way."""
+        begin = self.start.motion.time
+        return self.time if share == 1.0 else begin + share * (self.time - begin)
+
+    def standing(self, problem: ContactProblem, share: float, state: ContactState, motion: SlipHistory) -> Standing:
+        """Return the end of an increment."""
+        acting = self.model.acting(state)
+        if self.before is not None and share < 1.0:  # what acts is affine in the loads
+            pairs = zip(self.before.acting(state), acting, strict=True)
+            acting = tuple((1.0 - share) * one + share * two for one, two in pairs)  # type: ignore[assignment]
+        return Standing(state, motion, problem.gap, *acting)
+
+
+def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
+    """Go from the load of one step to that of the next one, in halves where a jump does not converge.
+
+    Parameters
+    ----------
+    path : Path
+    guess : ContactState, optional
+        Where to start the first step from; by default all nodes stick.
+    callback : callable, optional
+
+    Returns
+    -------
+    ReachedStep
+        Converged under the load of the step, or how the last increment failed, the smallest that is tried. After an
+        increment that converges the next one is twice as large.
+
+    Notes
+    -----
+    Loads that contact can balance make a convex set, so that there is no collapse between two of them: an increment
+    that fails has stalled. Loads that nothing can balance are found by the static programme before any step, see
+    `bemkit.contact.solvability`, and are not approached.
+    """
+    reached, increment, end, n_increments, work = 0.0, 1.0, path.start, 0, StepWork()
+    records: tuple[StepRecord, ...] = ()
+    is_first = path.before is None
+    while True:
+        target = min(reached + increment, 1.0)
+        problem = path.between(target)
+        if not is_first:
+            problem = replace(problem, reference_slip=end.state.u_t)
+        words = "" if target == 1.0 and not records else f"increment to {target:.4g} of the step"
+        recorder = _Recorder(records, words, callback)
+        attempt = _attempt(path, problem, end, path.time_at(target), guess if is_first else end.state, recorder)
+        records, failure = attempt.result.history, attempt.result
+        if failure.is_converged:
+            following = path.standing(problem, target, failure.state, attempt.motion)
+            work += following.work_from(end, path.model)
+            reached, end, n_increments, increment = target, following, n_increments + 1, 2.0 * increment
+            if reached == 1.0:
+                break
+        elif is_first or failure.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
+            break
+        else:
+            increment = 0.5 * (target - reached)
+    words = failure.message
+    if failure.is_converged and n_increments > 1:
+        words += f" The jump to this load stalled; {n_increments} increments in its place led there."
+    elif not (failure.is_converged or is_first) and failure.status not in _HOPELESS:
+        words += (
+            f" Increments down to {target - reached:.2g} of the step led to {reached:.3g} of it. The static programme "
+            "finds no collapse under this load: give load steps closer to each other."
+        )
+    return ReachedStep(attempt.problem, replace(failure, message=words), end, work, n_increments)
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    problem: ContactProblem
+    result: ContactSolution
+    motion: SlipHistory
+
+
+def _attempt(
+    path: Path,
+    problem: ContactProblem,
+    end: Standing,
+    time: float,
+    start: ContactState | None,
+    recorder: _Recorder,
+) -> _Attempt:
+    """Solve one increment; under a law that depends on its slip, until slip and law agree."""
+    law, unit = problem.law, path.model.units.displacement
+    motion = end.motion.followed(time, np.zeros(problem.n_contact), np.zeros(problem.n_contact, bool))
+    for _ in range(MOST_LAWS):
+        present = replace(problem, law=law.at_slip(motion)) if law.needs_history else problem
+        result = recorder.solved(present, path.model.solver, start)
+        if not result.is_converged:
+            return _Attempt(present, result, motion)
+        slip = (result.state.u_t - problem.slip_origin) * unit
+        motion = end.motion.followed(time, slip, result.node_status != NodeStatus.SEPARATED)
+        if not law.needs_history:
+            return _Attempt(present, result, motion)
+        bounds = [each.bound(np.minimum(result.state.sigma_n, 0.0)) for each in (present.law, law.at_slip(motion))]
+        if np.abs(bounds[1] - bounds[0]).max(initial=0.0) <= _SETTLED * np.abs(bounds[0]).max(initial=0.0):
+            return _Attempt(present, result, motion)
+        start = result.state
+        recorder = recorder.after(result)
+    words = f"{Status.STALLED.value} [the friction law and the slip on which it depends do not come to agree]"
+    return _Attempt(present, replace(result, status=Status.STALLED, message=words), motion)
+
+
+@dataclass(frozen=True)
+class _Recorder:
+    """Numbers the records and linear solves of a solve after those of the solves before."""
+
+    records: tuple[StepRecord, ...]
+    words: str
+    callback: Callback
+
+    def after(self, result: ContactSolution) -> _Recorder:
+        return replace(self, records=result.history)
+
+    def solved(self, problem: ContactProblem, solver: ContactSolver, start: ContactState | None) -> ContactSolution:
+        records = self.records
+        first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+
+        def following(record: StepRecord) -> StepRecord:
+            message = "; ".join(filter(None, (self.words, record.message)))
+            return replace(
+                record, step=first + record.step, linear_solves=spent + record.linear_solves, message=message
+            )
+
+        def told(record: StepRecord) -> None:
+            if self.callback is not None:
+                self.callback(following(record))
+
+        if problem.n_contact:
+            result = solve(problem, solver, start=start, throw=False, callback=told)
+        else:
+            result = certified(problem.body, told)
+        history = (*records, *(following(record) for record in result.history))
+        steps = history[-1].step if history else 0
+        return replace(result, history=history, steps=steps, linear_solves=spent + result.linear_solves)
+
+
+def _no_state(n_contact: int) -> ContactState:
+    return ContactState(np.zeros((n_contact, 2)), np.zeros((n_contact, 2)))

@@ -1,0 +1,239 @@
+"""The one loop over the steps of a load history, of one body or of several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
+
+from bemkit.contact.body import ContactState
+from bemkit.contact.problem import ContactProblem
+from bemkit.contact.slip_history import SlipHistory
+from bemkit.errors import InputError
+from bemkit.plan import Plan
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.load_history import LoadHistory, LoadStep
+from bemkit.results.solution import Solution, following
+from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
+from bemkit.runs.timing import Stage, StageClock
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.solvers.base import ContactSolution, Status, solve
+
+AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
+AnyModel = TypeVar("AnyModel", bound=Any)
+
+
+class UnsolvableSceneError(InputError):
+    """The scene has no solution; the message says why."""
+
+
+@dataclass(frozen=True)
+class Kind(Generic[AnyModel, AnySolution]):
+    """What the loop over load steps asks of one body, or of several.
+
+    Parameters
+    ----------
+    checked : callable
+        Model and outcome -> the outcome, with another status if the energy of a body is negative.
+    solution : callable
+        Model, outcome, plan, clock and slip -> the fields.
+    explained : callable
+        Model and outcome -> why nothing can balance the load.
+    """
+
+    checked: Callable[[AnyModel, ContactSolution], ContactSolution]
+    solution: Callable[[AnyModel, ContactSolution, Plan, StageClock, SlipHistory], AnySolution]
+    explained: Callable[[AnyModel, ContactSolution], str]
+
+
+@dataclass(frozen=True, eq=False)
+class History(Generic[AnySolution]):
+    """What is asked of a load history, and what is known of it.
+
+    Parameters
+    ----------
+    asked : Scene or Assembly
+    times : sequence of float [s]
+        Of its steps.
+    is_recorded : bool
+        Whether results say what the steps were.
+    done : Solution or AssemblySolution, optional
+        Up to some step, with its `loading`: that is where to go on.
+    finished : callable, optional
+        Receives the result of all steps so far after each of them but the last.
+    """
+
+    asked: Scene | Assembly
+    times: Sequence[float]
+    is_recorded: bool
+    done: AnySolution | None = None
+    finished: Callable[[AnySolution], None] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        asked: Scene | Assembly,
+        steps: Sequence[Scene | Assembly],
+        done: AnySolution | None = None,
+        finished: Callable[[AnySolution], None] | None = None,
+    ) -> History[AnySolution]:
+        """Return the history of scenes with single loads; those that say no time follow each other at 1, 2, 3.
+
+        Raises
+        ------
+        InputError
+            If times do not increase.
+        """
+        has_times = any(step.steps for step in steps)
+        times = [step.steps[-1].time if step.steps else float(k) for k, step in enumerate(steps, start=1)]
+        for number in range(1, len(times)):
+            if times[number] <= times[number - 1]:
+                before, time = times[number - 1], times[number]
+                raise InputError(f"step {number + 1}: time is {time:g} after {before:g}: give times that increase")
+        return cls(asked, times, has_times or len(times) > 1, done, finished)
+
+
+def solve_steps(
+    kind: Kind[AnyModel, AnySolution],
+    model: AnyModel,
+    steps: Sequence[Any],
+    plan: Plan,
+    history: History[AnySolution],
+    *,
+    clock: StageClock,
+    guess: ContactState | None = None,
+    callback: Callback = None,
+) -> tuple[AnySolution, ...]:
+    """Solve the steps of a load history, up to the first that does not converge.
+
+    Parameters
+    ----------
+    kind : Kind
+    model : Model or AssembledModel
+        Of the first step.
+    steps : sequence of Prepared or PreparedAssembly
+    plan : Plan
+    history : History
+    clock : StageClock
+    guess : ContactState, optional
+        Where to start the first step.
+    callback : callable, optional
+
+    Returns
+    -------
+    tuple of solutions
+        One for each step that is solved here. If a step fails that is not the first one, its fields are those of the
+        step before, the last state that is certified; status, message and history are its own.
+
+    Raises
+    ------
+    UnsolvableSceneError
+        If nothing can balance the first load.
+    """
+    solutions: list[AnySolution] = []
+    whole, before, end = history.done, None, Standing.at_rest(model)
+    done = None if whole is None else whole.loading
+    n_done = 0 if done is None else len(done.steps)
+    for number, step in enumerate(steps):
+        if number:
+            before, model = model, model.under(step)
+        if done is not None and number < n_done:  # in an earlier run: only the model goes the same way again
+            end = Standing.under(model, done.state, done.motion) if number == n_done - 1 else end
+            continue
+        clock = clock.closed(Stage.CONDENSE)
+        reached = reach(_path(model, before, end, history.times[number]), guess, callback)
+        if before is None and not reached.result.history:
+            raise UnsolvableSceneError(kind.explained(model, reached.result))
+        model = replace(model, problem=reached.problem)
+        result = kind.checked(model, reached.result)
+        clock = clock.closed(Stage.SOLVE)
+        if before is not None and not result.is_converged:
+            words = result.message
+            if result.status is Status.UNSOLVABLE_LOAD:
+                words = f"{result.status.value} {kind.explained(model, result)}."
+            solutions.append(_not_reached(solutions[-1] if solutions else whole, replace(result, message=words), clock))
+            break
+        solution = kind.solution(model, result, plan, clock, reached.end.motion)
+        if history.is_recorded and solution.is_converged:
+            solution = replace(solution, loading=_loading(history, solutions, model, reached, solution))
+        solutions.append(solution)
+        clock, end = StageClock.start(), reached.end
+        if not solution.is_converged:
+            break
+        if history.finished is not None:
+            whole = following(whole, solution, history.asked, number + 1, len(steps))
+            if number + 1 < len(steps):
+                history.finished(replace(whole, status=Status.UNFINISHED))
+    return tuple(solutions)
+
+
+def joined(history: History[AnySolution], solutions: Sequence[AnySolution]) -> AnySolution:
+    """Return the last of the steps, with the records, solves, times, memory and warnings of all."""
+    whole = history.done
+    n_done = 0 if whole is None or whole.loading is None else len(whole.loading.steps)
+    for number, solution in enumerate(solutions, start=n_done + 1):
+        whole = following(whole, solution, history.asked, number, len(history.times))
+    if whole is None:
+        raise InputError("there is no step to join")
+    return whole
+
+
+def solved_once(kind: Kind[AnyModel, AnySolution], model: AnyModel, start: ContactState | None) -> ContactSolution:
+    """Solve a model under a single load; UnsolvableSceneError if nothing can balance it."""
+    result = solve(model.problem, model.solver, start=start, throw=False)
+    if not result.history:
+        raise UnsolvableSceneError(kind.explained(model, result))
+    return kind.checked(model, result)
+
+
+def _path(model: AnyModel, before: AnyModel | None, end: Standing, time: float) -> Path:
+    def between(share: float) -> ContactProblem:
+        problem: ContactProblem = model.problem if before is None else model.between(before, share)
+        return problem
+
+    return Path(model, end, time, before, between)
+
+
+def _loading(
+    history: History[AnySolution],
+    solutions: Sequence[AnySolution],
+    model: AnyModel,
+    reached: ReachedStep,
+    solution: AnySolution,
+) -> LoadHistory:
+    """Return the history up to a step that is finished."""
+    former = solutions[-1] if solutions else history.done
+    steps: tuple[LoadStep, ...] = () if former is None or former.loading is None else former.loading.steps
+    work, end = reached.work, reached.end
+    if model.has_body_forces:
+        change = solution.energy - (steps[-1].elastic_energy if steps else 0.0)
+        work = replace(work, external_work=change + work.dissipation + work.increment_work)
+    step = LoadStep(
+        time=end.motion.time,
+        work=work,
+        elastic_energy=solution.energy,
+        n_increments=reached.n_increments,
+        linear_solves=solution.linear_solves,
+        contact=solution.contact,
+        slip=end.motion.slip,
+    )
+    finished: tuple[LoadStep, ...] = (*steps, step)
+    return LoadHistory(history.asked, len(history.times), finished, end.state, end.motion)
+
+
+def _not_reached(before: AnySolution | None, result: ContactSolution, clock: StageClock) -> AnySolution:
+    """Return what stands for a step that failed: the fields of the step before, and why they are the last."""
+    if before is None or before.loading is None:
+        raise InputError("there is no step before the one that failed")
+    return replace(
+        before,
+        status=result.status,
+        message=f"{result.message} {before.loading.where()} The fields are those of the step before.",
+        history=result.history,
+        linear_solves=result.linear_solves,
+        outer_steps=result.steps,
+        timings=clock.timings,
+        memory=clock.memory,
+        warnings=before.plan.warnings,
+    )

@@ -1,0 +1,168 @@
+"""Places in scenes by the keys of scene files, and scenes with other values there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
+from types import UnionType
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from bemkit.errors import InputError
+from bemkit.formulas import closest
+from bemkit.scene.body import Body
+from bemkit.scene.conditions import Part
+from bemkit.scene.rigid_body import RigidBody
+
+_NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'
+_PLACE = re.compile(rf"{_NAME}(?:\.{_NAME}|\[\d+\])*")
+_STEP = re.compile(rf"{_NAME}|\[\d+\]")
+
+Node = TypeVar("Node")
+
+
+class PlaceError(InputError):
+    """A place that a scene does not have, or a value that does not fit there; the message names the place."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a scene file.
+
+    Parameters
+    ----------
+    text : str
+        Names with dots between them, and numbers of list entries from 0 on in brackets:
+        ``bodies.punch.placement.shift[0]``. A name with a dot stands in quotation marks.
+
+    Raises
+    ------
+    PlaceError
+        If the text is no such place.
+    """
+
+    text: str
+
+    def __post_init__(self) -> None:
+        if not _PLACE.fullmatch(self.text):
+            raise PlaceError(f"key {self.text!r}: give a place in a scene file, such as law.friction_coefficient")
+
+    @property
+    def names(self) -> tuple[str | int, ...]:
+        """The names and numbers that lead there."""
+        found = _STEP.findall(self.text)
+        return tuple(int(name[1:-1]) if name.startswith("[") else name.strip('"') for name in found)
+
+
+def value_at(scene: object, place: Place) -> Any:
+    """Return what stands at a place of a scene or an assembly.
+
+    Raises
+    ------
+    PlaceError
+        If there is no such place.
+    """
+    node, declared, path = scene, cast(Any, type(scene)), ""
+    for name in place.names:
+        node, declared, path = _inside(node, declared, name, path)
+    return node
+
+
+def with_value(scene: Node, place: Place, value: object) -> Node:
+    """Return a scene or an assembly with another value at a place; what does not lead there are the same objects.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+    place : Place
+    value : object
+        As scene files state it (a number, a formula, a word, a list or a table), or an object of Python.
+
+    Raises
+    ------
+    PlaceError
+        If there is no such place, or the value does not fit there.
+    """
+    changed: Node = _replaced(scene, type(scene), place.names, value, "")
+    return changed
+
+
+def _replaced(node: Any, declared: Any, names: tuple[str | int, ...], value: object, path: str) -> Any:
+    if not names:
+        return _fitting(value, declared, path)
+    name, rest = names[0], names[1:]
+    inner, inner_declared, inner_path = _inside(node, declared, name, path)
+    changed = _replaced(inner, inner_declared, rest, value, inner_path)
+    if isinstance(node, Mapping):
+        return {**node, name: changed}
+    if isinstance(node, np.ndarray):
+        return np.array([changed if k == name else entry for k, entry in enumerate(node.tolist())])
+    if isinstance(node, tuple | list):
+        number = name if isinstance(name, int) else [entry.name for entry in node].index(name)
+        return (*node[:number], changed, *node[number + 1 :])
+    try:
+        return replace(node, **{str(name): changed})
+    except PlaceError:
+        raise
+    except ValueError as error:
+        raise PlaceError(f"{path}: {error}" if path else str(error)) from error
+
+
+def _fitting(value: object, declared: Any, path: str) -> Any:
+    """Return a value as the place holds it."""
+    if not isinstance(value, bool | int | float | str | list | dict):
+        return value
+    from bemkit.scene.serialisation import StructureError, structure  # heavy, and only for scenes that change
+
+    try:
+        return structure(value, declared)
+    except StructureError as error:
+        raise PlaceError(f"{path}: {error}") from error
+
+
+def _inside(node: Any, declared: Any, name: str | int, path: str) -> tuple[Any, Any, str]:
+    """Return what stands in an object under a name or number, its declared type, and its path."""
+    if node is None:
+        raise PlaceError(f"{path} is left out in the scene: write it there first")
+    inner_path = f"{path}[{name}]" if isinstance(name, int) else f"{path}.{name}".lstrip(".")
+    if isinstance(name, int):
+        if not isinstance(node, tuple | list | np.ndarray):
+            raise PlaceError(f"{inner_path}: {path} is no list: leave [{name}] out")
+        if name >= len(node):
+            raise PlaceError(f"{inner_path}: unknown entry: {path} has {len(node)}, counted from 0")
+        return node[name], _entry_type(declared, name, node[name]), inner_path
+    if isinstance(node, tuple | list) and node and isinstance(node[0], Part | Body | RigidBody):
+        named = {entry.name: entry for entry in node}
+        return named[_known(name, list(named), path)], type(node[0]), inner_path
+    if isinstance(node, Mapping):
+        return node.get(name), (get_args(declared) or (None, float))[1], inner_path
+    if is_dataclass(node):
+        _known(name, [entry.name for entry in fields(node) if entry.init and entry.name != "name"], path)
+        return getattr(node, name), _declared_types(cast(type, type(node)))[name], inner_path
+    what = "a list: give the number of an entry, such as [0]" if isinstance(node, tuple | list) else "no table"
+    raise PlaceError(f"{path}.{name}: unknown key: {path} is {what}")
+
+
+def _entry_type(declared: Any, number: int, entry: object) -> Any:
+    """Return the declared type of an entry of a list."""
+    options = get_args(declared) if get_origin(declared) in (Union, UnionType) else (declared,)
+    for option in options:
+        if get_origin(option) is tuple:
+            inner = get_args(option)
+            return inner[0] if inner[-1] is Ellipsis else inner[number]
+    return type(entry)
+
+
+@cache
+def _declared_types(of: type) -> dict[str, Any]:
+    return get_type_hints(of)
+
+
+def _known(name: str, names: list[str], path: str) -> str:
+    if name in names:
+        return name
+    known = f"the keys are {', '.join(names)}" if names else "there are no keys here"
+    raise PlaceError(f"{f'{path}.{name}'.lstrip('.')}: unknown key: {known}{closest(name, names)}")

@@ -1,0 +1,104 @@
+"""Steps of a load history, and what a scene says about itself whatever it is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from bemkit.contact.laws import FrictionLaw
+from bemkit.errors import InputError
+
+TimeValue: TypeAlias = float | str | Callable[[float], float]
+"""A number, a formula in the time t, or a Python function of it."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What changes in one step of a load history; what is not named stays as the step before left it.
+
+    Parameters
+    ----------
+    time : float [s]
+        At the end of the step; positive, and later than the step before. The history begins at 0.
+    changes : mapping of str to value
+        By the places of scene files, such as ``"parts.press.condition.y"``, ``"law.friction_coefficient"`` or
+        ``"rigid.punch.y"``: a number, a text, a table or an object as the place takes it, or a Python function of the
+        time that returns one. A formula may use the time ``t``; numbers hold from the first increment of the step on,
+        formulas follow the time, also through later steps that do not name the place again.
+    load_factor : float, str, callable or None
+        Multiplies all loads, prescribed displacements and body forces that are not constant.
+    increments : int
+        Equal parts in which the time of the step passes, each a step of the result.
+
+    Raises
+    ------
+    InputError
+        If the time is not positive and finite, or there is no increment.
+    """
+
+    time: float
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    load_factor: TimeValue | None = None
+    increments: int = 1
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.time) and self.time > 0.0):
+            raise InputError(f"time is {self.time}: give the time at the end of the step, a positive number")
+        if self.increments < 1:
+            raise InputError(f"increments is {self.increments}: give 1 or more")
+        object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))
+
+    def __reduce__(self) -> tuple[type[Step], tuple[object, ...]]:
+        """Travel to another process; a read-only mapping does not."""
+        return Step, (self.time, dict(self.changes), self.load_factor, self.increments)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it says the time and nothing else, as the steps of results do."""
+        return not self.changes and self.load_factor is None and self.increments == 1
+
+
+def check_stated(title: str, load_factors: Sequence[float], steps: Sequence[Step]) -> None:
+    """Refuse a title or a load history that is none.
+
+    Raises
+    ------
+    InputError
+        If the title is empty, a load factor is missing or not finite, times do not increase, or there are load factors
+        besides steps.
+    """
+    if not title or not title.isprintable():
+        raise InputError(f"title is {title!r}: give one line of printable text")
+    if not (load_factors and np.all(np.isfinite(load_factors))):
+        raise InputError(f"load_factors is {load_factors}: give finite numbers such as (0.5, 1.0)")
+    if steps and tuple(load_factors) != (1.0,):
+        raise InputError(f"load_factors is {load_factors} besides {len(steps)} steps: give each step its load_factor")
+    for number in range(1, len(steps)):
+        before, time = steps[number - 1].time, steps[number].time
+        if time <= before:
+            raise InputError(f"steps[{number}]: time is {time:g} after {before:g}: give times that increase")
+
+
+def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
+    """Refuse laws that need a load history where there are no steps.
+
+    Raises
+    ------
+    InputError
+        Naming the place and the law.
+    """
+    for place, law in laws.items():
+        if law.needs_history and not steps:
+            raise InputError(
+                f"{place} is {type(law).__name__}, which depends on slip or time: give [[steps]] with their times"
+            )
+
+
+def n_steps(load_factors: Sequence[float], steps: Sequence[Step]) -> int:
+    """Return how many results a load history has."""
+    return sum(step.increments for step in steps) if steps else len(load_factors)
