@@ -207,7 +207,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
         for place, column in ((x, contact.x), (y, contact.y)):
             place[own] = np.interp(kept[own], contact.s[rows], column[rows])
     at = zip(parts, x.tolist(), y.tolist(), kept.tolist(), changes, strict=True)
-    return tuple(Transition(*place, words[i], words[i + 1]) for *place, i in at)
+    return tuple(Transition(part, px, py, s, words[i], words[i + 1]) for part, px, py, s, i in at)
 
 
 def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:
