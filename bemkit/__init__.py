@@ -85,6 +85,8 @@ if TYPE_CHECKING:
     from bemkit.runs.assembly import run_assembly_history as run_assembly_history
     from bemkit.runs.checkpoint import run_to_file as run_to_file
     from bemkit.runs.collapse import largest_load_factor as largest_load_factor
+    from bemkit.runs.critical_friction import CriticalFriction as CriticalFriction
+    from bemkit.runs.critical_friction import critical_friction as critical_friction
     from bemkit.runs.history import run_history as run_history
     from bemkit.runs.nested import run_cascade as run_cascade
     from bemkit.runs.run import FailedRun as FailedRun
@@ -131,6 +133,7 @@ if TYPE_CHECKING:
     from bemkit.solvers.ssn import SemismoothNewton as SemismoothNewton
     from bemkit.studies.sweep.sweep import sweep as sweep
     from bemkit.studies.sweep.table import Sweep as Sweep
+    from bemkit.studies.verification.verification import verify as verify
     from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
@@ -170,6 +173,7 @@ _HOME = {
     "runs.assembly": ("run_assembly_history",),
     "runs.checkpoint": ("run_to_file",),
     "runs.collapse": ("largest_load_factor",),
+    "runs.critical_friction": ("CriticalFriction", "critical_friction"),
     "runs.history": ("run_history",),
     "runs.nested": ("run_cascade",),
     "runs.run": ("FailedRun", "run", "run_all", "run_probe"),
@@ -194,6 +198,7 @@ _HOME = {
     "solvers.ssn": ("SemismoothNewton",),
     "studies.sweep.sweep": ("sweep",),
     "studies.sweep.table": ("Sweep",),
+    "studies.verification.verification": ("verify",),
     "testing.lemke": ("LemkePivoting",),
 }
 _MODULE_OF = {name: f"bemkit.{module}" for module, names in _HOME.items() for name in names}

@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep | verify``.
+"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep | critical-friction | verify``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -30,7 +30,13 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
-_STUDIES = {"stability": "study", "study": "study", "sweep": "sweep", "verify": "verify"}
+_STUDIES = {
+    "critical-friction": "critical_friction",
+    "stability": "study",
+    "study": "study",
+    "sweep": "sweep",
+    "verify": "verify",
+}
 """Commands that are loaded only when they are asked for, and their modules."""
 
 
@@ -85,7 +91,7 @@ class _Commands(click.Group):
         """Return the command of a name."""
         if cmd_name not in _STUDIES:
             return super().get_command(ctx, cmd_name)
-        command: click.Command = getattr(import_module(f"bemkit.cli.{_STUDIES[cmd_name]}"), cmd_name)
+        command: click.Command = getattr(import_module(f"bemkit.cli.{_STUDIES[cmd_name]}"), cmd_name.replace("-", "_"))
         return command
 
 

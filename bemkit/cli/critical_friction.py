@@ -1,0 +1,42 @@
+"""The command ``bemkit critical-friction``."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import click
+
+from bemkit.errors import concerning
+from bemkit.results.outputs import JSON_START, Outputs, TextFile
+from bemkit.runs.critical_friction import CriticalFriction
+from bemkit.runs.critical_friction import critical_friction as critical_friction_of
+from bemkit.scene.toml import load_scene, with_overrides
+
+
+@click.command("critical-friction")
+@click.argument("scene")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
+@click.option("--json", "json_file", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+def critical_friction(scene: str, elements: int | None, accuracy: float | None, json_file: str | None) -> None:
+    """Find the friction coefficients at which sliding states of SCENE lose uniqueness."""
+    chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy)
+
+    def as_json(found: CriticalFriction) -> str:
+        return json.dumps({"title": chosen.title, **found.as_dict()}, indent=2, allow_nan=False) + "\n"
+
+    outputs = Outputs((TextFile(json_file, "JSON file", JSON_START, as_json),))
+    outputs.check()
+    with concerning(scene):
+        found = critical_friction_of(chosen)
+    outputs.write(found)
+    if not outputs.uses_stdout:
+        print(f"{found.n_contact} nodes in contact, {found.n_slipping} of them slip in the solution")
+        print(f"all slide forward:             {_words(found.forward)}")
+        print(f"all slide backward:            {_words(found.backward)}")
+        print(f"those that slip slide on:      {_words(found.present)}")
+
+
+def _words(coefficient: float) -> str:
+    return "unique at any friction" if math.isinf(coefficient) else f"loses uniqueness at {coefficient:.6g}"

@@ -1,0 +1,87 @@
+"""The friction coefficient at which a sliding state loses uniqueness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import LinearBody, SingularResponse
+from bemkit.contact.conditions import LinearConditions, of_statuses, separated, stick
+
+_NEARLY_REAL = 1e-9
+"""Imaginary parts below this share of an eigenvalue are those of two real ones that round-off has joined."""
+
+
+def sliding_response(body: LinearBody, is_closed: BoolArray, slides: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Return what tangential motions of nodes in contact do to the tractions there.
+
+    Parameters
+    ----------
+    body : LinearBody
+    is_closed : (n_contact,) bool array
+        Nodes in contact; the others carry nothing.
+    slides : (n_contact,) bool array
+        The nodes in contact that may move along their tangents; the others have no friction.
+
+    Returns
+    -------
+    normal, tangential : (n_sliding, n_sliding) arrays [Pa/m]
+        Changes of sigma_n and sigma_t (rows) under unit displacements u_t (columns), nodes in contact staying closed.
+
+    Raises
+    ------
+    SingularResponse
+        If without friction the body is free to slide, so that no coefficient is needed.
+    """
+    n_contact = len(is_closed)
+    zero = np.zeros(n_contact)
+    rows = np.flatnonzero(slides)
+    smooth = of_statuses(is_closed, np.ones(n_contact, bool), stick(zero, zero), separated(n_contact))
+    if smooth.free_motions(body.rigid_motions()).shape[0]:
+        raise SingularResponse("nothing but friction keeps the body from sliding")
+
+    def response(moved: FloatArray) -> FloatArray:
+        held: LinearConditions = of_statuses(is_closed, ~slides, stick(zero, moved), separated(n_contact))
+        return body.respond(held).traction[rows]
+
+    at_rest = response(zero)
+    columns = np.stack([response(unit) - at_rest for unit in np.eye(n_contact)[rows]], axis=2)
+    return columns[:, 0], columns[:, 1]
+
+
+def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: FloatArray) -> float:
+    """Return the smallest coefficient at which nodes that slide in given directions lose uniqueness.
+
+    Parameters
+    ----------
+    normal, tangential : (n_sliding, n_sliding) arrays [Pa/m]
+        From `sliding_response`, or a part of it: nodes left out stick.
+    direction : (n_sliding,) array
+        +1 for sliding along the tangent, -1 against it.
+
+    Returns
+    -------
+    float
+        Infinite if there is none.
+
+    Notes
+    -----
+    Rates of nodes that go on sliding obey ``du_n = 0`` and ``d sigma_t = s direction d sigma_n``, because sigma_t
+    opposes the motion and sigma_n is negative. With ``tangential v = s diag(direction) normal v`` for a motion v
+    that is not zero the rate problem has no solution for most loads and a line of them for the others. That needs s to
+    be a real eigenvalue; complex ones belong to no quasistatic motion.
+
+    References
+    ----------
+    [Klarbring1990], [Hild2004].
+    """
+    from scipy.linalg import eigvals
+
+    if not len(direction):
+        return np.inf
+    # of the inverse problem, whose matrix on the right is positive definite however many zeros the left one has
+    inverse = eigvals(direction[:, None] * normal, tangential)
+    is_real = np.abs(inverse.imag) <= _NEARLY_REAL * np.abs(inverse)
+    largest = float(inverse.real[is_real].max(initial=0.0))
+    # what round-off leaves of no coupling at all
+    return 1.0 / largest if largest > 1e-10 else np.inf

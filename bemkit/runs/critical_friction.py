@@ -1,0 +1,165 @@
+"""Critical friction of a scene: the coefficient from which a sliding state need not be the only answer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from bemkit.arrays import BoolArray
+from bemkit.contact.body import SingularResponse
+from bemkit.contact.critical_friction import critical_coefficient, sliding_response
+from bemkit.contact.problem import ContactProblem, LawError
+from bemkit.errors import NoResultError
+from bemkit.model.assembled.model import build_assembled_model
+from bemkit.model.assembled.prepared import prepare_assembly_steps
+from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.run import LoadHistoryError, run
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import NoContactError, Scene
+from bemkit.solvers.active_sets import NodeStatus
+from bemkit.solvers.base import solve
+
+
+class NoSlidingStateError(NoResultError):
+    """A scene that has no state of contact to ask about."""
+
+
+@dataclass(frozen=True)
+class CriticalFriction:
+    """Smallest friction coefficients at which states of sliding lose uniqueness; infinite where there is none.
+
+    Parameters
+    ----------
+    forward, backward : float
+        All nodes in contact slide along their tangents, or against them.
+    present : float
+        Nodes that slip in the solution of the scene slide on in their directions, those that stick stay.
+    n_contact, n_slipping : int
+        Nodes in contact, and those of them that slip in the solution.
+    """
+
+    forward: float
+    backward: float
+    present: float
+    n_contact: int
+    n_slipping: int
+
+    @property
+    def smallest(self) -> float:
+        """The smallest of the three."""
+        return min(self.forward, self.backward, self.present)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers by their names; None for infinite ones."""
+        numbers = {"smallest": self.smallest} | asdict(self)
+        return {name: None if math.isinf(value) else value for name, value in numbers.items()}
+
+
+def critical_friction(scene: Scene | Assembly) -> CriticalFriction:
+    """Return the friction coefficients at which sliding states of a scene lose uniqueness.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+        With a law under which friction grows with the pressure, and a single load. Which nodes are in contact, and
+        which of them slip, is taken from its solution under its own law; one coefficient is then asked for that all
+        sliding nodes have in common.
+
+    Returns
+    -------
+    CriticalFriction
+
+    Raises
+    ------
+    NoContactError
+        If no part is in contact.
+    LawError
+        If there is no friction, or none that grows with the pressure: then there is no such coefficient.
+    LoadHistoryError
+        If there are several load factors.
+    UnsolvableSceneError
+        If nothing but friction keeps a body from sliding: it does so at any coefficient.
+    NoSlidingStateError
+        If the solver finds no solution, or no node is in contact.
+
+    Notes
+    -----
+    The statement is one about rates [Klarbring1990], which for states that slide as a whole is Hild's about solutions
+    [Hild2004]. Let all nodes of a set slide in given directions and stay in contact, let the others in contact stick,
+    or have no friction, and let all others stay open. At a coefficient s at which
+    ``tangential v = s diag(direction) normal v`` has a solution (see `bemkit.contact.critical_friction`), the motion v
+    can be added to any such state, or none exists: the rate problem cannot be solved uniquely. Past the smallest such s
+    there are loads under which the scene has several solutions or none; ``bemkit study solutions`` looks for them.
+
+    This is not a bound below which solutions are unique: other sets of nodes have coefficients of their own. Nor does
+    it say that the load of the scene is one of those loads. The stiffness is that of the mesh, and scenes with symmetry
+    lines slide symmetrically.
+    """
+    problem, statuses = _solved(scene)
+    slope = problem.friction_slope(np.full(problem.n_contact, -1.0))
+    is_closed = statuses != NodeStatus.SEPARATED
+    has_friction = (slope < 0.0) & ~problem.body.tangent_is_eliminated
+    if not has_friction.any():
+        raise LawError("friction does not grow with the pressure: choose Coulomb's law, or one like it")
+    if not (is_closed & has_friction).any():
+        raise NoSlidingStateError("no node with friction is in contact under this load: press the body on")
+    return _coefficients(problem, statuses, is_closed, is_closed & has_friction)
+
+
+def _coefficients(
+    problem: ContactProblem,
+    statuses: np.ndarray[tuple[int], np.dtype[np.intp]],
+    is_closed: BoolArray,
+    slides: BoolArray,
+) -> CriticalFriction:
+    try:
+        normal, tangential = sliding_response(problem.body, is_closed, slides)
+    except SingularResponse as error:
+        raise UnsolvableSceneError(f"{error}: it slides at any coefficient; hold it by a support") from error
+    own = statuses[slides]
+    signs = (own == NodeStatus.SLIP_FORWARD) * 1.0 - (own == NodeStatus.SLIP_BACKWARD)
+    slipping = np.flatnonzero(signs)
+    part = np.ix_(slipping, slipping)
+    ones = np.ones(len(own))
+    return CriticalFriction(
+        forward=critical_coefficient(normal, tangential, ones),
+        backward=critical_coefficient(normal, tangential, -ones),
+        present=critical_coefficient(normal[part], tangential[part], signs[slipping]),
+        n_contact=int(slides.sum()),
+        n_slipping=len(slipping),
+    )
+
+
+def _solved(scene: Scene | Assembly) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
+    """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
+    if len(scene.load_factors) > 1:
+        raise LoadHistoryError(
+            f"a load history of {len(scene.load_factors)} steps has no single state: give one load factor"
+        )
+    if isinstance(scene, Scene) and not scene.contact_parts:
+        raise NoContactError("no part is in contact: nothing slides")
+    found: Solution | AssemblySolution | None = run(scene) if scene.mesh.accuracy is not None else None
+    if isinstance(scene, Assembly):
+        meshes = (
+            {name: body.mesh for name, body in found.bodies.items()} if isinstance(found, AssemblySolution) else None
+        )
+        (prepared,) = prepare_assembly_steps([scene], meshes)
+        if not prepared.n_contact:
+            raise NoContactError("no two bodies are in contact: nothing slides")
+        problem, driver = build_assembled_model(prepared).problem, scene.solver
+    else:
+        mesh = found.mesh if isinstance(found, Solution) else scene.build_mesh()
+        discretisation = found.scene.discretisation if isinstance(found, Solution) else scene.discretisation
+        model = build_model(prepare(replace(scene, discretisation=discretisation), mesh))
+        problem, driver = model.problem, scene.solver
+    result = solve(problem, driver, throw=False)
+    if not result.is_converged:
+        raise NoSlidingStateError(f"the scene has no solution to begin with: {result.message}")
+    return problem, result.node_status
