@@ -6,6 +6,7 @@ Pairs (n, t) are complex numbers here: the tangential component is the real part
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -99,10 +100,15 @@ class ReducedConditions:
 
     def _summed(self, numbers: ComplexArray) -> ComplexArray:
         """Add up what the unknowns of each node have, (n_contact,)."""
-        n = self.given.size
-        parts = (np.bincount(self.node, part, n) for part in (numbers.real, numbers.imag))
-        real, imaginary = parts
-        return np.asarray(real + 1j * imaginary)
+        result = np.zeros(self.given.size, complex)
+        result[self.node] = numbers
+        result[self.node[self._is_second]] += numbers[self._is_second - 1]
+        return result
+
+    @cached_property
+    def _is_second(self) -> IntArray:
+        """The unknowns that share their node with the one before them."""
+        return 1 + np.flatnonzero(self.node[1:] == self.node[:-1])
 
     def changes(self, unknowns: FloatArray) -> ComplexArray:
         """Return the tractions (n_contact,) of the unknowns alone."""

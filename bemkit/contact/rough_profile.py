@@ -219,7 +219,8 @@ class SelfAffineProfile:
         phases = 2.0 * np.pi * np.random.default_rng(self.seed).random(self.n_waves)
         spectrum = np.zeros(n // 2 + 1, complex)
         spectrum[1 : self.n_waves + 1] = 0.5 * n * self._amplitudes * np.exp(1j * phases)
-        return np.asarray(self.period / n * np.arange(n)), np.asarray(np.fft.irfft(spectrum, n), float)
+        heights: FloatArray = np.fft.irfft(spectrum, n).astype(float)
+        return np.asarray(self.period / n * np.arange(n)), heights
 
     def heights(self, x: FloatArray) -> FloatArray:
         """Return the heights (n,) [m] at positions (n,) [m]."""

@@ -206,8 +206,8 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
         own, rows = np.equal(parts, part), contact.rows(part)
         for place, column in ((x, contact.x), (y, contact.y)):
             place[own] = np.interp(kept[own], contact.s[rows], column[rows])
-    at = zip(parts, x.tolist(), y.tolist(), kept.tolist(), changes, strict=True)
-    return tuple(Transition(part, px, py, s, words[i], words[i + 1]) for part, px, py, s, i in at)
+    at = zip(changes, parts, x.tolist(), y.tolist(), kept.tolist(), strict=True)
+    return tuple(Transition(part, x_at, y_at, s, words[i], words[i + 1]) for i, part, x_at, y_at, s in at)
 
 
 def resolved_transitions(contact: ContactTable, transitions: Sequence[Transition]) -> tuple[Transition, ...]:
