@@ -59,8 +59,9 @@ def run_to_file(
     """
     text, target = scene_to_toml(scene), check_result_target(path)
     known = read_result(target) if target.exists() else None
-    is_begun = known is not None and known.loading is not None and not known.loading.is_complete
-    done = known if is_begun and scene_to_toml(known.stated) == text else None
+    done = None
+    if known is not None and known.loading is not None and not known.loading.is_complete:
+        done = known if scene_to_toml(known.stated) == text else None
 
     def write(solution: Solution | AssemblySolution) -> None:
         write_result(target, solution)

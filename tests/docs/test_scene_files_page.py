@@ -19,6 +19,7 @@ from bemkit.scene.conditions import Part
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
+from bemkit.scene.steps import Step
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml
 from bemkit.scene.unit_names import UnitNames
 from tests.docs.pages import Row, blocks, plain, read, section, table
@@ -43,6 +44,7 @@ TABLES = {
     "Parts": Part,
     "Symmetry": Symmetry,
     "Mesh": MeshOptions,
+    "Steps": Step,
 }
 
 
