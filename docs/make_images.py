@@ -7,6 +7,7 @@ from pathlib import Path
 import bemkit as bk
 from bemkit.results.assembly_figures import draw_contact_map, draw_deformed_bodies
 from bemkit.results.figures import draw_contact_displacement, draw_contact_traction, draw_deformation
+from bemkit.results.history_figures import history_figures
 from bemkit.scene.toml import with_overrides
 
 IMAGES = Path(__file__).parent / "images"
@@ -14,7 +15,7 @@ DOTS_PER_INCH = 110  # sharp at the width of a page, and each file below 100 kB
 
 
 def main() -> None:
-    """Solve Example 1 of the paper with linear elements, an arch and a pin, and draw them."""
+    """Solve Example 1 of the paper with linear elements, an arch, a pin and a friction loop, and draw them."""
     solution = bk.run(with_overrides(bk.load_scene("paper-1"), discretisation="linear"))
     arch, pin = bk.run(bk.load_scene("masonry-arch")), bk.run(bk.load_scene("pin-in-plate"))
     figures = {
@@ -25,6 +26,8 @@ def main() -> None:
         "masonry-arch-contacts": draw_contact_map(arch),
         "pin-in-plate-contacts": draw_contact_map(pin),
     }
+    drawn = history_figures(bk.run(bk.load_scene("friction-loop")))
+    figures |= {"friction-loop": drawn["friction-loop"], "friction-loop-status": drawn["status-over-time"]}
     IMAGES.mkdir(exist_ok=True)
     for name, figure in figures.items():
         # without the time and version stamps the same picture is the same file

@@ -27,10 +27,11 @@ class StepWork:
         Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
         heat it is what the other entries leave.
     dissipation : float [J/m]
-        What friction takes up, at nodes that are closed at both ends of an increment; never negative.
+        What friction takes up at nodes that are closed at both ends of an increment; never negative.
     increment_work : float [J/m]
         What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
-        turns back under a falling friction bound. It vanishes as increments become smaller.
+        turns back under a falling friction bound by so much that friction would seem to give work. It vanishes as
+        increments become smaller.
 
     Notes
     -----

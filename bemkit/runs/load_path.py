@@ -96,16 +96,15 @@ class Standing:
         moved = self.state.displacement - before.state.displacement
         with np.errstate(invalid="ignore"):  # infinite gaps, whose nodes carry nothing
             approached = np.where(np.isfinite(self.gap), self.gap - before.gap, 0.0)
-        # a node that opens or closes is carried by other forces for a part of its way, and so is one that turns back
-        # under a falling bound: there the rule says nothing of friction
+        # a node that opens or closes is carried by other forces for a part of its way
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
         of_friction = -sigma[:, 1] * moved[:, 1]
-        taken = np.where(is_held, np.maximum(of_friction, 0.0), 0.0)
+        taken = max(float(of_friction[is_held].sum()), 0.0)
         of_forces = 0.5 * float((before.forces + self.forces) @ (self.displacements - before.displacements))
         return StepWork(
             external_work=of_forces + float(sigma[:, 0] @ approached),
-            dissipation=float(taken.sum()),
-            increment_work=float(sigma[:, 0] @ (approached - moved[:, 0]) + (of_friction - taken).sum()),
+            dissipation=taken,
+            increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - taken,
         )
 
 

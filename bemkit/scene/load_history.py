@@ -66,7 +66,9 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
                 states.append(_at_time(base, changes, load_factor, time))
             except ValueError as error:
                 raise type(error)(f"steps[{number}]: {error}") if scene.steps else error from error
-        last = step.time
+        # what a step leaves stays
+        last, load_factor = step.time, _value(load_factor, step.time)
+        changes = {place: _value(value, step.time) for place, value in changes.items()}
     return tuple(states)
 
 

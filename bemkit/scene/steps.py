@@ -28,8 +28,8 @@ class Step:
     changes : mapping of str to value
         By the places of scene files, such as ``"parts.press.condition.y"``, ``"law.friction_coefficient"`` or
         ``"rigid.punch.y"``: a number, a text, a table or an object as the place takes it, or a Python function of the
-        time that returns one. A formula may use the time ``t``; numbers hold from the first increment of the step on,
-        formulas follow the time, also through later steps that do not name the place again.
+        time that returns one. Numbers hold from the first increment of the step on; formulas of the time ``t`` follow
+        it to the end of the step, and what they have come to stays.
     load_factor : float, str, callable or None
         Multiplies all loads, prescribed displacements and body forces that are not constant.
     increments : int

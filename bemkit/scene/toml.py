@@ -16,10 +16,11 @@ from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
+from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.registry import SOLVERS
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import StructureError, UnstructureError, structure, unstructure
+from bemkit.scene.serialisation import UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
 
 MAX_BYTES = 1_000_000
@@ -153,9 +154,12 @@ def scene_from_table(table: dict[str, Any]) -> Scene | Assembly:
         If it is no valid scene; the message begins with the key.
     """
     try:
-        return structure(table, Assembly) if "bodies" in table else structure(table, Scene)
-    except StructureError as error:
+        scene: Scene | Assembly = structure(table, Assembly) if "bodies" in table else structure(table, Scene)
+        if scene.steps:
+            _ = load_steps(scene)  # whatever a step changes is checked
+    except InputError as error:
         raise SceneError(printable(str(error))) from error
+    return scene
 
 
 def scene_to_toml(scene: Scene | Assembly) -> str:
@@ -248,7 +252,7 @@ def with_overrides(
             own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
             changes["bodies"] = tuple(replace(body, **own) for body in scene.bodies)
         return replace(scene, **changes)
-    except (StructureError, ValueError) as error:
+    except ValueError as error:
         raise SceneError(printable(str(error))) from error
 
 

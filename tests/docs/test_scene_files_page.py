@@ -20,6 +20,7 @@ from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
+from bemkit.scene.steps import Step
 from bemkit.scene.toml import MAX_BYTES, SceneError, scene_from_toml
 from bemkit.scene.unit_names import UnitNames
 from tests.docs.pages import Row, blocks, plain, read, section, table
@@ -45,6 +46,7 @@ TABLES = {
     "Half-planes": FarField,
     "Symmetry": Symmetry,
     "Mesh": MeshOptions,
+    "Steps": Step,
 }
 
 

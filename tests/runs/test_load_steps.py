@@ -1,0 +1,213 @@
+"""Load histories solved: work, friction loops, smaller increments, steps that are kept, laws that remember."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.contact.history_laws import SlipWeakening
+from bemkit.results.load_history import LoadHistory, StepWork
+from bemkit.runs import load_path
+from bemkit.solvers.base import Status
+from tests.runs.test_rigid_bodies import driven
+
+LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=40))
+SHEAR = "parts.top.condition.x"
+
+
+def solved(scene: bk.Scene | bk.Assembly) -> LoadHistory:
+    solution = bk.run(scene)
+    assert solution.is_converged, solution.message
+    assert solution.loading is not None
+    assert solution.loading.is_complete
+    return solution.loading
+
+
+def check_balance(loading: LoadHistory, tolerance: float) -> None:
+    """The loads' work is elastic energy, friction, and what increments leave: two sums over different nodes."""
+    energy = 0.0
+    for step in loading.steps:
+        work = step.work
+        rest = work.external_work - (step.elastic_energy - energy) - work.dissipation - work.increment_work
+        size = max(abs(value) for value in (step.elastic_energy, *vars(work).values()))
+        assert abs(rest) <= tolerance * size
+        assert work.dissipation >= 0.0
+        energy = step.elastic_energy
+
+
+@pytest.mark.parametrize(
+    ("discretisation", "friction"),
+    [(bk.LinearGalerkin(), 0.3), (bk.Galerkin(3), 0.2)],  # so little that no edge lifts
+    ids=["linear", "degree 3"],
+)
+def test_over_a_closed_cycle_friction_takes_what_the_push_gives(
+    discretisation: bk.Discretisation, friction: float
+) -> None:
+    loading = solved(replace(LOOP, discretisation=discretisation, law=bk.Coulomb(friction)))
+    check_balance(loading, 1e-12)  # round-off of symmetric matrices
+    first, last = (int(np.argmin(np.abs(loading.times - time))) for time in (2.0, 6.0))
+    cycle = loading.total(first + 1, last + 1)
+    assert cycle.dissipation == pytest.approx(cycle.external_work, rel=1e-10)  # asked for: 1e-8
+    # the loop is closed, and slides with the whole friction there is both ways
+    one, other = loading.steps[first], loading.steps[last]
+    assert other.force_tangential == pytest.approx(one.force_tangential, rel=1e-10)
+    assert one.force_tangential == pytest.approx(-friction * one.force_normal, rel=1e-10)
+    np.testing.assert_allclose(other.contact.u_t, one.contact.u_t, rtol=1e-9)
+    assert cycle.external_work > one.elastic_energy
+
+
+def test_collocation_balances_up_to_its_error() -> None:
+    check_balance(solved(replace(LOOP, discretisation=bk.ConstantCollocation())), 3e-2)  # of 40 constant elements
+
+
+def test_obstacles_that_move_do_work() -> None:
+    """The floor comes up instead of the top coming down: the same state, and the floor has done the work."""
+    top = {"parts.top.condition.y": 0.0, "parts.floor.condition.obstacle.point[1]": "0.01*t"}
+    held = replace(LOOP, steps=(bk.Step(1.0, top, increments=2),), discretisation=bk.LinearGalerkin())
+    loading, pressed = solved(held), solved(replace(LOOP, steps=LOOP.steps[:1]))
+    assert loading.steps[-1].force_normal == pytest.approx(pressed.steps[-1].force_normal, rel=1e-10)
+    assert loading.total().external_work == pytest.approx(pressed.total().external_work, rel=1e-10)
+    check_balance(loading, 1e-12)
+
+
+def test_bodies_and_a_punch_balance_too() -> None:
+    """A punch is pressed down by a force and moved to and fro."""
+    steps = (
+        bk.Step(1.0, {"rigid.punch.force_y": "-1e-3*t"}, increments=2),
+        bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=6),
+    )
+    assembly = replace(driven(x=0.0, force_y=-1e-3), law=bk.Coulomb(0.3), steps=steps)
+    loading = solved(assembly)
+    check_balance(loading, 1e-10)
+    assert loading.total().dissipation > 0.0
+
+
+def test_with_weight_the_external_work_follows_from_the_balance() -> None:
+    weight = bk.Gravity(1e-3, (0.0, -1.0), is_constant=True)
+    loading = solved(replace(LOOP, body_forces=(weight,), steps=LOOP.steps[:1]))
+    check_balance(loading, 1e-12)
+    assert loading.steps[0].work.external_work > 0.0
+
+
+def test_a_step_that_fails_is_gone_in_halves() -> None:
+    """Two full steps settle small increments of one body and no large ones."""
+    impatient = bk.SemismoothNewton(full_steps=2, damped_steps=0, follows_path=False)
+    jump = (bk.Step(1.0, {"parts.top.condition.y": "-0.01*t"}), bk.Step(2.0, {SHEAR: 0.01}))
+    patient, halved = (solved(replace(LOOP, steps=jump, solver=each)) for each in (LOOP.solver, impatient))
+    assert patient.steps[1].n_increments == 1
+    assert halved.steps[1].n_increments > 1
+    assert halved.steps[1].time == 2.0
+    check_balance(halved, 1e-12)
+    assert halved.steps[1].force_tangential == pytest.approx(patient.steps[1].force_tangential, rel=1e-9)  # it slides
+
+
+def test_finished_steps_are_kept_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(load_path, "MOST_HALVINGS", 0)
+    hopeless = bk.SemismoothNewton(full_steps=1, damped_steps=0, follows_path=False)
+    steps = (
+        bk.Step(1.0, {"parts.top.condition.y": "-0.01*t"}),
+        bk.Step(1.5),
+        bk.Step(2.0, {SHEAR: 0.006}),
+        bk.Step(3.0),
+    )
+    solution = bk.run(replace(LOOP, steps=steps, solver=hopeless))
+    assert solution.status in (Status.STALLED, Status.CYCLING)
+    assert solution.message.startswith("load step 3 of 4: ")
+    assert "Finished: 2 of 4 steps, up to t = 1.5. The fields are those of the step before." in solution.message
+    assert solution.loading is not None
+    assert [step.time for step in solution.loading.steps] == [1.0, 1.5]
+    assert not solution.is_certified
+    assert solution.scene.steps == (bk.Step(1.5),)
+
+
+def test_a_single_step_is_static() -> None:
+    """Slip counts from rest, as without steps: a step alone changes nothing but the time."""
+    at_once = replace(LOOP, steps=(bk.Step(7.0, {SHEAR: 0.005}),))
+    parts = tuple(
+        replace(part, condition=bk.PrescribedDisplacement(0.005, -0.01)) if part.name == "top" else part
+        for part in LOOP.parts
+    )
+    plain = bk.run(replace(LOOP, steps=(), parts=parts))
+    np.testing.assert_array_equal(bk.run(at_once).contact.sigma_t, plain.contact.sigma_t)
+    assert plain.loading is None
+
+
+def sliding(law: bk.FrictionLaw, increments: int, duration: float = 1.0) -> LoadHistory:
+    """A block is pressed on a floor and dragged along it by its top."""
+    top = {SHEAR: f"0.05*(t - 1)/{duration}"}
+    press = bk.Step(1.0, {"parts.top.condition.y": "-0.01*t"})
+    steps = (press, bk.Step(1.0 + duration, top, increments=increments))
+    return solved(replace(LOOP, law=law, steps=steps))
+
+
+def test_friction_falls_with_the_slip() -> None:
+    """At the end every node has slipped farther than D; on the way each carries what its own slip has left."""
+    law = SlipWeakening(0.3, 0.1, 0.03)
+    loading = sliding(law, 10)
+    last = loading.steps[-1]
+    assert last.slip.min() > 0.03
+    assert last.force_tangential == pytest.approx(-0.1 * last.force_normal, rel=1e-9)
+    for step in loading.steps:
+        slips = np.array(step.contact.status_words()) == "slip"
+        left = np.maximum(1.0 - step.slip / 0.03, 0.0)
+        bound = (0.1 + 0.2 * left) * np.abs(step.contact.sigma_n)
+        np.testing.assert_allclose(np.abs(step.contact.sigma_t)[slips], bound[slips], rtol=1e-8)
+        assert np.all(np.abs(step.contact.sigma_t) <= bound * (1.0 + 1e-8) + 1e-12)
+    check_balance(loading, 1e-11)
+
+
+def test_friction_grows_with_the_speed() -> None:
+    """Twice as fast, all nodes sliding: the coefficients are those of the law at the speed of the top."""
+    law = bk.RateStrengthening(0.1, 0.02, 0.01)
+    for duration in (1.0, 0.5):
+        last = sliding(law, 10, duration).steps[-1]
+        speed = 0.05 / duration  # of the top, and of every node of a block that slides as a whole
+        expected = 0.1 + 0.02 * np.log1p(speed / 0.01)
+        assert -last.force_tangential / last.force_normal == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_bound_in_the_result_is_that_of_the_slip() -> None:
+    law = SlipWeakening(0.3, 0.1, 0.03)
+    steps = (LOOP.steps[0], bk.Step(2.0, {SHEAR: "0.05*(t - 1)"}, increments=4))
+    solution = bk.run(replace(LOOP, law=law, steps=steps))
+    assert solution.friction_bound is not None
+    np.testing.assert_allclose(solution.friction_bound, np.abs(solution.contact.sigma_t), rtol=1e-8)
+
+
+def test_a_law_that_never_agrees_with_its_slip_is_named() -> None:
+    """A bound that all but vanishes at the first slip, under a load: the block snaps forward without end."""
+    brittle = SlipWeakening(0.4, 0.0, 1e-6)
+    parts = tuple(replace(p, condition=bk.Traction(y=-1.0)) if p.name == "top" else p for p in LOOP.parts)
+    steps = (bk.Step(1.0), bk.Step(2.0, {SHEAR: 0.35}))
+    solution = bk.run(replace(LOOP, law=brittle, parts=parts, steps=steps))
+    assert solution.status in (Status.STALLED, Status.UNSOLVABLE_LOAD, Status.CYCLING)
+    assert "Finished: 1 of 2 steps" in solution.message
+
+
+@pytest.mark.parametrize("accuracy", [2e-2, 5e-3])
+def test_histories_with_an_accuracy(accuracy: float) -> None:
+    steps = (LOOP.steps[0], replace(LOOP.steps[1], increments=6))
+    options: dict[str, Any] = {"mesh": bk.MeshOptions(accuracy=accuracy), "discretisation": bk.QuadraticGalerkin()}
+    solution = bk.run(replace(LOOP, steps=steps, **options))
+    assert solution.is_converged, solution.message
+    assert solution.loading is not None
+    assert solution.loading.is_complete
+    assert solution.estimated_error is not None
+    assert solution.estimated_error <= accuracy
+    fine = replace(LOOP, steps=steps, mesh=bk.MeshOptions(elements=400), discretisation=bk.QuadraticGalerkin())
+    for one, other in zip(solution.loading.steps, solved(fine).steps, strict=True):
+        assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=accuracy)  # the square of it, in theory
+
+
+def test_degrees_do_not_rise_in_histories() -> None:
+    options: dict[str, Any] = {"mesh": bk.MeshOptions(accuracy=1e-2), "discretisation": bk.HpGalerkin()}
+    with pytest.raises(bk.InputError, match="32 load steps: degrees rise for single loads alone"):
+        bk.run(replace(LOOP, **options))
+
+
+def test_work_adds_up() -> None:
+    assert StepWork(1.0, 2.0, 3.0) + StepWork(0.5, 0.25, 0.125) == StepWork(1.5, 2.25, 3.125)
