@@ -111,26 +111,34 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
     if factor == 1.0 and scene.load_factors == (1.0,):
         return scene
     if isinstance(scene, Assembly):
-        bodies = tuple(replace(body, **_scaled(body, factor)) for body in scene.bodies)
+        known: dict[int, Any] = {}
+        bodies = tuple(replace(body, **_scaled(body, factor, known)) for body in scene.bodies)
         rigid = tuple(body.scaled(factor) for body in scene.rigid)
         return replace(scene, bodies=bodies, rigid=rigid, load_factors=(1.0,))
     far = None if scene.far is None else scene.far.scaled(factor)
-    return replace(scene, **_scaled(scene, factor), far=far, load_factors=(1.0,))
+    return replace(scene, **_scaled(scene, factor, {}), far=far, load_factors=(1.0,))
 
 
-def _scaled(loaded: Scene | Body, factor: float) -> dict[str, Any]:
-    """Return parts and body forces under scaled loads; those without loads are the same objects."""
+def _scaled(loaded: Scene | Body, factor: float, known: dict[int, Any]) -> dict[str, Any]:
+    """Return parts and body forces under scaled loads; those without loads are the same objects.
+
+    What several bodies share they share afterwards: `known` holds, by the identity of an object, what became of it.
+    """
 
     def scaled(field: ScalarField) -> ScalarField:
         return _times(factor, field)
 
-    conditions = [with_fields(part.condition, scaled, scaled) for part in loaded.parts]
-    parts = [
-        part if condition is part.condition else replace(part, condition=condition)
-        for part, condition in zip(loaded.parts, conditions, strict=True)
-    ]
-    forces = (force if force.is_constant else scaled_body_force(force, factor) for force in loaded.body_forces)
-    return {"parts": tuple(parts), "body_forces": tuple(forces)}
+    for part in loaded.parts:
+        if id(part) not in known:
+            condition = with_fields(part.condition, scaled, scaled)
+            known[id(part)] = part if condition is part.condition else replace(part, condition=condition)
+    for force in loaded.body_forces:
+        if id(force) not in known:
+            known[id(force)] = force if force.is_constant else scaled_body_force(force, factor)
+    return {
+        "parts": tuple(known[id(part)] for part in loaded.parts),
+        "body_forces": tuple(known[id(force)] for force in loaded.body_forces),
+    }
 
 
 @dataclass(frozen=True)

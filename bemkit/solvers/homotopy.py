@@ -73,12 +73,13 @@ class _Piece(NamedTuple):
     slack_rate: FloatArray  # (5, n_contact)
 
 
-def why_no_path(problem: ContactProblem) -> str:
+def why_no_path(problem: ContactProblem, *, is_short: bool = False) -> str:
     """Return why the path of solutions is not to be followed, nothing if it is.
 
-    It asks for two responses or more for each contact node, and the law has to be continuous where nodes open.
+    It asks for two responses or more for each contact node, unless it is short, and the law has to be continuous where
+    nodes open.
     """
-    if problem.body.is_costly:
+    if problem.body.is_costly and not is_short:
         return "the path of solutions is not followed, because responses of this body are costly"
     jumps = problem.cohesion > 0.0
     if np.any(jumps & ~np.asarray(problem.law.acts_across_gap)):

@@ -20,6 +20,9 @@ _MOST_WEAKENED = 4
 _FEW_PIECES = 20
 """Pieces of a short path, besides one for eight nodes; the whole path has one or two for each node."""
 
+_COSTLY_PIECES = 80
+"""Pieces of a short path where responses are costly: after springs, packings of 200 discs took 37."""
+
 _FEW_STEPS = 12
 """Full steps under weaker friction."""
 
@@ -122,7 +125,7 @@ class SemismoothNewton:
         Steps allowed; a path counts as one.
     full_steps : int
         Full steps allowed before the line search begins; it begins earlier if active sets come back. At most 20 where
-        the responses of the body are costly.
+        the responses of the body are costly, unless springs have held it in the steps before.
     damped_steps : int
         Steps with line search allowed before the path is followed; zero leaves the line search out. At most 5 where
         responses are costly: load steps closer to each other help more.
@@ -223,7 +226,8 @@ class SemismoothNewton:
             return replace(following, ended=Status.STALLED, message=reason)
         if repeats:
             return self._rescued(problem, following, Status.CYCLING, "the active sets come back")
-        most = min(self.full_steps, _COSTLY_FULL) if problem.body.is_costly else self.full_steps
+        is_first_try = problem.body.is_costly and following.spring == 0.0
+        most = min(self.full_steps, _COSTLY_FULL) if is_first_try else self.full_steps
         if following.n_in_phase >= most:
             reason = f"{most} full steps have not settled the active sets"
             return self._rescued(problem, following, Status.STALLED, reason)
@@ -253,13 +257,16 @@ class SemismoothNewton:
     def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
         hindrance = why_no_path(problem) if self.follows_path else ""
-        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS and not hindrance
+        # springs that have become weaker leave few nodes wrong, whose path is short even where responses are costly
+        hindrance_if_short = why_no_path(problem, is_short=iterate.spring > 0.0)
+        may_follow = self.follows_path and iterate.n_paths < _MOST_PATHS
         for phase in iterate.phase.more_patient:
             if phase is Phase.DAMPED and self.damped_steps > 0:
                 return _back_at_best(replace(iterate, message=f"{reason}; line search begins"))
             if phase is Phase.SPRINGS and _may_be_sprung(problem, iterate):
                 return _sprung(problem, iterate, reason)
-            if phase not in (Phase.DAMPED, Phase.SPRINGS) and may_follow:
+            is_hindered = hindrance_if_short if phase is Phase.SHORT_PATH else hindrance
+            if phase not in (Phase.DAMPED, Phase.SPRINGS) and may_follow and not is_hindered:
                 return replace(iterate, phase=phase, n_in_phase=0, message=f"{reason}; the path is followed next")
         return replace(iterate, ended=status, message="; ".join(filter(None, (reason, hindrance))))
 
@@ -348,7 +355,7 @@ def _sprung(problem: ContactProblem, iterate: NewtonIterate, reason: str) -> New
 
 
 def _few_pieces(problem: ContactProblem) -> int:
-    return _FEW_PIECES + problem.n_contact // 8
+    return _COSTLY_PIECES if problem.body.is_costly else _FEW_PIECES + problem.n_contact // 8
 
 
 def _with_full_steps(equations: ProjectionEquations, start: ContactState) -> tuple[Residual, ActiveSets, int]:

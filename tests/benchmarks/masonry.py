@@ -3,8 +3,8 @@
 ``[courses] [blocks a course]`` alone: the contact system of a wall, one sticking response, the programme that finds
 unsolvable loads, and a whole solve under weight and a push on the uppermost course of a tenth of what friction holds.
 Times are those of the processor and, in brackets, of the clock. ``steps [courses] [blocks a course]``: such a wall as
-an assembly, weight alone and then the push, with the seconds of each stage. ``packing [discs] [width]``: a random
-packing of discs in a box.
+an assembly, weight alone and then the push, with the seconds of each stage. ``packing [discs] [width] [seed]``: a
+random packing of discs in a box.
 """
 
 import resource
@@ -75,6 +75,7 @@ if __name__ == "__main__":
         push = 0.1 * FRICTION * 2 * per_course
         assembled(replace(wall_assembly(n_courses, per_course, push=True), load_factors=(0.0, push)))
     elif "packing" in sys.argv:
-        assembled(packing(*(numbers or (200, 20))))
+        discs, width, *seed = numbers or (200, 20)
+        assembled(packing(discs, width, seed=sum(seed)))
     else:
         main(*numbers)

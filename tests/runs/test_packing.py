@@ -24,6 +24,13 @@ def test_a_packing_of_twelve_discs_rests() -> None:
     check_packing(packing(12, 5.0))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_packings_of_two_hundred_discs_rest(seed: int) -> None:
+    """Springs throughout, then full steps; of seed 1 a path of 37 pieces where these come back."""
+    check_packing(packing(200, 20.0, seed=seed))
+
+
 def test_points_that_face_two_discs_are_why_contacts_have_a_reach() -> None:
     """With the reach of half a disc the contacts tie many points twice, and six digits are lost."""
     near = packing(12, 5.0)

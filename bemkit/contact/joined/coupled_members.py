@@ -123,11 +123,6 @@ class CoupledMembers:
         return sparse.csr_array((self.relative @ self.motions).T)
 
     @cached_property
-    def stiffness(self) -> sparse.csr_array:
-        """(n, n) sparse array [Pa]: the stiffnesses of all members."""
-        return sparse.csr_array(sparse.block_diag([member.stiffness for member in self.members], format="csr"))
-
-    @cached_property
     def motion_owner(self) -> IntArray:
         """(n_motions,) array: the member that each of the motions moves."""
         return np.repeat(np.arange(len(self.members)), [len(member.motions) for member in self.members])

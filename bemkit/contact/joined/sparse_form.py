@@ -11,6 +11,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.coupled_members import CoupledMembers
+from bemkit.contact.joined.reduced_members import ReducedMembers
 
 _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
@@ -20,12 +21,14 @@ _LARGE = 0.3
 """Entries of a row of the coupling above this share of its largest may be pivots."""
 
 
-def sparse_response(joined: CoupledMembers, conditions: LinearConditions) -> ContactState:
+def sparse_response(joined: CoupledMembers, reduced: ReducedMembers, conditions: LinearConditions) -> ContactState:
     """Return the response of many members; see `LinearBody.respond`.
 
     Parameters
     ----------
     joined : CoupledMembers
+    reduced : ReducedMembers
+        The same members as far as contacts feel them.
     conditions : LinearConditions
         That leave no rigid motion free.
 
@@ -50,16 +53,16 @@ def sparse_response(joined: CoupledMembers, conditions: LinearConditions) -> Con
         _blocks(array)[kept]
         for array in (conditions.on_displacement, conditions.on_traction / joined.weights[:, None, None])
     )
-    ties = sparse.csr_array(on_displacement @ joined.relative)
-    spread = joined.relative.T @ given.by_kept
+    ties = sparse.csr_array(on_displacement @ reduced.relative)
+    spread = reduced.relative.T @ given.by_kept
     matrix = sparse.block_array(
-        [[joined.stiffness / modulus, -spread], [ties, modulus * (on_force @ given.by_kept)]], format="csr"
+        [[reduced.stiffness / modulus, -spread], [ties, modulus * (on_force @ given.by_kept)]], format="csr"
     )
-    forces = joined.load + joined.relative.T @ given.at_rest
+    forces = reduced.on_kept @ joined.load + reduced.relative.T @ given.at_rest
     values = conditions.value.ravel()[kept] - on_displacement @ joined.offset - on_force @ given.at_rest
     solution = _solved(matrix, np.concatenate([forces / modulus, values]), ties)
-    n_displacements = joined.relative.shape[1]
-    displacement = (joined.relative @ solution[:n_displacements] + joined.offset).reshape(n, 2)
+    n_displacements = reduced.relative.shape[1]
+    displacement = (reduced.relative @ solution[:n_displacements] + joined.offset).reshape(n, 2)
     force = given.by_kept @ (modulus * solution[n_displacements:]) + given.at_rest
     return _exact(conditions, displacement, force.reshape(n, 2) / joined.weights[:, None])
 
