@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep | critical-friction | verify``.
+"""The command line: ``bemkit run | show | scenes | plan | schema | study | stability | sweep | critical-friction | verify``.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -30,8 +30,9 @@ if TYPE_CHECKING:
     from bemkit.scene.scene import Scene
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
-_STUDIES = {
+_ON_DEMAND = {
     "critical-friction": "critical_friction",
+    "schema": "schema",
     "stability": "study",
     "study": "study",
     "sweep": "sweep",
@@ -81,17 +82,17 @@ def _run_to_end(arguments: list[str] | None) -> int:
 
 
 class _Commands(click.Group):
-    """Loads the commands of studies only when they are asked for."""
+    """Loads some commands only when they are asked for."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
-        return sorted([*super().list_commands(ctx), *_STUDIES])
+        return sorted([*super().list_commands(ctx), *_ON_DEMAND])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a name."""
-        if cmd_name not in _STUDIES:
+        if cmd_name not in _ON_DEMAND:
             return super().get_command(ctx, cmd_name)
-        command: click.Command = getattr(import_module(f"bemkit.cli.{_STUDIES[cmd_name]}"), cmd_name.replace("-", "_"))
+        command: click.Command = getattr(import_module(f"bemkit.cli.{_ON_DEMAND[cmd_name]}"), cmd_name.replace("-", "_"))
         return command
 
 

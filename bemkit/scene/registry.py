@@ -57,10 +57,14 @@ class Registry:
         installed = self._installed()
         if kind in installed:
             return self._load(installed[kind])
-        known = [*self.built_in, *installed]
+        known = self.words()
         raise InputError(
             f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{closest(kind, known)}"
         )
+
+    def words(self) -> tuple[str, ...]:
+        """Return all words: the built-in ones, then those that installed packages add."""
+        return tuple(dict.fromkeys([*self.built_in, *self._installed()]))
 
     def kind_of(self, value: object) -> str:
         """Return the word that names the class of a value.

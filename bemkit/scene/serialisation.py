@@ -67,7 +67,7 @@ _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (ContactSolver, SOLVERS),
 )
 
-_NAMED: tuple[tuple[Any, type, str], ...] = (
+NAMED: tuple[tuple[Any, type, str], ...] = (
     (tuple[Part, ...], Part, "parts"),
     (tuple[Body, ...], Body, "bodies"),
     (tuple[RigidBody, ...], RigidBody, "rigid"),
@@ -160,7 +160,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
         for entry, content in _written_fields(value, keep_defaults)
     }
-    registry = _registry(FrictionLaw if isinstance(value, FrictionLaw) else declared)
+    registry = registry_of(FrictionLaw if isinstance(value, FrictionLaw) else declared)
     if registry is None:
         return table
     try:
@@ -201,17 +201,18 @@ def _converter() -> Converter:
     add(lambda wanted: get_origin(wanted) is tuple, lambda value, wanted: _tuple(converter, value, wanted))
     add(lambda wanted: get_origin(wanted) is Mapping, lambda value, wanted: _mapping(converter, value, wanted))
     add(lambda wanted: _is_class(wanted, Enum), lambda value, wanted: _enum(value, wanted))
-    add(lambda wanted: bool(_options(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
+    add(lambda wanted: bool(options_of(wanted)), lambda value, wanted: _one_of(converter, value, wanted))
     converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
     add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
-    add(lambda wanted: _registry(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
-    for declared, entry, heading in _NAMED:
+    add(lambda wanted: registry_of(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
+    for declared, entry, heading in NAMED:
         add(partial(eq, declared), partial(_named, converter, entry, heading))
     return converter
 
 
-def _registry(declared: Any) -> Registry | None:
-    options = _options(declared)
+def registry_of(declared: Any) -> Registry | None:
+    """Return the registry whose words name the classes that stand under a declared type, None if there is none."""
+    options = options_of(declared)
     declared = options[0] if len(options) == 1 else declared
     return next((registry for wanted, registry in _REGISTRIES if declared == wanted), None)
 
@@ -279,7 +280,7 @@ def _enum(value: object, wanted: type[Enum]) -> Enum:
     raise InputError(f"{_show(value)} is unknown: give one of {', '.join(words)}{closest(str(value), words)}")
 
 
-def _options(wanted: Any) -> tuple[Any, ...]:
+def options_of(wanted: Any) -> tuple[Any, ...]:
     """Return the alternatives of a union that a table can hold."""
     if get_origin(wanted) not in (Union, types.UnionType):
         return ()
@@ -291,7 +292,7 @@ def _is_callable(wanted: Any) -> bool:
 
 
 def _one_of(converter: Converter, value: object, wanted: Any) -> Any:
-    options = _options(wanted)
+    options = options_of(wanted)
     for option in options:
         if _fits(value, option):
             return converter.structure(value, option)
@@ -306,17 +307,17 @@ def _fits(value: object, option: Any) -> bool:
         case int() | float():
             return option is float or (option is int and isinstance(value, int))
         case str():
-            return option is str or option is Expression or _is_class(option, Enum) or _registry(option) is not None
+            return option is str or option is Expression or _is_class(option, Enum) or registry_of(option) is not None
         case list():
             return get_origin(option) in (tuple, np.ndarray)
         case dict():
-            return is_dataclass(option) or _registry(option) is not None
+            return is_dataclass(option) or registry_of(option) is not None
     return False
 
 
 def _name(option: Any) -> str:
     names = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", Expression: "a formula"}
-    registry = _registry(option)
+    registry = registry_of(option)
     if registry is not None:
         return f"a {registry.role}"
     return names.get(option, "a list" if get_origin(option) in (tuple, np.ndarray) else "a table")
@@ -332,7 +333,7 @@ def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], An
 
 
 def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
-    registry = cast(Registry, _registry(wanted))  # the hook is chosen by it
+    registry = cast(Registry, registry_of(wanted))  # the hook is chosen by it
     if isinstance(value, str):
         value = {"kind": value}
     table = registry.without_variant(_exactly(value, dict, f"a {registry.role} as a word or as a table with its kind"))

@@ -1,0 +1,204 @@
+"""The JSON schema of scene files, by which editors complete keys and mark what is wrong while it is written.
+
+It is made of the same dataclasses, types and words that scene files are read by, of those that installed packages add,
+too; descriptions are those of the docstrings. Editors know draft 7 of JSON schema.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from enum import Enum
+from functools import partial
+from typing import Any, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from bemkit.errors import InputError
+from bemkit.formulas import Expression
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.docstrings import parameters, summary
+from bemkit.scene.registry import Registry
+from bemkit.scene.scene import Scene
+from bemkit.scene.serialisation import NAMED, options_of, registry_of, unstructure
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+Schema = dict[str, Any]
+
+_PLAIN: tuple[tuple[type, Schema], ...] = (
+    (bool, {"type": "boolean"}),
+    (int, {"type": "integer"}),
+    (float, {"type": "number"}),
+    (str, {"type": "string"}),
+    (Expression, {"type": "string"}),
+)
+
+
+def scene_schema() -> Schema:
+    """Return the JSON schema (draft 7) of scene files of one body and of several.
+
+    What is no matter of keys, types and words, such as a Poisson ratio of 0.7 or a side that the shape lacks, is left
+    to `bemkit.load_scene`.
+
+    Returns
+    -------
+    dict
+        To be written as JSON.
+    """
+    definitions = _Definitions()
+    one, several = definitions.table(Scene), definitions.table(Assembly)
+    return {
+        "$schema": DRAFT,
+        "title": "bemkit scene",
+        "description": "A contact problem of one elastic body, or of several if there are tables [bodies.NAME].",
+        "type": "object",
+        "properties": several["properties"] | one["properties"],
+        "if": {"required": ["bodies"]},
+        "then": _keys(several),
+        "else": _keys(one),
+        "definitions": dict(sorted(definitions.made.items())),
+    }
+
+
+def _keys(table: Schema) -> Schema:
+    """Return which keys a table must and may have."""
+    return {"required": table["required"], "propertyNames": {"enum": list(table["properties"])}}
+
+
+class _Definitions:
+    """Schemas of all classes met so far, each made once."""
+
+    def __init__(self) -> None:
+        self.made: dict[str, Schema] = {}
+
+    def of_type(self, declared: Any) -> Schema:
+        """Return the schema of what may stand under a declared type."""
+        for listed, entry, _ in NAMED:
+            if declared == listed:
+                without_name = self._referred(entry.__name__, partial(self.table, entry, leave_out="name"))
+                return {"type": "object", "additionalProperties": without_name}
+        registry = registry_of(declared)
+        if registry is not None:
+            return self._referred(_slug(registry.role), partial(self._kinds, registry))
+        if options := options_of(declared):
+            return _any_of([self.of_type(option) for option in options])
+        return self._of_one(declared)
+
+    def _of_one(self, declared: Any) -> Schema:
+        for plain, schema in _PLAIN:
+            if declared is plain:
+                return dict(schema)
+        origin, inner = get_origin(declared), get_args(declared)
+        if origin is np.ndarray:
+            return {"type": "array", "items": {"type": ["number", "array"]}}
+        if origin is tuple and inner[1:] == (Ellipsis,):
+            return {"type": "array", "items": self.of_type(inner[0])}
+        if origin is tuple:
+            items = [self.of_type(entry) for entry in inner]
+            return {"type": "array", "items": items, "minItems": len(items), "maxItems": len(items)}
+        if origin is Mapping:
+            return {"type": "object", "additionalProperties": self.of_type(inner[1])}
+        if isinstance(declared, type) and issubclass(declared, Enum):
+            return {"enum": [member.value for member in declared]}
+        if is_dataclass(declared):
+            table = cast(type, declared)
+            return self._referred(table.__name__, partial(self.table, table))
+        raise TypeError(f"{declared} has no place in scene files: teach it to bemkit.scene.serialisation and here")
+
+    def _referred(self, name: str, make: Callable[[], Schema]) -> Schema:
+        if name not in self.made:
+            self.made[name] = {}  # is being made: classes may contain themselves
+            self.made[name] = make()
+        return {"$ref": f"#/definitions/{name}"}
+
+    def table(self, owner: type, *, leave_out: str = "") -> Schema:
+        """Return the schema of a table with the fields of a dataclass."""
+        entries = [entry for entry in fields(owner) if entry.init and entry.name != leave_out]
+        hints, texts = get_type_hints(owner), parameters(inspect.getdoc(owner) or "")
+        described = {
+            entry.name: _described(self.of_type(hints[entry.name]), entry, hints[entry.name], texts.get(entry.name, ""))
+            for entry in entries
+        }
+        return {
+            "description": summary(inspect.getdoc(owner) or ""),
+            "type": "object",
+            "properties": described,
+            "required": [entry.name for entry in entries if _is_required(entry)],
+            "additionalProperties": False,
+        }
+
+    def _kinds(self, registry: Registry) -> Schema:
+        """Return the schema of a word alone, or a table with a kind: what is wrong in it is told of its kind alone."""
+        tables = {word: self._kind(registry, word) for word in registry.words() if _can_be_loaded(registry, word)}
+        alone = [word for word, table in tables.items() if not table["required"]]
+        return {
+            "description": f"{registry.role[0].upper()}{registry.role[1:]}: a word, or a table with its kind.",
+            "type": ["string", "object"],
+            "required": ["kind"],
+            "properties": {"kind": {"enum": list(tables)}} | _hints(tables),
+            "allOf": [
+                {"if": {"type": "string"}, "then": {"enum": alone}},
+                *({"if": _is_of_kind(word), "then": table} for word, table in tables.items()),
+            ],
+        }
+
+    def _kind(self, registry: Registry, word: str) -> Schema:
+        table = self.table(registry.find(word))
+        properties = {"kind": {"const": word}} | table["properties"]
+        for kind, key, value in registry.variants:
+            if kind == word:
+                properties[key] = _any_of([properties[key], {"const": value}])
+        return table | {"properties": properties}
+
+
+def _can_be_loaded(registry: Registry, word: str) -> bool:
+    """Tell whether scene files may use a word: a broken package cannot add any."""
+    try:
+        registry.find(word)
+    except InputError:
+        return False
+    return True
+
+
+def _is_of_kind(word: str) -> Schema:
+    return {"type": "object", "required": ["kind"], "properties": {"kind": {"const": word}}}
+
+
+def _hints(tables: Mapping[str, Schema]) -> Schema:
+    """Return all keys of all kinds with their descriptions: editors look no further for what they propose."""
+    texts: dict[str, list[str]] = {}
+    for word, table in tables.items():
+        for key, schema in table["properties"].items():
+            if key != "kind":
+                texts.setdefault(key, []).append(f"{word}: {schema.get('description', key)}")
+    return {key: {"description": "\n\n".join(lines)} for key, lines in texts.items()}
+
+
+def _slug(text: str) -> str:
+    return text.replace(" ", "-")
+
+
+def _is_required(entry: Field[Any]) -> bool:
+    return entry.init and entry.default is MISSING and entry.default_factory is MISSING
+
+
+def _any_of(schemas: list[Schema]) -> Schema:
+    """Return the schema of a value that fits one of several; plain types become a list of types."""
+    if len(schemas) == 1:
+        return schemas[0]
+    if all(list(schema) == ["type"] for schema in schemas):
+        return {"type": [schema["type"] for schema in schemas]}
+    return {"anyOf": schemas}
+
+
+def _described(schema: Schema, entry: Field[Any], declared: Any, text: str) -> Schema:
+    """Return a schema with the description and the default of a key."""
+    described: Schema = {"description": text} if text else {}
+    if not _is_required(entry) and "additionalProperties" not in schema:
+        default = entry.default if entry.default_factory is MISSING else entry.default_factory()
+        if default is not None and default != math.inf:  # JSON has no infinity
+            described["default"] = unstructure(default, declared)
+    # beside a reference nothing else counts in draft 7
+    return ({"allOf": [schema]} if "$ref" in schema and described else schema) | described
