@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
     from bemkit.results.assembly_solution import AssemblySolution as AssemblySolution
+    from bemkit.results.citations import cite as cite
     from bemkit.results.export import export_result as export_result
     from bemkit.results.interior import interior_fields as interior_fields
     from bemkit.results.result_file import read_result as read_result
@@ -166,6 +167,7 @@ _HOME = {
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
     "results.assembly_solution": ("AssemblySolution",),
+    "results.citations": ("cite",),
     "results.export": ("export_result",),
     "results.interior": ("interior_fields",),
     "results.result_file": ("read_result", "write_result"),

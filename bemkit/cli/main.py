@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | schema | study | stability | sweep | critical-friction | verify``.
+"""The command line: the program ``bemkit`` and its commands.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
 _ON_DEMAND = {
+    "cite": "cite",
     "critical-friction": "critical_friction",
     "schema": "schema",
     "stability": "study",

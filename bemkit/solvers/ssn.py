@@ -9,6 +9,8 @@ from bemkit.solvers.base import Iterate, Status, check_count, check_max_steps, c
 from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
 from bemkit.solvers.newton import merit, negligible, respond
 
+PATH_MESSAGE, SPRINGS_MESSAGE = "path of", "springs of"
+"""How the messages of steps begin that follow a path of solutions, and that hold all bodies by springs."""
 _MOST_PATHS = 5
 """Paths followed to their ends before giving up. One is enough for bounds that are affine in the pressure; for others
 each path starts from the tangent at the end of the last."""
@@ -279,7 +281,7 @@ class SemismoothNewton:
         following = replace(iterate, linear_solves=iterate.linear_solves + end.linear_solves)
         if end.state is None:
             return self._rescued(problem, following, Status.STALLED, end.reason)
-        return self._restarted(problem, following, end.state, f"path of {end.n_pieces} pieces")
+        return self._restarted(problem, following, end.state, f"{PATH_MESSAGE} {end.n_pieces} pieces")
 
     def _weaker_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
         share = _WEAKER ** (iterate.n_in_phase + 1)
@@ -294,7 +296,7 @@ class SemismoothNewton:
             message=f"from {share:.2g} of the friction: {end.reason}",
         )
         if end.state is not None:
-            words = f"path of {end.n_pieces} pieces from {share:.2g} of the friction"
+            words = f"{PATH_MESSAGE} {end.n_pieces} pieces from {share:.2g} of the friction"
             return self._restarted(problem, following, end.state, words)
         if following.n_in_phase >= _MOST_WEAKENED:
             return self._rescued(problem, following, Status.STALLED, end.reason)
@@ -311,7 +313,7 @@ class SemismoothNewton:
             iterate,
             state=residual.state,
             linear_solves=iterate.linear_solves + 1,
-            message=f"springs of {iterate.spring / problem.body.stiffness_scale:.1e}",
+            message=f"{SPRINGS_MESSAGE} {iterate.spring / problem.body.stiffness_scale:.1e}",
             residual=residual,
             sets=sets,
             merit=merit(problem, residual),

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import bemkit
-from tests.docs.pages import read
+from bemkit.results.bibliography import PACKAGE, works
+from tests.docs.pages import DOCS, read
 
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:18|19|20)\d\d)\]")
 CITED = {key for path in Path(bemkit.__file__).parent.rglob("*.py") for key in KEY.findall(path.read_text("utf-8"))}
@@ -16,7 +17,16 @@ CITED = {key for path in Path(bemkit.__file__).parent.rglob("*.py") for key in K
 
 @pytest.mark.parametrize("key", sorted(CITED))
 def test_what_is_cited_is_listed(key: str) -> None:
-    assert f"[{key}]" in read("references.md")
+    assert key in works()
+
+
+def test_the_page_shows_the_bibliography(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(DOCS)
+    from make_bibliography import filled
+
+    page = read("references.md")
+    assert filled(page) == page, "run python docs/make_bibliography.py"
+    assert re.findall(r"^\| `\[(\w+)\]`", page, re.MULTILINE) == [key for key in works() if key != PACKAGE]
 
 
 def test_something_is_cited() -> None:

@@ -1,0 +1,156 @@
+"""Which works stand behind a scene, or behind what a run of it used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from bemkit.geometry.curves import Segment
+from bemkit.operators.linear.solvers import Krylov
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.bibliography import PACKAGE, Work, works
+from bemkit.results.solution import Solution
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
+from bemkit.scene.discretisation import ConstantCollocation, Discretisation
+from bemkit.scene.registry import SOLVERS
+from bemkit.scene.scene import Scene
+from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
+
+_NEWTON = ("HintermuellerItoKunisch2002", "HueeberStadlerWohlmuth2008", "ChristensenEtAl1998")
+DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "semismooth-newton": _NEWTON,
+        "augmented-lagrangian": ("Paper", "Stadler2004"),
+        "fixed-point": ("NecasJarusekHaslinger1980", *_NEWTON),
+        "lemke": ("Lemke1965", "CottlePangStone1992", "StewartTrinkle1996"),
+    }
+)
+"""The works behind each built-in driver, by its word in scene files."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method and the works behind it.
+
+    Parameters
+    ----------
+    name : str
+    keys : tuple of str
+        In the bibliography; none of a method that bemkit does not come with.
+    """
+
+    name: str
+    keys: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Citations:
+    """Methods of a scene or of a run, the package first.
+
+    Parameters
+    ----------
+    methods : tuple of Method
+    reference : str
+        Where the scene comes from, in its own words; may be empty.
+    """
+
+    methods: tuple[Method, ...]
+    reference: str = ""
+
+    @property
+    def works(self) -> tuple[Work, ...]:
+        """The works of all methods, each once."""
+        return tuple(works()[key] for key in dict.fromkeys(key for method in self.methods for key in method.keys))
+
+    def __str__(self) -> str:
+        """Return the methods, each with its works, as text."""
+        lines = []
+        for method in self.methods:
+            lines.append(method.name)
+            lines += [f"    {works()[key].text()}" for key in method.keys] or ["    not part of bemkit: ask its author"]
+        if self.reference:
+            lines += ["the scene", f"    {' '.join(self.reference.split())}"]
+        return "\n".join(lines)
+
+    def bibtex(self) -> str:
+        """Return the works as entries of a BibTeX file."""
+        return "\n\n".join(work.bibtex() for work in self.works)
+
+
+def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
+    """Name the works to cite for a scene, or for what a run of it used.
+
+    Parameters
+    ----------
+    subject : Scene, Assembly, Solution or AssemblySolution
+        A solution tells more than its scene: the linear solver that was chosen, and whether the driver had to follow
+        paths of solutions or to hold bodies by springs.
+
+    Returns
+    -------
+    Citations
+        ``print`` shows the methods with their works; `Citations.bibtex` has them for a BibTeX file.
+    """
+    stated = subject if isinstance(subject, Scene | Assembly) else subject.stated
+    methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated)]
+    if not isinstance(subject, Scene | Assembly):
+        methods += _of_run(subject)
+    elif isinstance(subject.linear_solver, Krylov):
+        methods.append(_CONJUGATE_GRADIENTS)
+    return Citations(tuple(dict.fromkeys(methods)), stated.reference)
+
+
+_CONJUGATE_GRADIENTS = Method(
+    "block conjugate gradients with the hypersingular operator", ("OLeary1980", "Dubrulle2001", "SteinbachWendland1998")
+)
+
+
+def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
+    bodies: tuple[Scene | Body, ...] = stated.bodies if isinstance(stated, Assembly) else (stated,)
+    is_adaptive = stated.mesh.accuracy is not None
+    for discretisation in (body.discretisation or stated.discretisation for body in bodies):
+        yield from _of_discretisation(discretisation, is_adaptive=is_adaptive)
+    sides = [side for body in bodies for side in body.shape.outline().sides]
+    if any(not isinstance(side.curve, Segment) for side in sides):
+        yield Method("integrals near curved elements", ("AfKlintebergBarnett2021",))
+    if any(body.body_forces for body in bodies):
+        yield Method("body forces in closed form", ("TimoshenkoGoodier1970",))
+
+
+def _of_discretisation(discretisation: Discretisation, *, is_adaptive: bool) -> Iterator[Method]:
+    if isinstance(discretisation, ConstantCollocation):
+        yield Method("collocation with constant elements", ("Paper", "Somigliana1885", "Betti1872"))
+    elif discretisation.is_symmetric:
+        yield Method("symmetric Galerkin boundary elements", ("Paper", "Steinbach2008", "SauterSchwab2011", "Han1994"))
+    else:
+        yield Method(f"{discretisation.method} of {type(discretisation).__module__}", ())
+    if is_adaptive and discretisation.takes_layers:
+        yield Method("geometric layers and rising degrees", ("BabuskaGuo1986", "BanzStephan2015"))
+        yield Method("error estimates from Legendre coefficients", ("Mavriplis1994",))
+
+
+def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
+    if isinstance(stated, Assembly) and (stated.contacts or stated.touching is not None):
+        yield Method(
+            "mortar coupling with dual multipliers",
+            ("Wohlmuth2000", "PusoLaursen2004", "PoppEtAl2010", "CichoszBischoff2011"),
+        )
+    if isinstance(stated, Scene) and not stated.contact_parts:
+        return
+    yield Method("contact and friction as projection equations", ("Paper", "AlartCurnier1991", "QiSun1993"))
+    word = SOLVERS.word_of(stated.solver)
+    yield Method(f"driver {word}", DRIVERS.get(word, ()))
+
+
+def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
+    if isinstance(solution.plan.linear_solver, Krylov):
+        yield _CONJUGATE_GRADIENTS
+    if any(item.is_needed and "multigrid" in item.name for item in solution.plan.items):
+        yield Method("algebraic multigrid", ("RugeStueben1987",))
+    messages = [record.message for record in solution.history]
+    if any(message.startswith(PATH_MESSAGE) for message in messages):
+        yield Method("path of solutions by complementary pivoting", ("Lemke1965",))
+    if any(message.startswith(SPRINGS_MESSAGE) for message in messages):
+        yield Method("springs that become weaker (proximal point method)", ("Rockafellar1976",))

@@ -1,0 +1,145 @@
+"""The works that are named are those of what a scene asks for, and of what its run used."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import bemkit as bk
+from bemkit.cli.main import commands
+from bemkit.results.bibliography import PACKAGE, Work, works
+from bemkit.results.citations import DRIVERS, Citations, Method, cite
+from bemkit.scene.registry import SOLVERS
+from bemkit.scene.toml import shipped_files, with_overrides
+from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
+from bemkit.version import __version__
+
+ROOT = Path(__file__).parents[2]
+PAPER_1 = bk.load_scene("paper-1")
+assert isinstance(PAPER_1, bk.Scene)
+NEEDED = {
+    "article": {"journal", "volume", "year"},
+    "book": {"publisher", "year"},
+    "incollection": {"booktitle", "year"},
+}
+
+
+def keys(citations: Citations) -> set[str]:
+    return {work.key for work in citations.works}
+
+
+@pytest.mark.parametrize("name", shipped_files())
+def test_every_shipped_scene_cites_works_of_the_bibliography(name: str) -> None:
+    citations = cite(bk.load_scene(name))
+    assert citations.methods[0].keys == (PACKAGE,)
+    assert len(citations.works) > 3
+    assert all(method.keys for method in citations.methods)
+
+
+@pytest.mark.parametrize(
+    ("options", "key"),
+    [
+        ({"discretisation": "constant"}, "Betti1872"),
+        ({"discretisation": "linear"}, "Steinbach2008"),
+        ({"solver": "augmented-lagrangian"}, "Stadler2004"),
+        ({"solver": "semismooth-newton"}, "HintermuellerItoKunisch2002"),
+        ({"solver": "fixed-point"}, "NecasJarusekHaslinger1980"),
+        ({"solver": "lemke"}, "CottlePangStone1992"),
+        ({"degree": "hp", "accuracy": 1e-4}, "BabuskaGuo1986"),
+    ],
+)
+def test_options_cite_works_that_other_options_do_not(options: dict[str, str], key: str) -> None:
+    assert key in keys(cite(with_overrides(PAPER_1, **options)))  # type: ignore[arg-type]
+    others = {"discretisation": "linear", "solver": "semismooth-newton"}
+    if options.items() <= others.items():
+        others = {"discretisation": "constant", "solver": "lemke"}
+    assert key not in keys(cite(with_overrides(PAPER_1, **others)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("two-cylinders", "Wohlmuth2000"),
+        ("gravity-column", "TimoshenkoGoodier1970"),
+        ("disc-between-plates", "AfKlintebergBarnett2021"),
+    ],
+)
+def test_what_scenes_hold_cites_works(name: str, key: str) -> None:
+    assert key in keys(cite(bk.load_scene(name)))
+    assert key not in keys(cite(PAPER_1))
+
+
+def test_a_scene_without_contact_cites_nothing_of_contact() -> None:
+    assert not keys(cite(bk.load_scene("bending"))) & {"AlartCurnier1991", *DRIVERS["semismooth-newton"]}
+
+
+def test_a_run_cites_the_linear_solver_that_it_used() -> None:
+    scene = replace(with_overrides(PAPER_1, elements=40, discretisation="linear"), linear_solver=bk.Krylov())
+    assert "OLeary1980" in keys(cite(scene))
+    assert "OLeary1980" in keys(cite(bk.run(scene)))
+    assert "OLeary1980" not in keys(cite(bk.run(replace(scene, linear_solver=bk.DenseCholesky()))))
+
+
+def test_a_run_cites_the_path_of_solutions_if_it_was_followed() -> None:
+    scene = with_overrides(PAPER_1, elements=40)
+    assert "Lemke1965" not in keys(cite(bk.run(scene)))
+    solution = bk.run(replace(scene, solver=bk.SemismoothNewton(full_steps=1, damped_steps=0)))
+    assert any(record.message.startswith(PATH_MESSAGE) for record in solution.history)
+    assert "Lemke1965" in keys(cite(solution))
+    record = replace(solution.history[-1], message=f"{SPRINGS_MESSAGE} 1e-2")
+    assert "Rockafellar1976" in keys(cite(replace(solution, history=(record,))))
+    assert "Rockafellar1976" not in keys(cite(solution))
+
+
+def test_every_driver_has_its_works() -> None:
+    assert list(DRIVERS) == list(SOLVERS.built_in)
+
+
+def test_a_method_from_elsewhere_is_named_without_works() -> None:
+    assert str(Citations((Method("driver of mine", ()),))) == "driver of mine\n    not part of bemkit: ask its author"
+
+
+@pytest.mark.parametrize("work", works().values(), ids=lambda work: work.key)
+def test_entries_are_complete_and_balanced(work: Work) -> None:
+    entry = work.bibtex()
+    names = set(re.findall(r"^  (\w+) = \{.+\},$", entry, re.MULTILINE))
+    assert names >= NEEDED.get(work.type, set()) | {"title"}
+    assert entry.count("{") == entry.count("}")
+    assert work.title in work.text()
+    assert work.author or work.key == "Paper"
+
+
+def test_texts_say_authors_source_and_year() -> None:
+    text = works()["RugeStueben1987"].text("*")
+    assert (
+        text == "J. W. Ruge, K. Stüben: Algebraic multigrid. In S. F. McCormick (ed.): *Multigrid Methods*, SIAM, 1987."
+    )
+    text = works()["OLeary1980"].text()
+    assert text.endswith("Linear Algebra and its Applications 29 (1980) 293-322.")
+
+
+def test_the_package_is_cited_as_citation_cff_says() -> None:
+    stated = dict(re.findall(r"^([\w-]+): \"?(.*?)\"?$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE))
+    work = works()[PACKAGE]
+    assert work.title == stated["title"]
+    assert str(work.year) == stated["date-released"][:4]
+    assert stated["version"] == __version__
+    assert work.note == f"Version {__version__}"
+
+
+def test_the_command_takes_scenes_and_results(tmp_path: Path) -> None:
+    def printed(*arguments: str) -> str:
+        ran = CliRunner().invoke(commands, ["cite", *arguments])
+        assert ran.exit_code == 0
+        return ran.output
+
+    path = tmp_path / "result.h5"
+    solution = bk.run(with_overrides(PAPER_1, elements=40))
+    bk.write_result(path, solution)
+    assert printed("paper-1") == f"{cite(PAPER_1)}\n"
+    assert printed(str(path)) == f"{cite(solution)}\n"
+    assert printed("paper-1", "--bibtex") == cite(PAPER_1).bibtex() + "\n"
