@@ -1,17 +1,13 @@
 """Write the pages of the API reference, which autodoc fills from docstrings; `conf.py` does so before each build.
 
-A page for each name of ``bemkit``, listed by the folder that it lives in, and one for each module of the folders that
-researchers extend.
+The names of ``bemkit`` by the folder that they live in, and all modules of the folders that researchers extend.
 """
 
 from __future__ import annotations
 
-import ast
-import importlib
 import re
 import shutil
-from collections.abc import Iterator
-from itertools import groupby
+from collections.abc import Iterable
 from pathlib import Path
 
 import bemkit
@@ -25,15 +21,18 @@ EXTENDED = ("geometry", "operators", "contact", "solvers", "scene", "results", "
 def main() -> None:
     """Write all pages anew."""
     shutil.rmtree(FOLDER, ignore_errors=True)
-    home = {name: home_of(name) for name in bemkit.__all__}
-    write("bemkit", names_page(home))
-    for name in home:
-        write(f"names/{name}", name_page(name))
+    by_folder: dict[str, list[str]] = {}
+    for name in bemkit.__all__:
+        by_folder.setdefault(home_of(name).split(".")[1], []).append(name)
+    folders = [folder for folder in purposes() if folder in by_folder]
+    write("bemkit", index_page(folders, by_folder))
+    for folder in folders:
+        write(f"names/{folder}", names_page(folder, by_folder[folder]))
     for folder in EXTENDED:
-        modules = [module for module in modules_of(folder) if documented(module)]
-        write(folder, folder_page(folder, modules))
-        for module in modules:
-            write(f"modules/{module}", module_page(module, [name for name, place in home.items() if place == module]))
+        inner = {".".join(module.split(".")[:-1]) for module in modules_of(folder)}
+        for package in sorted(inner):
+            modules = [module for module in modules_of(folder) if module.rpartition(".")[0] == package]
+            write(package, modules_page(package, modules))
 
 
 def write(name: str, text: str) -> None:
@@ -67,59 +66,47 @@ def modules_of(folder: str) -> list[str]:
     ]
 
 
-def documented(module: str) -> list[str]:
-    """Return the names that a module defines for others: classes, functions and constants with a docstring."""
-    tree = ast.parse(Path(importlib.import_module(module).__file__ or "").read_text("utf-8"))
-    return [name for name in _defined(tree) if not name.startswith("_")]
+def heading(text: str, mark: str = "=") -> str:
+    return f"{text}\n{mark * len(text)}\n\n"
 
 
-def _defined(tree: ast.Module) -> Iterator[str]:
-    for node, following in zip(tree.body, [*tree.body[1:], None], strict=True):
-        if isinstance(node, ast.ClassDef | ast.FunctionDef):
-            yield node.name
-        is_described = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
-        if is_described and isinstance(node, ast.Assign | ast.AnnAssign):
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            yield from (target.id for target in targets if isinstance(target, ast.Name))
+def toctree(pages: Iterable[str]) -> str:
+    return ".. toctree::\n   :hidden:\n\n" + "".join(f"   {page}\n" for page in pages) + "\n"
 
 
-def heading(text: str) -> str:
-    return f"{text}\n{'=' * len(text)}\n"
-
-
-def names_page(home: dict[str, str]) -> str:
+def index_page(folders: list[str], by_folder: dict[str, list[str]]) -> str:
     """List the names of the package, by folder."""
-    order = list(purposes())
-    folders = sorted(home, key=lambda name: (order.index(home[name].split(".")[1]), name))
-    text = heading("bemkit") + "\nEverything below is a name of ``bemkit``, such as ``bemkit.Scene``.\n"
-    text += "\n.. toctree::\n   :hidden:\n   :glob:\n\n   names/*\n"
-    for folder, names in groupby(folders, lambda name: home[name].split(".")[1]):
-        text += f"\n.. rubric:: {folder}: {purposes()[folder]}\n\n.. currentmodule:: bemkit\n\n"
-        text += ".. autosummary::\n   :nosignatures:\n\n" + "".join(f"   {name}\n" for name in names)
+    text = heading("Names of bemkit") + "Each is a name of ``bemkit``, such as ``bemkit.Scene``.\n\n"
+    text += toctree(f"names/{folder}" for folder in folders)
+    for folder in folders:
+        text += f".. rubric:: {purposes()[folder].capitalize()}\n\n.. currentmodule:: bemkit\n\n"
+        text += ".. autosummary::\n   :nosignatures:\n\n" + "".join(f"   {name}\n" for name in by_folder[folder]) + "\n"
     return text
 
 
-def name_page(name: str) -> str:
-    """Show one public name with its members, those that it inherits among them."""
-    if not isinstance(getattr(bemkit, name), type):
-        return f"{heading(name)}\n.. autofunction:: bemkit.{name}\n"
-    inherits = "" if issubclass(getattr(bemkit, name), Exception) else "   :inherited-members:\n"
-    return f"{heading(name)}\n.. autoclass:: bemkit.{name}\n   :members:\n{inherits}"
+def names_page(folder: str, names: list[str]) -> str:
+    """Show public names that live in a folder, with their members."""
+    text = heading(f"bemkit: {folder}") + f"{purposes()[folder].capitalize()}.\n\n"
+    for name in names:
+        text += heading(name, "-")
+        if not isinstance(getattr(bemkit, name), type):
+            text += f".. autofunction:: bemkit.{name}\n\n"
+        else:
+            inherits = "" if issubclass(getattr(bemkit, name), Exception) else "   :inherited-members:\n"
+            text += f".. autoclass:: bemkit.{name}\n   :members:\n{inherits}\n"
+    return text
 
 
-def folder_page(folder: str, modules: list[str]) -> str:
-    """List the modules of a folder with their first sentences."""
-    text = f"{heading(f'bemkit.{folder}')}\n{purposes()[folder].capitalize()}.\n"
-    text += "\n.. toctree::\n   :hidden:\n\n" + "".join(f"   modules/{module}\n" for module in modules)
-    return text + "\n.. autosummary::\n\n" + "".join(f"   {module}\n" for module in modules)
-
-
-def module_page(module: str, public: list[str]) -> str:
-    """Show the members of a module; those that are names of the package have a page of their own."""
-    text = f"{heading(module)}\n.. automodule:: {module}\n   :members:\n   :member-order: bysource\n"
-    if public:
-        text += f"   :exclude-members: {', '.join(public)}\n\n.. rubric:: Names of ``bemkit``\n\n"
-        text += ", ".join(f":py:obj:`bemkit.{name}`" for name in public) + "\n"
+def modules_page(package: str, modules: list[str]) -> str:
+    """Show the modules of a folder; members that are names of the package stand on other pages."""
+    text = heading(package)
+    for module in modules:
+        text += heading(module, "-") + f".. automodule:: {module}\n   :members:\n   :member-order: bysource\n"
+        public = [name for name in bemkit.__all__ if home_of(name) == module]
+        if public:
+            text += f"   :exclude-members: {', '.join(public)}\n\n"
+            text += f"Names of ``bemkit``: {', '.join(f':py:obj:`bemkit.{name}`' for name in public)}.\n"
+        text += "\n"
     return text
 
 

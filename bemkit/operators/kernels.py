@@ -213,14 +213,14 @@ def log_integrals(integrals: ComplexArray, log_product: FloatArray) -> FloatArra
 
     Parameters
     ----------
-    integrals : (highest + 2, *shape of points) complex array
+    integrals : (highest + 2, ...) complex array
         C_0 ... C_{highest + 1}.
     log_product : array
         log|zeta**2 - 1|.
 
     Returns
     -------
-    (highest + 1, *shape of points) array
+    (highest + 1, ...) array
     """
     result = np.empty((len(integrals) - 1, *log_product.shape))
     for k, values in enumerate(result):
@@ -265,6 +265,6 @@ def legendre_of_monomials(highest: int) -> FloatArray:
 
 
 def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:
-    """Return P_0 ... P_highest at points of [-1, 1], of shape (highest + 1, *shape of t)."""
+    """Return P_0 ... P_highest at points of [-1, 1], of shape (highest + 1, ...) before that of t."""
     values = np.polynomial.legendre.legvander(np.asarray(t, float), highest)
     return np.moveaxis(values, -1, 0).reshape(highest + 1, *np.shape(t))

@@ -1,10 +1,12 @@
 """Assemblies in result files: the layout of `bemkit.results.result_file`, with a group for each body.
 
-/assembly        text, the assembly as TOML, instead of /scene
-/bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
-/contact         with columns direction_x, direction_y and, with friction, friction_bound
-/contacts        table: what each contact transmits
-/rigid           table: how each rigid body moved, and what acts on it; left out without rigid bodies
+The groups that differ from those of a scene:
+
+    /assembly        text, the assembly as TOML, instead of /scene
+    /bodies/N        mesh and boundary of body N, as /mesh and /boundary of a scene; attributes name, energy
+    /contact         with columns direction_x, direction_y and, with friction, friction_bound
+    /contacts        table: what each contact transmits
+    /rigid           table: how each rigid body moved, and what acts on it; left out without rigid bodies
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def _cover(one: tuple[int, int] | None, two: tuple[int, int] | None) -> tuple[in
 
 @dataclass(frozen=True, eq=False)
 class Inner:
-    """Inner integrals over elements of half length 1 whose chord is the real axis, (n_polynomials, *shape of points).
+    """Inner integrals over elements of half length 1 whose chord is the real axis, (n_polynomials, ...).
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Inner:
         return cls(log, kernels.quotient_integrals(integrals[:n_log], eta), integrals[:n_double])
 
     def rows(self) -> FloatArray:
-        """Return all of them as (n_rows, *shape of points) real numbers; `from_rows` undoes it."""
+        """Return all of them as (n_rows, ...) real numbers; `from_rows` undoes it."""
         return np.concatenate([self.log, self.quotient.real, self.quotient.imag, self.cauchy.real, self.cauchy.imag])
 
     @classmethod

@@ -1,0 +1,76 @@
+"""Version, changelog, citation, recipe and metadata agree."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from bemkit.version import __version__
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+RECIPE = (ROOT / "conda" / "recipe.yaml").read_text("utf-8")
+CHANGELOG = (ROOT / "CHANGELOG.md").read_text("utf-8")
+
+
+def spaced(requirement: str) -> str:
+    """Return a requirement as conda writes it."""
+    return re.sub(r"^([\w-]+)", r"\1 ", requirement)
+
+
+def listed(section: str) -> list[str]:
+    """Return the entries of a list of the recipe."""
+    found = re.search(rf"^ +{section}:\n((?: +- .*\n)+)", RECIPE, re.MULTILINE)
+    assert found, section
+    return [line.strip().removeprefix("- ") for line in found[1].splitlines()]
+
+
+def test_the_changelog_begins_with_what_is_not_released_and_then_this_version() -> None:
+    unreleased, version = re.findall(r"^## \[(.*?)\]", CHANGELOG, re.MULTILINE)[:2]
+    assert (unreleased, version) == ("Unreleased", __version__)
+
+
+def test_versions_of_the_changelog_have_dates_and_fall() -> None:
+    released = re.findall(r"^## \[(\d+)\.(\d+)\.(\d+)\] - \d{4}-\d\d-\d\d$", CHANGELOG, re.MULTILINE)
+    numbers = [tuple(map(int, version)) for version in released]
+    assert numbers == sorted(numbers, reverse=True)
+    assert len(numbers) == CHANGELOG.count("\n## [") - 1
+
+
+def test_the_citation_names_this_version_and_its_date() -> None:
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert re.search(rf"^version: {re.escape(__version__)}$", citation, re.MULTILINE)
+    date = re.search(r"^date-released: (.*)$", citation, re.MULTILINE)
+    assert date
+    assert f"## [{__version__}] - {date[1]}\n" in CHANGELOG
+
+
+def test_the_recipe_requires_what_the_project_requires() -> None:
+    python, *libraries = listed("run")
+    assert python == f"python {PROJECT['requires-python']}"
+    assert libraries == [spaced(requirement) for requirement in PROJECT["dependencies"]]
+    requires = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["build-system"]["requires"]
+    oldest = PROJECT["requires-python"].removeprefix(">=")
+    assert listed("host") == [f"python {oldest}.*", "pip", *(spaced(requirement) for requirement in requires)]
+
+
+def test_the_recipe_has_the_version_program_and_licence_of_the_project() -> None:
+    ((program, target),) = PROJECT["scripts"].items()
+    assert listed("entry_points") == [f"{program} = {target}"]
+    assert f'version: "{__version__}"\n' in RECIPE
+    assert f"license: {PROJECT['license']}\n" in RECIPE
+    assert f"summary: {PROJECT['description']}\n" in RECIPE
+
+
+def test_the_classifiers_name_the_oldest_python() -> None:
+    versions = re.findall(r"Python :: (3\.\d+)$", "\n".join(PROJECT["classifiers"]), re.MULTILINE)
+    assert versions[0] == PROJECT["requires-python"].removeprefix(">=")
+    assert versions == sorted(versions, key=lambda version: int(version.split(".")[1]))
+
+
+@pytest.mark.parametrize("requirement", PROJECT["dependencies"])
+def test_every_dependency_has_a_lower_bound(requirement: str) -> None:
+    assert re.fullmatch(r"[\w-]+>=[\d.]+", requirement)
