@@ -12,6 +12,7 @@ import bemkit as bk
 from bemkit.contact.history_laws import SlipWeakening
 from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs import load_path
+from bemkit.runs.history_accuracy import worst_of
 from bemkit.solvers.base import Status
 from tests.runs.test_rigid_bodies import driven
 
@@ -201,6 +202,30 @@ def test_histories_with_an_accuracy(accuracy: float) -> None:
     fine = replace(LOOP, steps=steps, mesh=bk.MeshOptions(elements=400), discretisation=bk.QuadraticGalerkin())
     for one, other in zip(solution.loading.steps, solved(fine).steps, strict=True):
         assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=accuracy)  # the square of it, in theory
+
+
+def test_histories_of_bodies_with_an_accuracy() -> None:
+    """Two cylinders are pressed more and less: the meshes do for the step that needs most."""
+    cylinders = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=0.05))
+    solution = bk.run(replace(cylinders, load_factors=(0.3, 1.0, 0.0)))
+    assert solution.is_converged, solution.message
+    assert solution.loading is not None
+    assert solution.loading.is_complete
+    single = bk.run(cylinders)
+    pressed = solution.loading.steps[1]
+    assert pressed.elastic_energy == pytest.approx(single.energy, rel=5e-3)  # twice the square of the accuracy
+    check_balance(solution.loading, 1e-9)
+
+
+def test_the_worst_step_guides_the_mesh() -> None:
+    """Errors are the largest of all steps on every element, measured by the largest energy."""
+    steps = bk.run_history([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
+    guide, errors = worst_of(steps), np.array([step.element_errors for step in steps])
+    unit = max(step.error_unit for step in steps)
+    assert guide.estimated_error == pytest.approx(np.sqrt(errors.max(axis=0).sum() / unit), rel=1e-14)
+    relative = guide.element_errors / guide.error_unit
+    np.testing.assert_allclose(relative, errors.max(axis=0) / unit, rtol=1e-14)
+    assert guide.estimated_error >= max(np.sqrt(own.sum() / unit) for own in errors)
 
 
 def test_degrees_do_not_rise_in_histories() -> None:
