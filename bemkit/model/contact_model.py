@@ -121,15 +121,28 @@ class Model:
             return self.problem
         one, two = before.prepared, self.prepared
         displacement = blended(one.conditions.displacement, two.conditions.displacement, share)
+        force = blended(one.force, two.force, share)
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
-        body = self.body.under(displacement, blended(one.force, two.force, share), inside)
+        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity) and one.drive != two.drive:
+            drive, conditions = one.drive.blended(two.drive, share), replace(two.conditions, displacement=displacement)
+            prepared = replace(two, drive=drive, conditions=conditions, force=force)
+            body = contact_body(self.elastic.driven_by(drive), prepared)
+        else:
+            body = self.body.under(displacement, force, inside)
         return replace(self.problem, body=body, gap=blended(before.problem.gap, self.problem.gap, share))
 
     def acting(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
-        """Return the forces [N/m] of loads and supports on all nodes, and the displacements [m] on which they work."""
+        """Return the forces [N/m] of loads and supports on all nodes, and the displacements [m] on which they work.
+
+        On a half-plane also the forces that balance all others from far away, on its motion there.
+        """
         displacement, force = self.body.recover(state)
-        units, conditions = self.units, self.prepared.conditions
-        acting = supporting_forces(conditions, self.prepared.force, force)
+        acting = supporting_forces(self.prepared.conditions, self.prepared.force, force)
+        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+            motion = displacement - self.elastic.strain_displacement(force)
+            acting = np.concatenate([acting, -force.ravel()])
+            displacement = np.concatenate([displacement, motion])
+        units = self.units
         return acting * (units.stress * units.length), displacement.ravel() * units.displacement
 
     @property

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
@@ -14,10 +11,10 @@ from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.history import run_on_mesh, solved_history
+from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
-from bemkit.runs.steps import joined
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -62,7 +59,11 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
                 f"discretisation is {scene.discretisation.method}, and there are {scene.n_steps} load steps: degrees "
                 "rise for single loads alone: choose 'quadratic', or another fixed degree"
             )
-        return refined(Level(scene, first), _HistoryRefinement(DensityMeshes(accuracy), callback), scene.mesh)
+        single = _SceneRefinement(DensityMeshes(accuracy), callback)
+        whole = HistoryRefinement(
+            single, lambda level: solved_history([level.scene], level.partition.mesh, None, callback)
+        )
+        return refined(Level(scene, first), whole, scene.mesh)
     sequence = LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes
     return refined(Level(scene, first), _SceneRefinement(sequence(accuracy), callback), scene.mesh)
 
@@ -106,51 +107,6 @@ class _SceneRefinement:
 
     def expected_seconds(self, level: Level, solution: Solution, spent: float) -> float:
         return _expected_seconds(solution, spent, level.scene, level.partition.mesh)
-
-
-@dataclass(frozen=True)
-class _HistoryRefinement(_SceneRefinement):
-    """Meshes for all steps of a load history: they follow a solution that has the largest errors of all steps."""
-
-    guides: dict[int, Solution] = field(default_factory=dict)
-    """By the identity of the last step on a mesh, what the next mesh follows."""
-
-    def solved(self, level: Level, start: Solution | None) -> Solution:
-        """Solve all steps from the beginning; their memory belongs to one mesh."""
-        history, steps = solved_history([level.scene], level.partition.mesh, None, self.callback)
-        solution = joined(history, steps)
-        self.guides[id(solution)] = worst_of(steps)
-        return solution
-
-    def error(self, solution: Solution) -> float:
-        return self.meshes.error(self.guides[id(solution)])
-
-    def shown_error(self, solution: Solution) -> str:
-        return f"{self.error(solution):.1e} in one of the steps"
-
-    def is_enough(self, solutions: Sequence[Solution]) -> bool:
-        return self.meshes.is_enough([self.guides[id(solution)] for solution in solutions])
-
-    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
-        return _SceneRefinement.following(self, level, [self.guides[id(solution)] for solution in solutions])
-
-
-def worst_of(steps: Sequence[Solution]) -> Solution:
-    """Return the step with the largest estimated error, with the largest error of all steps on each element.
-
-    The step with the largest energy measures all errors, so that those of an unloaded body are not measured by nothing.
-    """
-    errors = [step.element_errors for step in steps]
-    known = [each for each in errors if each is not None]
-    if len(known) < len(steps):
-        return steps[-1]
-    unit = max(step.error_unit for step in steps)
-    worst = copy(steps[int(np.argmax([each.sum() for each in known]))])
-    largest = np.max(known, axis=0)
-    relative = float(np.sqrt(largest.sum() / unit)) if unit > 0.0 else 0.0
-    of_worst = worst.error_unit / unit if unit > 0.0 else 1.0
-    vars(worst).update(element_errors=largest * of_worst, estimated_error=relative)
-    return worst
 
 
 def _expected_seconds(solution: Solution, spent: float, scene: Scene, mesh: BoundaryMesh) -> float:

@@ -14,8 +14,9 @@ from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partitio
 from bemkit.geometry.vectors import norms
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import resolved_transitions
-from bemkit.runs.assembly import run_assembly
+from bemkit.runs.assembly import run_assembly, solved_assemblies
 from bemkit.runs.density import error_rate, is_enough, next_size, target_density
+from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.mesh_sequence import ZoneEnd, zone_cuts
 from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.scene.assembly import Assembly
@@ -48,6 +49,9 @@ def run_assembly_adaptive(
         If the assembly has no accuracy, or for the reasons of `bemkit.run`.
     """
     refinement = _AssemblyRefinement(required_accuracy(assembly.mesh), callback)
+    if assembly.n_steps > 1:
+        whole = HistoryRefinement(refinement, lambda level: solved_assemblies([level.assembly], level.meshes, callback))
+        return refined(_Level.first(assembly), whole, assembly.mesh)
     return refined(_Level.first(assembly), refinement, assembly.mesh)
 
 

@@ -166,7 +166,7 @@ class Assembly:
         If the title is empty, there is no body, two bodies share a name, a contact names what does not exist or is
         listed twice, a rigid body takes part in no contact, a load factor is missing or not finite, times do not
         increase, a law needs slip or time without steps, or an accuracy is asked of collocation or goes with elements
-        of a body or with a load history.
+        of a body.
     """
 
     title: str
@@ -210,11 +210,6 @@ class Assembly:
             _ = self.scene_of(body)  # parts and sides are checked
 
     def _check_accuracy(self, accuracy: float) -> None:
-        if self.n_steps > 1:
-            raise InputError(
-                f"mesh.accuracy is {accuracy} with a load history of {self.n_steps} steps, whose memory "
-                "belongs to one mesh: give elements"
-            )
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
             if discretisation.needs_accuracy:

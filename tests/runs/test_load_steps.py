@@ -10,8 +10,12 @@ import pytest
 
 import bemkit as bk
 from bemkit.contact.history_laws import SlipWeakening
+from bemkit.model.contact_model import build_model
+from bemkit.model.prepared import prepare_steps
 from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs import load_path
+from bemkit.runs.history_accuracy import worst_of
+from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import Status
 from tests.runs.test_rigid_bodies import driven
 
@@ -84,6 +88,49 @@ def test_bodies_and_a_punch_balance_too() -> None:
     loading = solved(assembly)
     check_balance(loading, 1e-10)
     assert loading.total().dissipation > 0.0
+
+
+HALF_PLANE = bk.Scene(
+    title="Cylinder on a half-plane",
+    shape=bk.HalfPlaneBody(-0.07, 0.07),
+    material=bk.Material(1.0, 0.3),
+    law=bk.Coulomb(0.3),
+    far=bk.FarField(x=0.0, force_y=1e-3, turn=0.0),
+    parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),
+    mesh=bk.MeshOptions(elements=60),
+)
+
+
+def test_a_half_plane_is_pressed_and_sheared_from_far_away() -> None:
+    """What drives it there does the work; the shear is too small to slide, and slips in an annulus."""
+    press = bk.Step(1.0, {"far.force_y": "1e-3*t"}, increments=3)
+    shear = bk.Step(3.0, {"far.x": "3e-4*sin(pi/2*(t - 1))"}, increments=4)
+    loading = solved(replace(HALF_PLANE, steps=(press, shear)))
+    check_balance(loading, 1e-11)
+    sheared = loading.steps[4]
+    assert 0.0 < abs(sheared.force_tangential) < 0.3 * sheared.force_normal
+    counts = sheared.as_dict()
+    assert counts["n_slip"] > 0
+    assert counts["n_stick"] > 0
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        replace(LOOP, steps=(), body_forces=(bk.Gravity(1e-2, (0.0, -1.0)),)),
+        replace(HALF_PLANE, far=bk.FarField(x=1e-4, force_y=1e-3, turn=1e-4)),
+    ],
+    ids=["block", "half-plane"],
+)
+def test_what_is_given_is_interpolated_between_two_steps(scene: bk.Scene) -> None:
+    """Loads, weight, prescribed displacements, motions far away: halfway they are those of the step halfway."""
+    prepared = prepare_steps(load_steps(replace(scene, load_factors=(1.0, 2.0, 3.0))), scene.build_mesh())
+    before = build_model(prepared[0])
+    halfway, after = (before.under(each) for each in prepared[1:])
+    expected = halfway.problem.sticking_state.traction
+    found = after.between(before, 0.5).sticking_state.traction
+    assert np.abs(expected).max() > 0.0
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_with_weight_the_external_work_follows_from_the_balance() -> None:
@@ -201,6 +248,30 @@ def test_histories_with_an_accuracy(accuracy: float) -> None:
     fine = replace(LOOP, steps=steps, mesh=bk.MeshOptions(elements=400), discretisation=bk.QuadraticGalerkin())
     for one, other in zip(solution.loading.steps, solved(fine).steps, strict=True):
         assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=accuracy)  # the square of it, in theory
+
+
+def test_histories_of_bodies_with_an_accuracy() -> None:
+    """Two cylinders are pressed more and less: the meshes do for the step that needs most."""
+    cylinders = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=0.05))
+    solution = bk.run(replace(cylinders, load_factors=(0.3, 1.0, 0.0)))
+    assert solution.is_converged, solution.message
+    assert solution.loading is not None
+    assert solution.loading.is_complete
+    single = bk.run(cylinders)
+    pressed = solution.loading.steps[1]
+    assert pressed.elastic_energy == pytest.approx(single.energy, rel=5e-3)  # twice the square of the accuracy
+    check_balance(solution.loading, 1e-9)
+
+
+def test_the_worst_step_guides_the_mesh() -> None:
+    """Errors are the largest of all steps on every element, measured by the largest energy."""
+    steps = bk.run_history([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
+    guide, errors = worst_of(steps), np.array([step.element_errors for step in steps])
+    unit = max(step.error_unit for step in steps)
+    assert guide.estimated_error == pytest.approx(np.sqrt(errors.max(axis=0).sum() / unit), rel=1e-14)
+    relative = guide.element_errors / guide.error_unit
+    np.testing.assert_allclose(relative, errors.max(axis=0) / unit, rtol=1e-14)
+    assert guide.estimated_error >= max(np.sqrt(own.sum() / unit) for own in errors)
 
 
 def test_degrees_do_not_rise_in_histories() -> None:

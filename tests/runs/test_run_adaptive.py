@@ -219,11 +219,9 @@ def test_mesh_options_that_contradict_each_other(options: dict[str, object], mes
         bk.MeshOptions(**options)  # type: ignore[arg-type]
 
 
-def test_an_accuracy_needs_an_estimate_and_a_single_load() -> None:
+def test_an_accuracy_needs_an_estimate() -> None:
     with pytest.raises(ValueError, match="collocation has no error estimate"):
         paper(1, bk.ConstantCollocation(), bk.MeshOptions(accuracy=1e-3))
-    with pytest.raises(ValueError, match="load history of 2 steps"):
-        dataclasses.replace(paper(1, mesh=bk.MeshOptions(accuracy=1e-3)), load_factors=(0.5, 1.0))
 
 
 def test_scene_files_hold_the_accuracy() -> None:

@@ -132,10 +132,6 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
     [
         ({"load_factors": ()}, r"load_factors is (): give finite numbers such as (0.5, 1.0)"),
         ({"load_factors": (1.0, float("nan"))}, "load_factors is (1.0, nan): give finite numbers"),
-        (
-            {"load_factors": (0.5, 1.0), "mesh": MeshOptions(accuracy=1e-3)},
-            "mesh.accuracy is 0.001 with a load history of 2 steps",
-        ),
         ({"title": ""}, "title is '': give one line of printable text"),
         ({"bodies": ()}, "bodies is empty: give at least one body"),
         ({"bodies": (LOWER, SMALL, LOWER)}, "'lower' is the name of two bodies: give each its own name"),

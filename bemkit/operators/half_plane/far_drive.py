@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, blended
 from bemkit.operators.rigid_modes import rigid_motions
 
 
@@ -30,6 +30,12 @@ class FarDrive:
     motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
     load: tuple[float, float, float] = (0.0, 0.0, 0.0)
     centre: tuple[float, float] = (0.0, 0.0)
+
+    def blended(self, other: FarDrive, share: float) -> FarDrive:
+        """Return the drive a share of the way to another one."""
+        pairs = ((self.motion, other.motion), (self.load, other.load))
+        motion, load = (blended(np.array(one), np.array(two), share).tolist() for one, two in pairs)
+        return replace(other, motion=tuple(motion), load=tuple(load))
 
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return the displacements (n, 2, 3) of points (n, 2) [m] by the three unit motions."""

@@ -199,3 +199,34 @@ def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(
     assert len(after) == n_rows
     # equal to the run times: finished rows are taken over, not computed again
     assert after[: len(finished)] == finished or any("nan" in repr(row) for row in finished)
+
+
+def test_a_load_history_that_is_killed_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    runs = [
+        sys.executable,
+        "-c",
+        "from bemkit.cli.main import main; main()",
+        "run",
+        "friction-loop",
+        "--elements",
+        "40",
+    ]
+    whole, killed = tmp_path / "whole.h5", tmp_path / "killed.h5"
+    subprocess.run([*runs, "-q", "-o", str(whole)], check=True)
+    process = subprocess.Popen([*runs, "-q", "-o", str(killed)])
+    while process.poll() is None and not killed.exists():
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    part = read_result(killed)
+    assert part.status is bk.Status.UNFINISHED
+    assert part.loading is not None
+    assert 0 < len(part.loading.steps) < part.loading.n_steps
+    subprocess.run([*runs, "-q", "-o", str(killed)], check=True)
+    with h5py.File(whole) as one, h5py.File(killed) as other:
+        names: list[str] = []
+        one.visit(names.append)
+        arrays = [name for name in names if isinstance(one[name], h5py.Dataset)]
+        assert len(arrays) > 60
+        for name in arrays:
+            assert one[name][()].tobytes() == other[name][()].tobytes(), name

@@ -76,6 +76,7 @@ def test_every_kind_is_drawn() -> None:
     assert not [name for name in wanted if not drawn[name]]
     assert any(len(scene.load_factors) > 1 for scene in scenes)
     assert any(len(case.scenes) > 1 for case in cases)
+    assert any(scene.steps for scene in scenes)
     assert any(scene.mesh.accuracy is not None for scene in scenes)
     assert any(scene.material.poisson_ratio == 0.5 for scene in scenes)
     assert any(len(scene.contact_parts) > 1 for scene in scenes)
@@ -102,6 +103,21 @@ def test_a_wrong_success_is_called_wrong() -> None:
     outcome, reason, message = judge([dataclasses.replace(solution, energy=-solution.energy)])
     assert (outcome, reason) == (Outcome.WRONG, "energy")
     assert "negative_energy" in message
+
+
+def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
+    loop = bk.load_scene("friction-loop")
+    steps = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    assert judge(steps)[0] in (Outcome.SUCCESS, Outcome.WARNED)
+    for changes, message in (({"dissipation": -1e-9}, "friction gave back"), ({"external_work": 1.0}, "is missing")):
+        loading = steps[-1].loading
+        assert loading is not None
+        last = loading.steps[-1]
+        work = dataclasses.replace(last.work, **changes)
+        wrong = dataclasses.replace(loading, steps=(*loading.steps[:-1], dataclasses.replace(last, work=work)))
+        outcome, reason, text = judge([*steps[:-1], dataclasses.replace(steps[-1], loading=wrong)])
+        assert (outcome, reason) == (Outcome.WRONG, "energy of the load history")
+        assert message in text
 
 
 def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_coarse() -> None:
