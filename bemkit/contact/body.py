@@ -171,6 +171,10 @@ class LinearBody(Protocol):
         """Name what a combination (n_motions,) of the rigid motions moves, in words that go before "moves"."""
         return "the body"
 
+    def partners_of(self, coefficients: FloatArray) -> str:
+        """Name what that may touch, in words that go after "along"."""
+        return "the obstacle"
+
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body, those inside it included, are from equilibrium.
 

@@ -45,14 +45,15 @@ class UnsolvableLoad:
         zero everywhere if the body slides, nan where a node can never touch.
     work : float [N]
         Work of the load on this motion, less what friction takes up; positive.
-    who : str
-        What it moves, in words.
+    who, where : str
+        What it moves, and what that touches, in words.
     """
 
     motion: FloatArray
     lift: FloatArray
     work: float
     who: str = "the body"
+    where: str = "the obstacle"
 
     @property
     def is_sliding(self) -> bool:
@@ -68,9 +69,9 @@ class UnsolvableLoad:
             how = f"moves {self.who} where no obstacle can meet it"
         elif not self.is_sliding:
             how = "pushes" if np.ptp(self.motion[~np.isnan(self.lift), 0]) < 1e-6 else "tips"
-            how += f" {self.who} away from the obstacle"
+            how += f" {self.who} away from {self.where}"
         else:
-            how = f"slides {self.who} along the obstacle against all the friction there is"
+            how = f"slides {self.who} along {self.where} against all the friction there is"
         return f"the load {how} (work {self.work:.3g} on that rigid motion)"
 
 
@@ -107,7 +108,9 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
             motion, work = motion / size, work / size
             lift = np.where(touches, -motion[:, 0] - slope * np.abs(motion[:, 1]), np.nan)
             if best is None or work > best.work:
-                best = UnsolvableLoad(motion, lift, work, problem.body.moving_bodies(coefficients / unit))
+                moved = coefficients / unit
+                who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
+                best = UnsolvableLoad(motion, lift, work, who, where)
     return best
 
 

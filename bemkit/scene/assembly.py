@@ -310,8 +310,8 @@ class Assembly:
     def scene_of(self, body: Body) -> Scene:
         """Return what is said of one placed body, in its own coordinates: sides in contact are free parts.
 
-        Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in
-        common, and so have bodies of the same objects.
+        Loads, given displacements and obstacles are those of the body in its place. Copies have one scene in common,
+        and so have bodies that are made of the same objects.
         """
         stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
         key = (*(id(each) for each in stated), body.material, self.contact_parts(body))

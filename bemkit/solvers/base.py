@@ -13,8 +13,8 @@ from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
 from bemkit.errors import InputError, NoResultError
-from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
-from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response
+from bemkit.solvers.active_sets import ActiveSets, NodeStatus, ProjectionEquations, contact_sets
+from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response, with_least_slip
 
 
 class Status(Enum):
@@ -291,7 +291,15 @@ class _Run:
             if may_travel and (travel := find_long_travel(self.problem)) is not None:
                 status, words = Status.TOO_FAR, f"the travel is {travel:.1e} times the deformation"
                 iterate = replace(iterate, message=f"{words}; {iterate.message}".rstrip("; "))
+            if status is Status.CONVERGED and sets.is_closed.any():
+                iterate = self._with_least_slip(iterate, sets)
         return self._solution(iterate, status, sets, history)
+
+    def _with_least_slip(self, iterate: Iterate, sets: ActiveSets) -> Iterate:
+        """Choose among the positions that contact leaves open, unless another contact forbids it."""
+        rho = self.problem.body.stiffness_scale
+        state = with_least_slip(ProjectionEquations(self.problem, rho, rho), iterate.state, sets)
+        return replace(iterate, state=state) if certify(self.problem, state).is_below(self.tolerance) else iterate
 
     def _untouched(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""

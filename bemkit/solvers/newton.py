@@ -8,7 +8,7 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.certificate import certificate_scales
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
-from bemkit.contact.rigid_motions import RigidMotions, as_dense
+from bemkit.contact.rigid_motions import RigidMotions, as_dense, as_rows
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 
@@ -24,6 +24,9 @@ soon carries the body to where other sets hold it; by the second at most."""
 _NEGLIGIBLE = 100.0
 """Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
 a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
+
+_UNFELT = 1e-12
+"""Squared size of slips, relative to the largest, below which a motion makes no slip."""
 
 _MOST_PINNED = 60
 """Of more free motions than that the forces are not sorted out: springs hold them."""
@@ -173,6 +176,33 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
         traction[node, row] = rest / own[node, row]
     state = ContactState(response.displacement, traction)
     return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
+
+
+def with_least_slip(equations: ProjectionEquations, state: ContactState, sets: ActiveSets) -> ContactState:
+    """Return a state moved along the rigid motions that its sets leave free, so that contact nodes slip least.
+
+    Nothing says how far a disc turns in a hole without friction; responses leave it where round-off has put it.
+
+    Parameters
+    ----------
+    equations : ProjectionEquations
+    state : ContactState
+        That obeys them.
+    sets : ActiveSets
+        Its own.
+    """
+    problem = equations.problem
+    conditions = equations.linearised(equations.evaluate(state), sets)
+    free = as_rows(conditions.free_motions(problem.body.rigid_motions()))
+    if not free.shape[0]:
+        return state
+    along, weights = free[:, 1::2], problem.body.weights
+    work = along @ (weights * (state.u_t - problem.slip_origin))
+    weighted = along * weights if isinstance(along, np.ndarray) else along.multiply(weights).tocsr()
+    squares = weighted @ along.T
+    dense = squares if isinstance(squares, np.ndarray) else squares.toarray()
+    amounts = -np.linalg.lstsq(dense, work, rcond=_UNFELT)[0]
+    return ContactState(state.displacement + (free.T @ amounts).reshape(-1, 2), state.traction)
 
 
 def _few(motions: RigidMotions, n_contact: int) -> FloatArray:

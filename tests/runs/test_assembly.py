@@ -175,6 +175,42 @@ def test_an_accuracy_out_of_reach_is_said() -> None:
     assert not solution.is_converged
 
 
+@pytest.mark.parametrize("play", [0.0, -1e-3])
+def test_what_nothing_feels_turns_where_it_slips_least(play: float) -> None:
+    """A pin without friction in the hole of a plate that is pulled: its turn does not depend on how it was drawn."""
+    turns = []
+    rim, hole = (bk.Part(name, bk.Free(), tuple(f"{side}-{k}" for k in range(1, 5))) for name, side in RIMS.items())
+    base, pull = bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("pull", bk.Traction(1e-3, 0.0), ("right",))
+    plate = bk.Body(
+        name="plate",
+        shape=bk.PlateWithHole(1.5, 1.0, 0.3),
+        material=bk.Material(1.0, 0.3),
+        parts=(hole, base, pull),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    pair = bk.ContactPair(("pin.rim", "plate.hole"), interference=-play)
+    for turn in (0.0, 13.0):
+        pin = bk.Body(
+            name="pin",
+            shape=bk.Disk(0.3 - play),
+            material=bk.Material(1.0, 0.3),
+            parts=(rim,),
+            placement=bk.Placement((0.75, 0.5), turn),
+            mesh=bk.MeshOptions(elements=40),
+        )
+        assembly = bk.Assembly(title="Pin", bodies=(plate, pin), contacts=(pair,), law=bk.Frictionless())
+        solution = bk.run(assembly)
+        assert solution.is_converged
+        boundary = solution.bodies["pin"].boundary
+        arm = boundary.points - boundary.points.mean(axis=0)
+        moved = boundary.displacement - boundary.displacement.mean(axis=0)
+        turns.append(float(np.sum(arm[:, 0] * moved[:, 1] - arm[:, 1] * moved[:, 0]) / np.sum(arm**2)))
+    assert turns[0] == pytest.approx(turns[1], rel=2e-3)  # of two meshes of 40 elements; 40 % apart as responses come
+
+
+RIMS = {"rim": "arc", "hole": "hole"}
+
+
 def arch(n: int, thickness: float) -> bk.Assembly:
     """A semicircle of mean radius 1 of n wedges under their weight, springings on a rigid floor."""
     angle, inner, outer = 180.0 / n, 1.0 - thickness / 2.0, 1.0 + thickness / 2.0

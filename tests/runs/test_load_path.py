@@ -12,7 +12,7 @@ from bemkit.model.assembled.model import build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.runs import load_path
 from bemkit.runs.history import UnsolvableSceneError
-from bemkit.scene.load_history import with_scaled_loads
+from bemkit.scene.load_history import load_steps, with_scaled_loads
 from bemkit.solvers.base import Status
 from tests.runs.masonry import FRICTION, wall
 
@@ -169,3 +169,11 @@ def test_what_is_given_is_interpolated_between_two_steps() -> None:
         assert np.abs(expected).max() > 0.0
         np.testing.assert_allclose(getattr(problem.body, name), expected, atol=1e-13 * np.abs(expected).max())
     np.testing.assert_allclose(problem.gap, halfway.problem.gap, rtol=1e-13)
+
+
+def test_blocks_of_the_same_objects_are_assembled_once_under_every_load() -> None:
+    """Twelve blocks under two loads: whole and half ones, one that is pushed; those on the floor are held alone."""
+    assembly = replace(wall(4, 3, push=True), load_factors=(0.0, 1.0))
+    for step in prepare_assembly_steps(load_steps(assembly)):
+        free = {id(body.own_mesh) for body in step.bodies if not body.body.is_held}
+        assert len(free) == 3

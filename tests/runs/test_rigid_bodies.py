@@ -246,9 +246,9 @@ def test_a_circle_sticks_below_the_friction_and_is_refused_above() -> None:
 @pytest.mark.parametrize(
     ("loads", "message"),
     [
-        ({"force_y": FORCE}, "pushes body 'punch' away from the obstacle"),
-        ({"moment": 0.6 * FORCE}, "tips body 'punch' away from the obstacle"),
-        ({"force_x": 0.1 * FORCE}, "slides body 'punch' along the obstacle"),
+        ({"force_y": FORCE}, "pushes body 'punch' away from body 'block'"),
+        ({"moment": 0.6 * FORCE}, "tips body 'punch' away from body 'block'"),
+        ({"force_x": 0.1 * FORCE}, "slides body 'punch' along body 'block'"),
     ],
 )
 def test_loads_that_contact_cannot_hold_name_the_rigid_body(loads: dict[str, float], message: str) -> None:

@@ -166,9 +166,24 @@ class CoupledMembers:
 
     def moving_bodies(self, coefficients: FloatArray) -> str:
         """Name the members that a combination (n_motions,) of the rigid motions moves."""
+        return self._named(self._is_moved(coefficients))
+
+    def partners_of(self, coefficients: FloatArray) -> str:
+        """Name the members at rest that these may touch; without any there are only obstacles."""
+        is_moved = self._is_moved(coefficients)
+        met = np.asarray(self.owners.T @ (self.owners @ is_moved.astype(float) > 0.0).astype(float)) > 0.0
+        return self._named(met & ~is_moved) if np.any(met & ~is_moved) else "the obstacle"
+
+    def _is_moved(self, coefficients: FloatArray) -> BoolArray:
+        """Return (n_members,) bool: the members that a combination (n_motions,) of the rigid motions moves."""
         size = np.abs(coefficients)
-        moved = np.unique(self.motion_owner[size > 1e-6 * size.max()])
-        names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in moved]
+        is_moved = np.zeros(len(self.members), bool)
+        is_moved[self.motion_owner[size > 1e-6 * size.max()]] = True
+        return is_moved
+
+    def _named(self, is_meant: BoolArray) -> str:
+        meant = np.flatnonzero(is_meant)
+        names = [f"{self.members[k].name!r}" if self.members[k].name else f"number {k + 1}" for k in meant]
         if len(names) == 1:
             return f"body {names[0]}"
         return f"bodies {', '.join(names[:4])}" + (f" and {len(names) - 4} more" if len(names) > 4 else "")

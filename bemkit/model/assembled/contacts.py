@@ -11,7 +11,7 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import nodes_on
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.mortar.coupling import couple
+from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
@@ -134,6 +134,7 @@ def body_rows(
     for rows in with_obstacles:
         taken[rows.body].update(dict.fromkeys(rows.nodes.tolist(), rows.part))
     found: dict[int, ContactRows] = {}
+    couplings = CongruentCouplings()
     for k in np.argsort(-np.round(np.array(lengths) / max(lengths, default=1.0), _DIGITS), kind="stable").tolist():
         (first, part, side), (second, _, other_side) = ordered[k]
         own_nodes, normals = nodes_on(side.space, side.elements)
@@ -141,7 +142,13 @@ def body_rows(
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:
-            coupling = couple(side, other_side, without=without, reach=_reach(pairs[k], bodies[first], bodies[second]))
+            reach = _reach(pairs[k], bodies[first], bodies[second])
+            coupling = couplings.couple(
+                PlacedSide(side, bodies[first].own_mesh, bodies[first].turn),
+                PlacedSide(other_side, bodies[second].own_mesh, bodies[second].turn),
+                without,
+                reach,
+            )
         except ValueError as error:
             raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
         size = min(bodies[number].mesh.diameter for number in (first, second))
