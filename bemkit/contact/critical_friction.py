@@ -8,6 +8,8 @@ from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions, of_statuses, separated, stick
 
+LARGEST_COEFFICIENT = 1e3
+"""No friction is larger; what round-off leaves of the coupling of alike bodies would give such numbers."""
 _NEARLY_REAL = 1e-9
 """Imaginary parts below this share of an eigenvalue are those of two real ones that round-off has joined."""
 
@@ -62,7 +64,7 @@ def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: 
     Returns
     -------
     float
-        Infinite if there is none.
+        Infinite if there is none up to `LARGEST_COEFFICIENT`.
 
     Notes
     -----
@@ -83,5 +85,4 @@ def critical_coefficient(normal: FloatArray, tangential: FloatArray, direction: 
     inverse = eigvals(direction[:, None] * normal, tangential)
     is_real = np.abs(inverse.imag) <= _NEARLY_REAL * np.abs(inverse)
     largest = float(inverse.real[is_real].max(initial=0.0))
-    # what round-off leaves of no coupling at all
-    return 1.0 / largest if largest > 1e-10 else np.inf
+    return 1.0 / largest if largest * LARGEST_COEFFICIENT > 1.0 else np.inf

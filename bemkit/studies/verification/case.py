@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from bemkit.errors import InputError
 from bemkit.reference import Reference, answer_of, errors_of
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
@@ -61,6 +62,11 @@ class Case:
     quantities : tuple of Quantity
     n_quick : int
         How many of the resolutions, the coarsest ones, a quick verification takes.
+
+    Raises
+    ------
+    InputError
+        If a quantity has not one bound for each resolution.
     """
 
     title: str
@@ -70,6 +76,14 @@ class Case:
     resolutions: tuple[float, ...]
     quantities: tuple[Quantity, ...]
     n_quick: int = 2
+
+    def __post_init__(self) -> None:
+        for quantity in self.quantities:
+            if len(quantity.bounds) != len(self.resolutions):
+                raise InputError(
+                    f"{quantity.name!r} has {len(quantity.bounds)} bounds for {len(self.resolutions)} resolutions: "
+                    "give one for each"
+                )
 
 
 def at_resolution(scene: Scene | Assembly) -> Callable[[float], Solution | AssemblySolution]:

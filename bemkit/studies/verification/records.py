@@ -46,6 +46,8 @@ class VerificationRecord:
         return self.case, self.quantity, self.resolution
 
 
+ROUND_OFF = 1e-12
+"""Errors below it fall no further."""
 FORMAT = FileFormat("bemkit-verification", 1, "bemkit verification file", "bemkit verify -o")
 FILE = RecordFile(FORMAT, VerificationRecord, ("version",))
 
@@ -82,11 +84,15 @@ class VerifiedRow:
 
     @property
     def order(self) -> float:
-        """The power of the number of elements by which the error fell; nan of one mesh and where no error is left."""
+        """The power of the number of elements by which the error fell; nan of one mesh and where round-off is left."""
         if not self.records:
             return math.nan
         first, last = self.records[0], self.records[-1]
-        if not (0.0 < last.error < math.inf and 0.0 < first.error < math.inf and first.n_elements < last.n_elements):
+        if not (
+            ROUND_OFF < last.error < math.inf
+            and ROUND_OFF < first.error < math.inf
+            and first.n_elements < last.n_elements
+        ):
             return math.nan
         return math.log(first.error / last.error) / math.log(last.n_elements / first.n_elements)
 

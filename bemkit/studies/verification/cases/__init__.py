@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from bemkit.studies.verification.case import Case
-from bemkit.studies.verification.cases import elastic, obstacles, pairs
+from bemkit.studies.verification.cases import elastic, half_plane, obstacles, pairs
 
 CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(
     {
@@ -29,5 +29,18 @@ CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(
         "cattaneo-mindlin": pairs.cattaneo_mindlin,
         "pin-in-hole": pairs.pin_of_the_same,
         "pin-in-stiffer-hole": pairs.pin_of_another,
+        "hertz-half-plane": half_plane.hertz,
+        "flat-punch": half_plane.flat_punch,
+        "tilted-punch": half_plane.tilted_punch,
+        "sliding-punch": half_plane.sliding_punch,
+        "bonded-punch": half_plane.bonded_punch,
+        "blunt-wedge": half_plane.blunt_wedge,
+        "rounded-punch": half_plane.rounded_punch,
+        "spence-punch": half_plane.spence_punch,
+        "static-cylinder": half_plane.static_cylinder,
+        "growing-cylinder": half_plane.growing_cylinder,
+        "sheared-cylinder": half_plane.sheared_cylinder,
+        "sheared-rounded-punch": half_plane.sheared_rounded_punch,
+        "periodic-wave": half_plane.periodic_wave,
     }
 )

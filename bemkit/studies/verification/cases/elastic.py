@@ -35,7 +35,7 @@ def lame_ring() -> Case:
         return _radial_error(solution, exact.displacement)
 
     return Case(
-        title="ring under pressures, radial displacement",
+        title="ring under pressures",
         source="TimoshenkoGoodier1970",
         validity="small strains",
         solve=at_resolution(_scene(Ring(1.0, 2.0), parts)),
@@ -56,7 +56,7 @@ def kirsch_hole() -> Case:
         return float(np.abs(missed).max() / np.abs(whole).max())
 
     return Case(
-        title="hole in an infinite sheet under tension, displacement of the rim",
+        title="hole in an infinite sheet under tension",
         source="Kirsch1898",
         validity="small strains; the sheet is infinite here, too",
         solve=at_resolution(_scene(ExteriorOf(Disk(0.7)), parts, symmetry=None)),
@@ -75,7 +75,7 @@ def brazilian_disc() -> Case:
         return lambda solution: float(interior_fields(solution).stress(np.array([[-1e-9, -1e-9]]))[0, axis, axis])
 
     return Case(
-        title="disc pressed on two opposite arcs, stresses in the middle",
+        title="disc pressed on two opposite arcs",
         source="Hondros1959",
         validity="any radius, any material",
         solve=at_resolution(_scene(Disk(1.0), (jaws,))),
@@ -97,7 +97,7 @@ def rotating_disc() -> Case:
 
     scene = replace(_scene(Disk(1.5), ()), material=sheet, body_forces=(Rotation(0.8, 1.0),))
     return Case(
-        title="rotating disc, radial displacement of the rim",
+        title="rotating disc",
         source="TimoshenkoGoodier1970",
         validity="plane stress, small strains",
         solve=at_resolution(scene),
