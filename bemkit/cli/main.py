@@ -93,7 +93,9 @@ class _Commands(click.Group):
         """Return the command of a name."""
         if cmd_name not in _ON_DEMAND:
             return super().get_command(ctx, cmd_name)
-        command: click.Command = getattr(import_module(f"bemkit.cli.{_ON_DEMAND[cmd_name]}"), cmd_name.replace("-", "_"))
+        command: click.Command = getattr(
+            import_module(f"bemkit.cli.{_ON_DEMAND[cmd_name]}"), cmd_name.replace("-", "_")
+        )
         return command
 
 
