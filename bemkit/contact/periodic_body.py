@@ -148,7 +148,8 @@ class PeriodicBody(LinearBody):
         largest = float(np.abs(traction).max())
         total = float(np.abs(self.weights * traction).sum())
         if largest == 0.0:
-            return Imbalance(float(np.abs(missing).max() > 0.0), float(np.abs(force).max(initial=0.0) > 0.0))
+            is_pushed = bool(np.abs(force).max(initial=0.0) > 0.0)
+            return Imbalance(float(is_pushed or np.abs(missing).max() > 0.0), float(is_pushed))
         # a uniform traction too much moves the surface as a driven motion does
         on_motions = float(np.abs(force).max(initial=0.0)) / total
         return Imbalance(max(float(np.abs(missing).max()) / largest, on_motions), on_motions, self.accuracy)
@@ -192,14 +193,14 @@ class _System:
         solution = np.zeros(right.size)
         for _ in range(_MOST_CORRECTIONS):
             largest = float(np.abs(reduced.tractions(solution[:n])).max())
-            if np.abs(rest[:n]).max() <= 0.5 * body.accuracy * largest:
+            if np.abs(rest).max() <= 0.5 * body.accuracy * largest:
                 break
             aim = max(0.1 * body.accuracy, 0.2 * body.accuracy * largest / float(np.abs(rest).max()))
             solution = solution + gmres(operator, rest, rtol=min(aim, 0.1), restart=_RESTART, maxiter=_MOST_RESTARTS)[0]
             rest = right - operator.matvec(solution)
         else:
             raise SingularResponse(f"{_MOST_CORRECTIONS} corrections have not led to a response")
-        return solution[:n], solution[n:]
+        return solution[:n], solution[n:] / self._sizes
 
     @property
     def _motions(self) -> ComplexArray:
@@ -213,7 +214,7 @@ class _System:
         """Return the left-hand sides of the equations."""
         body, reduced = self.body, self.reduced
         traction = reduced.changes(x[: reduced.n_unknowns])
-        displacement = body._caused(traction) + x[reduced.n_unknowns :] @ self._motions
+        displacement = body._caused(traction) + (x[reduced.n_unknowns :] / self._sizes) @ self._motions
         return np.concatenate([reduced.rows(displacement, traction), self._resultants(traction)])
 
     def _tractions_of(self, right: FloatArray) -> FloatArray:
@@ -230,6 +231,11 @@ class _System:
         works = [self._resultants(reduced.changes(each)) for each in taken]
         return np.array(taken).T, np.asarray(np.linalg.inv(np.array(works).T))
 
+    @cached_property
+    def _sizes(self) -> FloatArray:
+        """(n_driven,) array [Pa/m]: the largest traction that each unit motion takes, by which motions are measured."""
+        return np.asarray(np.abs(self._for_motions[0]).max(axis=0)) if len(self._motions) else np.zeros(0)
+
     def _nearly_solved(self, right: FloatArray) -> FloatArray:
         """Return about the solution for given right-hand sides."""
         n = self.reduced.n_unknowns
@@ -238,4 +244,4 @@ class _System:
             return unknowns
         taken, inverse = self._for_motions
         motion = inverse @ (self._resultants(self.reduced.changes(unknowns)) - right[n:])
-        return np.concatenate([unknowns - taken @ motion, motion])
+        return np.concatenate([unknowns - taken @ motion, self._sizes * motion])

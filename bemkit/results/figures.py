@@ -123,7 +123,7 @@ def draw_deformation(solution: Solution, *, units: UnitNames | None = None) -> F
     axes = figure.add_subplot()
     draw_body(axes, space, displacement, factor, is_labelled=True)
     _draw_symmetry_lines(axes, solution.mesh.symmetry)
-    axes.set_aspect("equal")
+    axes.set_aspect("equal" if solution.mesh.surface is None else "auto")  # a strip would be a line
     axes.margins(0.08)
     draw_obstacles(axes, [getattr(part.condition, "obstacle", None) for part in solution.scene.contact_parts])
     axes.set_xlabel(with_unit("$x$", "length", units))

@@ -134,7 +134,7 @@ class Solution(SolvedBody):
         from bemkit.results.error_indicators import contact_errors, place_errors
 
         if self.coefficient_errors is None:
-            degree = self.scene.discretisation.displacement_space(self.mesh).degree
+            degree = max(self.scene.discretisation.displacement_space(self.mesh).degree, 1)
             squared = float(contact_errors(self.contact, degree).sum())
         else:
             squared = float(self.coefficient_errors.traction[self.contact_elements].sum())

@@ -81,8 +81,11 @@ def is_enough(errors: Sequence[float], ends: Iterable[ZoneEnd], accuracy: float)
 
 
 def error_rate(degree: int) -> int:
-    """Return the power of element lengths in the squared energy error of displacements of a degree p: 2 p + 1."""
-    return 2 * degree + 1
+    """Return the power of element lengths in the squared energy error of displacements of a degree p: 2 p + 1.
+
+    On a half-plane displacements are means, of degree 0, and tractions constant, which leaves the error of degree 1.
+    """
+    return 2 * max(degree, 1) + 1
 
 
 def target_density(element_errors: FloatArray, rate: int) -> FloatArray:

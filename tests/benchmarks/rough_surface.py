@@ -1,8 +1,9 @@
 """Periodic rough surfaces with friction, from 2^12 to 2^17 elements: steps of Newton's method, seconds, real contact.
 
-Run ``python tests/benchmarks/rough_surface.py`` from the root of the repository; ``--most 14`` stops at 2^14. The
-elements of the finest mesh and those of all coarser ones that `bemkit.run` solves on the way are timed together;
-seconds of the processor do not count what other programs do at the same time.
+    python tests/benchmarks/rough_surface.py [--most 14]
+
+The solves of the finest mesh and of all coarser ones that `bemkit.run` solves on the way are timed together; seconds of
+the processor do not count what other programs do at the same time.
 """
 
 from __future__ import annotations
