@@ -1,4 +1,4 @@
-"""The command line: ``bemkit run | show | scenes | plan | study | stability | sweep | critical-friction | verify``.
+"""The command line: ``bemkit run | show | scenes | plan | outline | study | sweep | verify | ...``; see `commands`.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
 interrupted.
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
 _STUDIES = {
     "critical-friction": "critical_friction",
+    "outline": "outline",
     "stability": "study",
     "study": "study",
     "sweep": "sweep",

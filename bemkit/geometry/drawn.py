@@ -147,7 +147,7 @@ class SplineTo:
             raise GeometryError(f"spline: the point {format_point(points[place])} comes twice in a row: leave one out")
         lengths = np.append(0.0, np.cumsum(steps)) / steps.sum()
         spline = CubicSpline(lengths, points, bc_type="periodic" if is_closed else "not-a-knot")
-        return ParametricCurve(spline, spline.derivative())
+        return ParametricCurve(spline, spline.derivative(), is_analytic=False)
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ class Nurbs:
 
     def curve(self) -> ParametricCurve:
         """Return the curve by its arc length."""
-        return ParametricCurve(self.point, self.derivative)
+        return ParametricCurve(self.point, self.derivative, is_analytic=len(self.knots) == 2 * self.degree + 2)
 
 
 def clamped_knots(n_points: int, degree: int) -> FloatArray:

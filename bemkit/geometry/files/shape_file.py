@@ -132,7 +132,7 @@ class MeshFile(ShapeFile):
 
     def drawn(self, path: Path) -> Drawn:
         """Read the lines, arcs and smooth curves that bound the body."""
-        if path.suffix.lower() in _DRAWINGS:
+        if is_drawing(path):
             raise GeometryError("it is a drawing: write kind = 'drawing' (DrawingFile in Python)")
         if path.suffix.lower() in _GEOMETRIES:
             from bemkit.geometry.files.gmsh_files import read_geometry
@@ -196,9 +196,9 @@ class DrawingFile(ShapeFile):
         return Drawn(strokes, notes, unit, GAP)
 
 
-def shape_file(path: str | Path) -> MeshFile | DrawingFile:
-    """Return a mesh or a drawing, by the ending of its name."""
-    return (DrawingFile if Path(path).suffix.lower() in _DRAWINGS else MeshFile)(str(path))
+def is_drawing(path: str | Path) -> bool:
+    """Tell by the ending of its name whether a file is a drawing."""
+    return Path(path).suffix.lower() in _DRAWINGS
 
 
 def _plane_mesh(path: Path) -> PlaneMesh:
