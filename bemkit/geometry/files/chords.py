@@ -38,12 +38,15 @@ class ChordLoop:
         Points at which a curve of the file ends.
     is_inner : (n,) bool array
         Points inside an element of higher order, where there is no corner.
+    is_within : (n,) bool array
+        Points inside a curve of the file, where chords may turn by twice as much.
     """
 
     points: FloatArray
     names: tuple[str, ...]
     is_end: BoolArray
     is_inner: BoolArray
+    is_within: BoolArray
 
 
 def strokes_of(loop: ChordLoop, corner_angle: float) -> list[Stroke]:
@@ -61,7 +64,7 @@ def strokes_of(loop: ChordLoop, corner_angle: float) -> list[Stroke]:
     """
     n = len(loop.points)
     turns = np.abs(_turns(loop.points))
-    is_break = loop.is_end | _corners(turns, loop.is_inner, np.radians(corner_angle))
+    is_break = loop.is_end | _corners(turns, loop.is_inner, np.radians(corner_angle) * (1.0 + loop.is_within))
     is_break |= np.array([loop.names[k - 1] != name for k, name in enumerate(loop.names)])
     breaks = np.flatnonzero(is_break)
     if breaks.size == 0 and (closed := _closed(loop)) is not None:
@@ -83,9 +86,9 @@ def _turns(points: FloatArray) -> FloatArray:
     return angles_between(np.roll(chords, 1, axis=0), chords)
 
 
-def _corners(turns: FloatArray, is_inner: BoolArray, corner_angle: float) -> BoolArray:
+def _corners(turns: FloatArray, is_inner: BoolArray, corner_angles: FloatArray) -> BoolArray:
     beside = np.maximum(np.roll(turns, 1), np.roll(turns, -1))
-    is_corner: BoolArray = (turns > corner_angle) | ((turns > _ISOLATED * beside) & (turns > _STRAIGHT * 1e3))
+    is_corner: BoolArray = (turns > corner_angles) | ((turns > _ISOLATED * beside) & (turns > _STRAIGHT * 1e3))
     return is_corner & ~is_inner
 
 

@@ -69,12 +69,9 @@ def _blocks(gmsh: Any, dimension: int, position: Any) -> Iterator[CellBlock]:
         kinds, elements, nodes = gmsh.model.mesh.getElements(dimension, entity)
         for kind, own, own_nodes in zip(kinds, elements, nodes, strict=True):
             title, _, order, n_nodes, _, _ = gmsh.model.mesh.getElementProperties(kind)
-            n_corners = _CORNERS.get(title.split()[0])
-            if n_corners is None:
-                raise GeometryError(f"it has cells of type {title!r}: give lines, triangles and quadrilaterals")
             cells = position[np.asarray(own_nodes, dtype=np.intp)].reshape(-1, n_nodes)
             curves = np.full(len(own), entity if dimension == 1 else 0, np.intp)
-            yield CellBlock(n_corners, order, cells, (name,) * len(own), curves)
+            yield CellBlock(_CORNERS[title.split()[0]], order, cells, (name,) * len(own), curves)
 
 
 def read_geometry(path: Path, only: Sequence[str], corner_angle: float) -> tuple[list[Stroke], list[str]]:
@@ -131,7 +128,7 @@ def _strokes(points: Any, name: str, corner_angle: float) -> list[Stroke]:
     if np.abs(points[0] - points[-1]).max() > 1e-9 * size:
         return fitted_strokes(points, name)
     n = len(points) - 1
-    loop = ChordLoop(points[:-1], (name,) * n, np.zeros(n, bool), np.zeros(n, bool))
+    loop = ChordLoop(points[:-1], (name,) * n, np.zeros(n, bool), np.zeros(n, bool), np.ones(n, bool))
     return strokes_of(loop, corner_angle)
 
 
@@ -166,7 +163,8 @@ def _opened(path: Path) -> Iterator[Any]:
     gmsh.option.setNumber("General.Terminal", 0)
     try:
         try:
-            gmsh.open(str(path))
+            gmsh.model.add(f"bemkit {path.name}")
+            gmsh.merge(str(path))  # where opening would clear the models there are
         except Exception as error:  # gmsh's own class of all its errors
             raise GeometryError(f"gmsh cannot read it ({printable(str(error))}): write it anew") from error
         yield gmsh

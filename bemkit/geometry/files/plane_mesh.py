@@ -209,10 +209,12 @@ def _chord_loop(points: FloatArray, chain: Sequence[_Edge]) -> ChordLoop:
     names: list[str] = []
     is_end: list[bool] = []
     is_inner: list[bool] = []
+    is_within: list[bool] = []
     for k, edge in enumerate(chain):
         n_inner = len(edge.nodes) - 2
         nodes += edge.nodes[:-1]
         names += [edge.name] * (n_inner + 1)
         is_end += [edge.curve != chain[k - 1].curve, *[False] * n_inner]
         is_inner += [False, *[True] * n_inner]
-    return ChordLoop(points[np.array(nodes)], tuple(names), np.array(is_end), np.array(is_inner))
+        is_within += [edge.curve == chain[k - 1].curve != 0, *[True] * n_inner]
+    return ChordLoop(points[np.array(nodes)], tuple(names), np.array(is_end), np.array(is_inner), np.array(is_within))
