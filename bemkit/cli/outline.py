@@ -10,7 +10,6 @@ import click
 import numpy as np
 from rich.text import Text
 
-from bemkit.arrays import FloatArray
 from bemkit.geometry.curves import Arc
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.files.chords import CORNER_ANGLE
@@ -86,13 +85,13 @@ def _shape_file(
 def _print_sides(shape: Shape, sides: Outline) -> None:
     console = stdout_console()
     drawn = drawn_shape(shape)
-    table = plain_table(("loop", "side", "group", "kind"), ("length", "from", "to"), gap=2)
+    table = plain_table(("loop", "side", "group", "kind"), ("length", "from"), gap=2)
     for number, loop in enumerate(sides.loops):
         for side in loop:
-            start, end = side.curve.point(np.array([0.0, 1.0]))
+            start = side.curve.point(np.zeros(1))[0]
             length = norms(side.curve.derivative(_SEEN)).mean()
             place = "outer" if number == 0 and not sides.is_exterior else f"hole {number}"
-            texts = (place, side.name, side.group, _kind(side), f"{length:.6g}", _pair(start), _pair(end))
+            texts = (place, side.name, side.group, _kind(side), f"{length:.6g}", f"({start[0]:.6g}, {start[1]:.6g})")
             table.add_row(*map(Text, texts))
     console.print(table)
     points = np.concatenate([side.curve.point(_SEEN) for side in sides.sides])
@@ -105,10 +104,6 @@ def _print_sides(shape: Shape, sides: Outline) -> None:
 
 def _kind(side: Side) -> str:
     return "line" if side.curve.is_straight else "arc" if isinstance(side.curve, Arc) else "curve"
-
-
-def _pair(point: FloatArray) -> str:
-    return f"({point[0]:.6g}, {point[1]:.6g})"
 
 
 def _figure(sides: Outline, file: str, units: UnitNames | None) -> Figure:

@@ -56,7 +56,7 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
     from ezdxf.lldxf.const import DXFError
 
     try:
-        document, _ = recover.readfile(path)
+        document, audit = recover.readfile(path)
     except (DXFError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
         raise GeometryError(f"it cannot be read ({printable(str(error))}): save it as DXF anew") from error
     entities = list(_entities(document.modelspace(), 0))
@@ -83,8 +83,13 @@ def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, l
         else:
             strokes += drawn
     words = ", ".join(f"{count} {kind}" for kind, count in sorted(left_out.items()))
+    notes = [f"left out, because no lines: {words}"] if words else []
+    if repairs := [*audit.fixes, *audit.errors]:
+        notes.append(
+            f"damaged, and repaired or left out: {len(repairs)} entries, such as: {printable(repairs[0].message)}"
+        )
     unit = _UNITS.get(int(document.header.get("$INSUNITS", 0)), "")
-    return strokes, unit, [f"left out, because no lines: {words}"] if words else []
+    return strokes, unit, notes
 
 
 def _entities(container: Iterable[Any], depth: int) -> Iterator[Any]:

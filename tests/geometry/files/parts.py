@@ -23,7 +23,17 @@ needs_svgpathtools = pytest.mark.skipif(bool(why_no("svgpathtools")), reason="sv
 
 def dxf(*entities: str, unit: int = 0) -> str:
     """Return a DXF file of the entities, each ``KIND code value code value ...``."""
-    pairs = ["0 SECTION", "2 HEADER", "9 $INSUNITS", f"70 {unit}", "0 ENDSEC", "0 SECTION", "2 ENTITIES"]
+    pairs = [
+        "0 SECTION",
+        "2 HEADER",
+        "9 $ACADVER",
+        "1 AC1015",
+        "9 $INSUNITS",
+        f"70 {unit}",
+        "0 ENDSEC",
+        "0 SECTION",
+        "2 ENTITIES",
+    ]
     for entity in entities:
         kind, *fields = entity.split()
         pairs += [f"0 {kind}", *(f"{code} {value}" for code, value in zip(fields[::2], fields[1::2], strict=True))]
