@@ -36,6 +36,14 @@ if TYPE_CHECKING:
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
     from bemkit.formulas import Expression as Expression
+    from bemkit.geometry.drawn import ArcTo as ArcTo
+    from bemkit.geometry.drawn import LineTo as LineTo
+    from bemkit.geometry.drawn import Loop as Loop
+    from bemkit.geometry.drawn import NurbsTo as NurbsTo
+    from bemkit.geometry.drawn import OutlineShape as OutlineShape
+    from bemkit.geometry.drawn import SplineTo as SplineTo
+    from bemkit.geometry.files.shape_file import DrawingFile as DrawingFile
+    from bemkit.geometry.files.shape_file import MeshFile as MeshFile
     from bemkit.geometry.grading import Algebraic as Algebraic
     from bemkit.geometry.grading import Geometric as Geometric
     from bemkit.geometry.grading import Uniform as Uniform
@@ -147,6 +155,8 @@ _HOME = {
     "contact.spline": ("SplineObstacle",),
     "errors": ("BemkitError", "InputError", "NoResultError"),
     "formulas": ("Expression",),
+    "geometry.drawn": ("ArcTo", "LineTo", "Loop", "NurbsTo", "OutlineShape", "SplineTo"),
+    "geometry.files.shape_file": ("DrawingFile", "MeshFile"),
     "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
     "geometry.meshing.discretise": ("discretise",),

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from bemkit.contact.certificate import Certificate
+from bemkit.geometry.drawn import drawn_shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution
@@ -152,6 +153,8 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
     if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
     yield "elements", f"{mesh.n_elements} ({discretisation})"
+    if (drawn := drawn_shape(solution.scene.shape)) and drawn.notes:
+        yield "outline", "\n".join(drawn.notes)
     if mesh.symmetry is not None:
         values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
         yield "symmetry", f"about {mesh.symmetry}: {values}"
@@ -182,6 +185,9 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
 def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str]]:
     yield "status", _status(solution)
     yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
+    for elastic in solution.assembly.bodies:
+        if (drawn := drawn_shape(elastic.shape)) and drawn.notes:
+            yield f"outline of {elastic.name}", "\n".join(drawn.notes)
     yield "contact nodes", _node_counts(solution)
     units = {quantity: unit_of(quantity, solution.units) for quantity in ("length", "stress", "force")}
     for contact in solution.contacts[:_MANY_CONTACTS]:

@@ -33,6 +33,7 @@ NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 1
 _ON_DEMAND = {
     "cite": "cite",
     "critical-friction": "critical_friction",
+    "outline": "outline",
     "schema": "schema",
     "stability": "study",
     "study": "study",
@@ -119,6 +120,7 @@ def commands() -> None:
 @commands.command()
 @click.argument("scene")
 @click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
@@ -134,6 +136,7 @@ def commands() -> None:
 def run(
     scene: str,
     output: str | None,
+    inside: int,
     json_file: str | None,
     csv_file: str | None,
     folder: str | None,
@@ -152,7 +155,7 @@ def run(
     from bemkit.scene.toml import load_scene, with_overrides
 
     outputs = _outputs(json_file, csv_file, folder)
-    click.get_current_context().with_resource(reserved(outputs.check(_result_target(output))))
+    click.get_current_context().with_resource(reserved(outputs.check(_result_target(output, inside))))
     chosen = with_overrides(
         load_scene(scene),
         elements=elements,
@@ -174,7 +177,7 @@ def run(
     if output is not None and _history_file(chosen, output) is None:
         from bemkit.results.export import export_result
 
-        export_result(output, solution)
+        export_result(output, solution, inside=inside)
     outputs.write(solution)
     output_seconds = time.perf_counter() - begin
     if not quiet and not outputs.uses_stdout:
@@ -199,8 +202,15 @@ def run(
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
 @click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
 def show(
-    result: str, table: str | None, json_file: str | None, folder: str | None, shows_scene: bool, output: str | None
+    result: str,
+    table: str | None,
+    json_file: str | None,
+    folder: str | None,
+    shows_scene: bool,
+    output: str | None,
+    inside: int,
 ) -> None:
     """Show RESULT, a file written by bemkit run -o."""
     from bemkit.results.result_file import read_result
@@ -209,12 +219,12 @@ def show(
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
     outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact")
-    outputs.check(_result_target(output))
+    outputs.check(_result_target(output, inside))
     solution = read_result(result)
     if output is not None:
         from bemkit.results.export import export_result
 
-        export_result(output, solution)
+        export_result(output, solution, inside=inside)
     outputs.write(solution)
     if shows_scene:
         print_data(scene_to_toml(solution.stated))
@@ -317,12 +327,14 @@ def _outputs(
     return Outputs(texts, folder, figures, "deformation")
 
 
-def _result_target(output: str | None) -> list[Path]:
+def _result_target(output: str | None, inside: int) -> list[Path]:
     if output is None:
+        if inside:
+            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
         return []
     from bemkit.results.export import format_of
 
-    return [format_of(output).check(Path(output))]
+    return [format_of(output, inside).check(Path(output))]
 
 
 def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:

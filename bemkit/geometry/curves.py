@@ -155,6 +155,9 @@ class ParametricCurve:
         (n,) parameters p in [0, 1] -> (n, 2) points [m].
     derivative_function : callable
         (n,) parameters -> (n, 2) derivatives dx/dp [m]; checked against `function`.
+    is_analytic : bool
+        Whether it is smooth to all orders, so that elements can follow it to round-off. They follow one that is not,
+        such as a spline, as closely as polynomials do.
 
     Raises
     ------
@@ -171,6 +174,7 @@ class ParametricCurve:
 
     function: Callable[[FloatArray], FloatArray]
     derivative_function: Callable[[FloatArray], FloatArray]
+    is_analytic: bool = True
 
     def __post_init__(self) -> None:
         nodes, weights = gauss_legendre(_N_CHECK_POINTS)
@@ -245,6 +249,13 @@ class MovedCurve:
 
     def _parameter(self, s: FloatArray) -> FloatArray:
         return 1.0 - s if self.is_reversed else s
+
+
+def is_analytic(curve: Curve) -> bool:
+    """Tell whether a curve, moved or not, is smooth to all orders; see `ParametricCurve`."""
+    while (original := getattr(curve, "curve", None)) is not None:
+        curve = original
+    return bool(getattr(curve, "is_analytic", True))
 
 
 def reverse_curve(curve: Curve) -> Curve:

@@ -28,10 +28,13 @@ class Side:
         Its name, by which selections find it.
     curve : Curve
         Where it runs, with the body on its left.
+    group : str
+        Another name, which several sides may have in common; empty for none.
     """
 
     name: str
     curve: Curve
+    group: str = ""
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name):
@@ -76,6 +79,11 @@ class Outline:
             if len(names) != 1 or not self.sides[0].curve.is_straight:
                 raise GeometryError(f"Outline: a half-plane has the sides {', '.join(names)}: give one straight side")
             return
+        for side in self.sides:
+            if side.group in names and side.group != side.name:
+                raise GeometryError(
+                    f"Outline: {side.group!r} names a side and a group of sides with {side.name!r}: rename one of them"
+                )
         start, end = self._ends()
         loop_of_side = np.repeat(np.arange(len(self.loops)), [len(loop) for loop in self.loops])
         curves = tuple(side.curve for side in self.sides)
@@ -92,6 +100,12 @@ class Outline:
     def side_names(self) -> tuple[str, ...]:
         """The names of all sides, loop after loop."""
         return tuple(side.name for side in self.sides)
+
+    @property
+    def selectable_names(self) -> tuple[str, ...]:
+        """The names of groups and of sides, each once: what a selection may name."""
+        groups = (side.group for side in self.sides if side.group)
+        return tuple(dict.fromkeys([*groups, *self.side_names]))
 
     @cached_property
     def corners(self) -> tuple[FloatArray, ...]:

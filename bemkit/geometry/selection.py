@@ -24,7 +24,7 @@ class Selection:
     Parameters
     ----------
     sides : tuple of str
-        Names of sides; empty for all sides.
+        Names of sides, or of groups of sides; empty for all sides.
     where : callable, optional
         Vectorised predicate: coordinates x and y, each (n,) [m] -> (n,) bool. A piece shorter than 1/256 of its side
         may be overlooked.
@@ -38,9 +38,13 @@ class Selection:
             raise GeometryError(f"Selection: sides is the string {self.sides!r}: give a tuple, ({self.sides!r},)")
         object.__setattr__(self, "sides", tuple(self.sides))
 
-    def holds(self, side_name: str, points: FloatArray) -> BoolArray:
+    def names(self, side_name: str, group: str = "") -> bool:
+        """Tell whether a side is named, itself or by its group."""
+        return not self.sides or side_name in self.sides or group in self.sides
+
+    def holds(self, side_name: str, points: FloatArray, group: str = "") -> BoolArray:
         """Tell which points (n, 2) of the named side are selected, (n,)."""
-        if self.sides and side_name not in self.sides:
+        if not self.names(side_name, group):
             return np.zeros(len(points), dtype=bool)
         return np.ones(len(points), dtype=bool) if self.where is None else evaluate_predicate(self.where, points)
 

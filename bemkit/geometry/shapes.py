@@ -330,4 +330,4 @@ def _hole_loop(centre: tuple[float, float], radius: float, name: str) -> tuple[S
 
 
 def _reversed_loop(loop: tuple[Side, ...]) -> tuple[Side, ...]:
-    return tuple(Side(side.name, reverse_curve(side.curve)) for side in reversed(loop))
+    return tuple(Side(side.name, reverse_curve(side.curve), side.group) for side in reversed(loop))

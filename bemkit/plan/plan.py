@@ -10,6 +10,7 @@ import numpy as np
 
 from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.errors import InputError
+from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
@@ -126,6 +127,9 @@ def plan_items(
 def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
     """Yield what elements, symmetry and spaces need."""
     n, n_curved, accuracy = sizes.n_elements, sizes.n_curved, scene.mesh.accuracy
+    if drawn := drawn_shape(scene.shape):
+        read = "; ".join(drawn.notes) or "taken as it is"
+        yield PlanItem("drawn outline", True, f"{_count(len(drawn.outline().sides), 'side')}; {read}")
     yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
     further = "the number of elements is given"
     if accuracy is not None:

@@ -10,10 +10,12 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import break_nodes
+from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, are_neighbours
 from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import amount
 
@@ -24,6 +26,10 @@ LARGEST_SHARE_ALONE = 0.2
 LARGEST_TURN = 50.0
 """Degrees by which the boundary may turn on one element. A ring of quadratic elements of 90 degrees is 35 % off while
 the estimate says 3 %; of 45 degrees it says enough."""
+LARGEST_STRAIN = 0.1
+"""Strain or rotation [rad] of a share of the boundary above which displacements are not small."""
+STRAINED_SHARE = 0.05
+"""That share; corners and ends of parts are strained without bound in theory, but over ever shorter lengths."""
 _MOST_ALIKE = 3
 """Doubts of one kind about several bodies and contacts that are told."""
 FEWEST_NODES = 4
@@ -45,7 +51,7 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     laws = solution.scene.laws
     smooth = {part for part, law in laws.items() if law.is_frictionless}
     narrow = _narrow_zones(solution.contact, smooth)
-    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), narrow
+    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
     return (*solution.plan.warnings, *chain(*doubts))
 
 
@@ -57,6 +63,7 @@ def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
     doubts = [
         _large(solution.estimated_error),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
+        (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
         _narrow_zones(solution.contact, smooth),
     ]
     return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
@@ -120,6 +127,36 @@ def _turned(solution: Solution) -> Iterator[str]:
             f"The body turns by {turn:.2g}, which moves the ends of constant elements without slopes by more than it "
             "is strained, and is taken for strain: use slopes, or linear elements."
         )
+
+
+def _large_strains(body: SolvedBody) -> Iterator[str]:
+    """Doubt displacements that vary too much along the boundary to be small, by strain or by rotation."""
+    gradients, lengths = boundary_gradients(body)
+    largest_first = np.argsort(gradients)[::-1]
+    share = np.cumsum(lengths[largest_first]) / lengths.sum()
+    strain = gradients[largest_first[np.searchsorted(share, STRAINED_SHARE)]]
+    if strain > LARGEST_STRAIN:
+        yield (
+            f"Strains and rotations exceed {strain:.2g} on {100.0 * STRAINED_SHARE:.0f} % of the boundary, far outside "
+            "small displacements, where results are proportional to loads but not true: check the units of loads "
+            "and of Young's modulus, or load less."
+        )
+
+
+def boundary_gradients(body: SolvedBody) -> tuple[FloatArray, FloatArray]:
+    """Return sizes (n,) of the derivative of the displacement along the boundary, and lengths (n,) [m] of its pieces.
+
+    They are means over elements, of constant elements differences between neighbours; strain and rotation are their
+    components.
+    """
+    mesh, displacement = body.mesh, body.boundary.displacement
+    space = body.scene.discretisation.displacement_space(mesh)
+    if space.degree > 0:
+        at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+        return norms(at_ends[:, 1] - at_ends[:, 0]) / mesh.lengths, mesh.lengths
+    before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
+    lengths = 0.5 * (mesh.lengths[before] + mesh.lengths[after])
+    return norms(displacement[after] - displacement[before]) / lengths, lengths
 
 
 def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:

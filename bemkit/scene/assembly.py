@@ -253,18 +253,21 @@ class Assembly:
             listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
             raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
         placed = self._by_name[body]
-        if any(part == own.name for own in placed.parts) or part not in self._side_names(placed):
+        sides = self._side_names(placed)
+        if any(part == own.name for own in placed.parts) or not any(part in names for names in sides):
             _ = placed.contact_part(part)
 
-    def _side_names(self, body: Body) -> tuple[str, ...]:
-        """Return the names of the sides of a body; copies share them, for an outline checks itself."""
+    def _side_names(self, body: Body) -> tuple[tuple[str, str], ...]:
+        """Return the name and the group of each side of a body; copies share them, for an outline checks itself."""
         if id(body.shape) not in self._sides:
-            self._sides[id(body.shape)] = tuple(body.shape.outline().side_names)
+            self._sides[id(body.shape)] = tuple(
+                (side.name, side.group or side.name) for side in body.shape.outline().sides
+            )
         return self._sides[id(body.shape)]
 
     @cached_property
-    def _sides(self) -> dict[int, tuple[str, ...]]:
-        """The names of the sides of shapes."""
+    def _sides(self) -> dict[int, tuple[tuple[str, str], ...]]:
+        """The names and groups of the sides of shapes."""
         return {}
 
     @property
@@ -296,10 +299,10 @@ class Assembly:
         listed = self._contact_parts.get(body.name, ())
         if self.touching is None:
             return listed
-        taken = {side for part in body.parts for side in part.sides}
+        taken = {side for part in body.parts for side in part.sides} | set(listed)
         whole = any(not part.sides for part in body.parts)
         free = [part.name for part in body.parts if isinstance(part.condition, Free)]
-        sides = [] if whole else [side for side in self._side_names(body) if side not in taken]
+        sides = [] if whole else [name for name, group in self._side_names(body) if not {name, group} & taken]
         return tuple(dict.fromkeys([*listed, *free, *sides]))
 
     @cached_property
@@ -336,6 +339,7 @@ class Assembly:
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,
                 mesh=self.mesh if body.mesh is None else body.mesh,
+                units=self.units,
             )
         except InputError as error:
             raise type(error)(f"body {body.name!r}: {error}") from error

@@ -97,7 +97,7 @@ class Body:
                     kind = type(part.condition).__name__
                     raise InputError(f"part {self.name}.{name} is {kind}: a part in contact with a body must be free")
                 return part
-        sides = self.shape.outline().side_names
+        sides = self.shape.outline().selectable_names
         if name not in sides:
             known = [*(part.name for part in self.parts), *sides]
             listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")

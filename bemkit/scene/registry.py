@@ -116,8 +116,24 @@ SHAPES = Registry(
         "exterior-of": "bemkit.geometry.shapes:ExteriorOf",
         "half-plane": "bemkit.geometry.shapes:HalfPlaneBody",
         "periodic-half-plane": "bemkit.geometry.shapes:PeriodicHalfPlaneBody",
+        "outline": "bemkit.geometry.drawn:OutlineShape",
+        "mesh": "bemkit.geometry.files.shape_file:MeshFile",
+        "drawing": "bemkit.geometry.files.shape_file:DrawingFile",
     },
     "bemkit.shapes",
+)
+
+FILE_KINDS = ("mesh", "drawing")
+"""Shapes with the name of a file."""
+
+SIDES = Registry(
+    "side",
+    {
+        "line": "bemkit.geometry.drawn:LineTo",
+        "arc": "bemkit.geometry.drawn:ArcTo",
+        "spline": "bemkit.geometry.drawn:SplineTo",
+        "nurbs": "bemkit.geometry.drawn:NurbsTo",
+    },
 )
 
 GRADINGS = Registry(

@@ -18,6 +18,7 @@ from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.formulas import closest
+from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
@@ -31,7 +32,7 @@ from bemkit.scene.far_field import FarField, check_half_plane
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.symmetry import check_symmetry
-from bemkit.scene.unit_names import UnitNames
+from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
 
@@ -131,12 +132,14 @@ class Scene:
             )
         outline = self.shape.outline()
         check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+        drawn = drawn_shape(self.shape)
+        check_length_of_file("" if drawn is None else drawn.unit, self.units)
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
                 "heat expands it without bound: leave the body forces out, or give a bounded shape"
             )
-        names = [side.name for loop in outline.loops for side in loop]
+        names = outline.selectable_names
         for part in self.parts:
             for side in part.sides:
                 if side not in names:

@@ -26,6 +26,8 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
+from bemkit.geometry.drawn import DrawnSide
+from bemkit.geometry.files.shape_file import ShapeFile
 from bemkit.geometry.grading import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
@@ -45,6 +47,7 @@ from bemkit.scene.registry import (
     LINEAR_SOLVERS,
     OBSTACLES,
     SHAPES,
+    SIDES,
     SOLVERS,
     Registry,
 )
@@ -55,6 +58,7 @@ T = TypeVar("T")
 
 _REGISTRIES: tuple[tuple[Any, Registry], ...] = (
     (Shape, SHAPES),
+    (DrawnSide, SIDES),
     (Grading, GRADINGS),
     (Condition, CONDITIONS),
     (Copies, COPIES),
@@ -144,6 +148,8 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
     if isinstance(value, Mapping):
         inner = get_args(declared)[1] if get_args(declared) else None
         return {key: unstructure(item, inner, f"{path}.{key}") for key, item in value.items()}
+    if isinstance(value, ShapeFile):  # texts hold what the file held, and need it no more
+        value = value.shape
     if is_dataclass(value):
         return _unstructure_dataclass(value, declared, path, keep_defaults)
     if callable(value):

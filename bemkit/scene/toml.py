@@ -18,7 +18,7 @@ from bemkit.scene.assembly import Assembly
 from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.registry import SOLVERS
+from bemkit.scene.registry import FILE_KINDS, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
@@ -93,7 +93,7 @@ def load_scene(source: str | Path) -> Scene | Assembly:
         text = content.decode("utf-8")
     except UnicodeDecodeError:
         raise SceneError(f"{name}: not UTF-8 text: give a TOML file") from None
-    return scene_from_toml(text, name=name)
+    return scene_from_toml(text, name=name, folder=None if str(source) in shipped else Path(source).parent)
 
 
 def load_single_body(source: str | Path) -> Scene:
@@ -119,7 +119,7 @@ def single_body(scene: Scene | Assembly, name: str) -> Scene:
     return scene
 
 
-def scene_from_toml(text: str, *, name: str = "scene") -> Scene | Assembly:
+def scene_from_toml(text: str, *, name: str = "scene", folder: Path | None = None) -> Scene | Assembly:
     """Turn TOML text into a scene, or an assembly if it has tables ``[bodies.NAME]``.
 
     Parameters
@@ -127,6 +127,8 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene | Assembly:
     text : str
     name : str
         Where the text comes from, for messages.
+    folder : Path, optional
+        Where names of mesh and drawing files begin. Without it the text may not name files.
 
     Raises
     ------
@@ -140,12 +142,12 @@ def scene_from_toml(text: str, *, name: str = "scene") -> Scene | Assembly:
     except (RecursionError, ValueError):  # ValueError: an integer of thousands of digits
         raise SceneError(f"{name}: not valid TOML: nested too deeply or a number too long: simplify it") from None
     try:
-        return scene_from_table(table)
+        return scene_from_table(table, folder)
     except SceneError as error:
         raise SceneError(f"{name}: {error}") from error
 
 
-def scene_from_table(table: dict[str, Any]) -> Scene | Assembly:
+def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene | Assembly:
     """Turn the table that a TOML text holds into a scene; see `scene_from_toml`.
 
     Raises
@@ -153,6 +155,7 @@ def scene_from_table(table: dict[str, Any]) -> Scene | Assembly:
     SceneError
         If it is no valid scene; the message begins with the key.
     """
+    table = _with_places_of_files(table, folder, "")
     try:
         scene: Scene | Assembly = structure(table, Assembly) if "bodies" in table else structure(table, Scene)
         if scene.steps:
@@ -160,6 +163,25 @@ def scene_from_table(table: dict[str, Any]) -> Scene | Assembly:
     except InputError as error:
         raise SceneError(printable(str(error))) from error
     return scene
+
+
+def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str) -> dict[str, Any]:
+    """Return a table of a scene whose shapes name their files from the folder of the scene."""
+    located = dict(table)
+    if isinstance(bodies := table.get("bodies"), dict):
+        located["bodies"] = {
+            name: _with_places_of_files(body, folder, f"bodies.{name}.") if isinstance(body, dict) else body
+            for name, body in bodies.items()
+        }
+    if isinstance(shape := table.get("shape"), dict):
+        located["shape"] = _with_places_of_files(shape, folder, f"{path}shape.")
+    if table.get("kind") in FILE_KINDS and isinstance(file := table.get("file"), str):
+        if folder is None:
+            raise SceneError(
+                f"{path}file: {printable(file)!r}: a text without a folder names no files: give the folder"
+            )
+        located["file"] = str(folder / file)
+    return located
 
 
 def scene_to_toml(scene: Scene | Assembly) -> str:

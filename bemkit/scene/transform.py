@@ -137,7 +137,7 @@ class TransformedShape:
         """Return the transformed boundary, its sides under their names."""
         outline = self.shape.outline()
         loops = tuple(
-            tuple(Side(side.name, _transformed_curve(side.curve, self.affine)) for side in loop)
+            tuple(Side(side.name, _transformed_curve(side.curve, self.affine), side.group) for side in loop)
             for loop in outline.loops
         )
         return Outline(loops, outline.is_exterior, outline.surface)

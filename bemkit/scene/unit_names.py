@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 
 from bemkit.errors import InputError
 
 _LONGEST = 24
+_METRES: Mapping[str, float] = MappingProxyType(
+    {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048, "m": 1.0, "km": 1e3}
+)
 
 
 @dataclass(frozen=True)
@@ -65,3 +70,14 @@ def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
     """Return a label with the unit in brackets, if units have names."""
     unit = unit_of(quantity, units)
     return f"{label} [{unit}]" if unit else label
+
+
+def check_length_of_file(stated: str, units: UnitNames | None) -> None:
+    """Raise if the file of a shape states another unit of length than a scene; empty is no statement."""
+    if units is None or stated not in _METRES or units.length not in _METRES or stated == units.length:
+        return
+    factor = _METRES[stated] / _METRES[units.length]
+    raise InputError(
+        f"units.length is {units.length!r}, but the file of the shape is in {stated!r}: give the shape scale = "
+        f"{factor:.10g}, or scale = 1 to take its numbers as they are"
+    )

@@ -33,6 +33,7 @@ FAMILIES = {
     "Obstacles": kinds.OBSTACLES,
     "Friction laws": kinds.LAWS,
     "Shapes": kinds.SHAPES,
+    "Sides of outlines": kinds.SIDES,
     "Gradings": kinds.GRADINGS,
     "Discretisations": kinds.DISCRETISATIONS,
     "Linear solvers": kinds.LINEAR_SOLVERS,

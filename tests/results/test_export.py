@@ -72,6 +72,51 @@ def test_other_programs_read_the_lines(solution: bk.Solution, tmp_path: Path) ->
     corner = np.argmin(np.hypot(*(mesh.points[:, :2] - solution.mesh.nodes[0]).T))
     np.testing.assert_allclose(mesh.point_data["displacement"][corner, :2], solution.boundary.displacement[0])
     assert mesh.cell_data["traction"][0].shape == (len(lines.data), 3)
+    slips = mesh.point_data["slip"][at_contact]
+    touches = np.array([word != "separated" for word in solution.contact.status_words()])
+    np.testing.assert_array_equal(slips, np.where(touches, solution.contact.u_t, np.nan))
+    assert {"gap", "clearance", "status"} <= set(mesh.point_data)
+
+
+def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    material = bk.Material(10.0, 0.3)
+    parts = (
+        bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+        bk.Part("wall", bk.Roller(), sides=("left",)),
+        bk.Part("load", bk.Pressure(1e-3), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="t", shape=bk.Rectangle(2.0, 1.0), material=material, parts=parts, mesh=bk.MeshOptions(elements=60)
+    )
+    bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=11)
+    mesh = meshio.read(tmp_path / "r.vtu")
+    assert [block.type for block in mesh.cells] == ["line", "vertex", "quad"]
+    squares = mesh.cells[2].data
+    assert len(squares) == 8 * 3  # eleven points along 2, the outermost on the boundary
+    inner = np.unique(squares)
+    x, y = mesh.points[inner, :2].T
+    assert np.ptp(x) == pytest.approx(1.6)
+    # uniform pressure in plane strain, which linear elements hold exactly
+    expected = np.zeros((3, 3))
+    expected[1, 1], expected[2, 2] = -1e-3, -0.3e-3
+    np.testing.assert_allclose(
+        mesh.point_data["stress"][inner].reshape(-1, 3, 3), np.tile(expected, (len(inner), 1, 1)), atol=1e-12
+    )
+    displacement = np.column_stack([0.39 * 1e-4 * x, -0.91 * 1e-4 * y, 0.0 * x])
+    np.testing.assert_allclose(mesh.point_data["displacement"][inner], displacement, atol=1e-14)
+    np.testing.assert_allclose(mesh.point_data["von_mises"][inner], 1e-3 * np.sqrt(1.0 - 0.3 + 0.09), rtol=1e-9)
+    on_lines = np.unique(mesh.cells[0].data)
+    assert np.isnan(mesh.point_data["stress"][on_lines]).all()
+
+
+def test_inside_is_refused_where_it_cannot_be_held(solution: bk.Solution, tmp_path: Path, capsys) -> None:
+    with pytest.raises(OutputFileError, match=r"r.h5: .h5 holds no fields inside the body: give .vtu, or leave"):
+        bk.export_result(tmp_path / "r.h5", solution, inside=10)
+    with pytest.raises(OutputFileError, match=r"r.vtu: inside is 1: give from 2 to 1000 points across the body"):
+        bk.export_result(tmp_path / "r.vtu", solution, inside=1)
+    assert call("run", "paper-1", "--inside", "10") == 2
+    assert "--inside goes into a file: give -o with a name that ends in .vtu" in capsys.readouterr().err
 
 
 def test_the_command_line_goes_by_the_ending(
@@ -92,3 +137,14 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, solution: b
     monkeypatch.setattr("bemkit.results.export.find_spec", lambda name: None)
     with pytest.raises(OutputFileError, match=r'need meshio: pip install "bemkit\[mesh\]"'):
         bk.export_result(tmp_path / "r.vtu", solution)
+
+
+def test_bodies_without_end_have_no_fields_inside(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    parts = (bk.Part("load", bk.Pressure(1.0)),)
+    shape = bk.ExteriorOf(bk.Disk(1.0))
+    scene = bk.Scene(
+        title="t", shape=shape, material=bk.Material(1e3, 0.3), parts=parts, mesh=bk.MeshOptions(elements=16)
+    )
+    bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=10)
+    assert [block.type for block in meshio.read(tmp_path / "r.vtu").cells] == ["line"]

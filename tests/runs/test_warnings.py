@@ -21,10 +21,11 @@ from bemkit.geometry.shapes import Rectangle
 from bemkit.hdf5 import MARK, seal
 from bemkit.operators.material import Material
 from bemkit.plan import make_plan
+from bemkit.results import warnings as warnings_module
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_json
-from bemkit.results.warnings import FEWEST_NODES, find_warnings
+from bemkit.results.warnings import FEWEST_NODES, find_assembly_warnings, find_warnings
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
@@ -43,6 +44,38 @@ def solution() -> Solution:
     found = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="linear"))
     plan = dataclasses.replace(found.plan, warnings=WORDS[:1])
     return dataclasses.replace(found, plan=plan, warnings=WORDS)
+
+
+LARGE = "far outside small displacements, where results are proportional to loads but not true: check the units"
+
+
+@pytest.mark.parametrize("word", ["linear", "quadratic", "constant"])
+@pytest.mark.parametrize(("stretch", "is_large"), [(0.09, False), (0.11, True)])
+def test_large_strains_are_warned_of(word: str, stretch: float, is_large: bool) -> None:
+    parts = (
+        Part("left", PrescribedDisplacement(x=Expression("0 * y"), y=0.0), sides=("left",)),
+        Part("right", PrescribedDisplacement(x=stretch, y=0.0), sides=("right",)),
+    )
+    scene = Scene(title="t", shape=Rectangle(1.0, 0.2), material=Material(1.0, 0.0), parts=parts)
+    warnings = run(with_overrides(scene, elements=48, discretisation=word)).warnings
+    assert sum(LARGE in sentence for sentence in warnings) == is_large
+
+
+def test_large_rotations_are_warned_of() -> None:
+    turned = PrescribedDisplacement(x=Expression("0.02 * x - 0.2 * y"), y=Expression("0.2 * x"))
+    parts = (Part("all", turned, sides=("left", "right")),)
+    scene = Scene(title="t", shape=Rectangle(1.0, 1.0), material=Material(1.0, 0.3), parts=parts)
+    warnings = run(with_overrides(scene, elements=24)).warnings
+    assert any(words.startswith("Strains and rotations exceed 0.2") for words in warnings)
+
+
+def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None:
+    solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
+    assert isinstance(solution, bk.AssemblySolution)
+    assert not any(LARGE in words for words in find_assembly_warnings(solution))
+    monkeypatch.setattr(warnings_module, "LARGEST_STRAIN", 1e-4)
+    doubts = [words for words in find_assembly_warnings(solution) if LARGE in words]
+    assert [words.split(":")[0] for words in doubts] == [f"Body '{name}'" for name in solution.bodies]
 
 
 def test_a_file_keeps_warnings(tmp_path: Path, solution: Solution) -> None:

@@ -39,7 +39,8 @@ def discretise(
         Spacing of the elements on every piece. Uniform if left out, but for lengths that grow gradually next to a piece
         with elements of less than half the length.
     density : mapping of str to float, optional
-        How densely sides are divided compared with the others, by the name of the side; 1 where left out.
+        How densely sides are divided compared with the others, by the name of the side, or else of
+        its group; 1 where left out.
     symmetry : Symmetry, optional
         Lines of which only the side x <= a, y <= b is divided, into a half or a quarter of `n_elements`.
 
@@ -65,7 +66,8 @@ def discretise(
         n_elements = _share_of_half(n_elements, division, symmetry)
         _check_sides_divided(density, division)
     lengths = division.piece_lengths
-    densities = [density.get(outline.side_names[piece.side], 1.0) for piece in division.pieces]
+    sides = [outline.sides[piece.side] for piece in division.pieces]
+    densities = [density.get(side.name, density.get(side.group, 1.0)) for side in sides]
     counts = share_elements(n_elements, lengths * densities)
     if isinstance(grading, Uniform):
         positions = _gradual(division, counts, lengths)
@@ -127,9 +129,9 @@ def _checked_positions(grading: Grading, n: int) -> FloatArray:
 
 def _check_density(density: Mapping[str, float], outline: Outline) -> None:
     for side, value in density.items():
-        if side not in outline.side_names:
+        if side not in outline.selectable_names:
             raise GeometryError(
-                f"discretise: density names the side {side!r}: the sides are {', '.join(outline.side_names)}"
+                f"discretise: density names the side {side!r}: the sides are {', '.join(outline.selectable_names)}"
             )
         if not 0.0 < value < np.inf:
             raise GeometryError(f"discretise: the density of side {side!r} is {value}: give a positive, finite number")
@@ -146,7 +148,8 @@ def _share_of_half(n_elements: int, half: Division, symmetry: Symmetry) -> int:
 
 
 def _check_sides_divided(density: Mapping[str, float], half: Division) -> None:
-    divided = {half.outline.side_names[piece.side] for piece in half.pieces}
+    sides = [half.outline.sides[piece.side] for piece in half.pieces]
+    divided = {name for side in sides for name in (side.name, side.group) if name}
     for side in density:
         if side not in divided:
             raise GeometryError(

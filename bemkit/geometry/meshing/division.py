@@ -212,14 +212,14 @@ def _cut(number: int, side: Side, parts: Mapping[str, Selection]) -> list[Piece]
     predicates = [
         selection.where
         for selection in parts.values()
-        if selection.where is not None and (not selection.sides or side.name in selection.sides)
+        if selection.where is not None and selection.names(side.name, side.group)
     ]
     cuts = merge_breakpoints(np.concatenate([np.zeros(0), *(breakpoints(side.curve, where) for where in predicates)]))
     ends = np.concatenate([[0.0], cuts, [1.0]])
     middles = side.curve.point(0.5 * (ends[:-1] + ends[1:]))
     names: list[str | None] = [None] * len(middles)
     for name, selection in parts.items():
-        for k in np.flatnonzero(selection.holds(side.name, middles)):
+        for k in np.flatnonzero(selection.holds(side.name, middles, side.group)):
             if names[k] is not None:
                 raise GeometryError(
                     f"discretise: parts {names[k]!r} and {name!r} overlap on side {side.name!r}, at "
@@ -233,10 +233,10 @@ def _cut(number: int, side: Side, parts: Mapping[str, Selection]) -> list[Piece]
 def _check_sides(outline: Outline, parts: Mapping[str, Selection]) -> None:
     for name, selection in parts.items():
         for side in selection.sides:
-            if side not in outline.side_names:
+            if side not in outline.selectable_names:
                 raise GeometryError(
                     f"discretise: part {name!r} names the side {side!r}: the sides are "
-                    f"{', '.join(repr(known) for known in outline.side_names)}"
+                    f"{', '.join(repr(known) for known in outline.selectable_names)}"
                 )
 
 

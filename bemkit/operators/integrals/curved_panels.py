@@ -20,6 +20,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.geometry.curves import is_analytic
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
@@ -32,6 +33,8 @@ ROUND_OFF = 4.0 * float(np.finfo(float).eps)
 UNRESOLVED = 1e3
 """Elements whose series goes on beyond MAX_DEGREE with this many times the round-off are refused."""
 MAX_NEWTON = 30
+FOLLOWED = 1e-5
+"""Share of their half length to which elements follow curves that are not analytic, such as splines."""
 ELLIPSE = 1.8
 """Points with a parameter in the ellipse with foci -1, 1 and this semi-axis are near; Gauss rules serve the others."""
 
@@ -72,7 +75,8 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     noise = ROUND_OFF * (1.0 + np.abs(places).max(axis=(1, 2)) / half[curved])
     is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
     degree = np.clip(series.shape[1] - 1 - is_noise.sum(axis=1), 1, MAX_DEGREE)
-    is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > UNRESOLVED * noise[:, None]).any(axis=1)
+    allowed = np.where(_is_analytic(mesh)[curved], UNRESOLVED * noise, FOLLOWED)
+    is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > allowed[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
     n_powers = int(degree.max()) + 1
     about_centre = np.zeros((n_powers, mesh.n_elements), complex)
@@ -89,6 +93,12 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
         ).max(axis=0)
     _check(mesh, curved, bend, is_unresolved)
     return CurvedPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
+
+
+def _is_analytic(mesh: BoundaryMesh) -> BoolArray:
+    """Tell of each element (n_elements,) whether its curve is smooth to all orders; straight ones are."""
+    of_curves = np.array([*(is_analytic(curve) for curve in mesh.curves), True])
+    return np.ones(mesh.n_elements, bool) if mesh.element_curve is None else of_curves[mesh.element_curve]
 
 
 def _check(mesh: BoundaryMesh, curved: IntArray, bend: FloatArray, is_unresolved: BoolArray) -> None:

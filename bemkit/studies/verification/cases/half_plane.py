@@ -197,7 +197,7 @@ def _scene(gap: str, half_width: float, far: FarField, law: FrictionLaw, materia
 def _frictionless(
     title: str, source: str, gap: str, exact: LineContact, bounds: tuple[float, ...], inner: float = 0.0
 ) -> Case:
-    """Return an indenter whose zone and pressure are compared, the latter away from the ends and from a sharp middle."""
+    """Return an indenter whose zone and pressure are compared, the latter away from ends and a sharp middle."""
     a = exact.half_width
     return Case(
         title=title,

@@ -1,0 +1,197 @@
+"""Outlines from DXF drawings, through ezdxf."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from bemkit.errors import printable
+from bemkit.formulas import closest
+from bemkit.geometry.drawn import ArcTo, LineTo, Point
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.files.free_form import ellipse_strokes, nurbs_strokes
+from bemkit.geometry.files.strokes import Stroke
+
+_UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})
+"""Units of length by their number in the header of a DXF file."""
+_PLANE = 1e-9
+_DEEPEST = 8
+"""Blocks within blocks."""
+
+
+def read_dxf(path: Path, only: Sequence[str] = ()) -> tuple[list[Stroke], str, list[str]]:
+    """Read the lines, arcs, circles, polylines, ellipses and splines of the model space of a DXF file.
+
+    Parameters
+    ----------
+    path : Path
+    only : sequence of str
+        Layers of the outline; if empty, all that are on.
+
+    Returns
+    -------
+    strokes : list of Stroke
+        Their groups are the layers, but that of layer 0 is empty.
+    unit : str
+        Unit of length that the file states; empty if none.
+    notes : list of str
+        What is left out.
+
+    Raises
+    ------
+    GeometryError
+        If ezdxf is missing, cannot read the file, a layer is unknown, or the drawing is not plane.
+    """
+    if importlib.util.find_spec("ezdxf") is None:
+        raise GeometryError('ezdxf is not installed: pip install "bemkit[cad]"')
+    from ezdxf import recover
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        document, audit = recover.readfile(path)
+    except (DXFError, ValueError, KeyError, IndexError, TypeError, AttributeError) as error:
+        raise GeometryError(f"it cannot be read ({printable(str(error))}): save it as DXF anew") from error
+    entities = list(_entities(document.modelspace(), 0))
+    layers = sorted({_layer(entity) for entity in entities})
+    for name in only:
+        if name not in layers:
+            listed = ", ".join(layers) or "none"
+            raise GeometryError(f"only names {name!r}: the layers with lines are {listed}{closest(name, layers)}")
+    strokes: list[Stroke] = []
+    left_out: Counter[str] = Counter()
+    for entity in entities:
+        layer = _layer(entity)
+        if (layer not in only) if only else _is_off(document, layer):
+            continue
+        group = "" if layer == "0" else layer
+        try:
+            drawn = _strokes(entity, group)
+        except (DXFError, ValueError, ZeroDivisionError) as error:
+            raise GeometryError(
+                f"a {entity.dxftype()} on layer {layer!r} is no curve ({error}): draw it anew"
+            ) from error
+        if drawn is None:
+            left_out[entity.dxftype()] += 1
+        else:
+            strokes += drawn
+    words = ", ".join(f"{count} {kind}" for kind, count in sorted(left_out.items()))
+    notes = [f"left out, because no lines: {words}"] if words else []
+    if repairs := [*audit.fixes, *audit.errors]:
+        notes.append(
+            f"damaged, and repaired or left out: {len(repairs)} entries, such as: {printable(repairs[0].message)}"
+        )
+    unit = _UNITS.get(int(document.header.get("$INSUNITS", 0)), "")
+    return strokes, unit, notes
+
+
+def _entities(container: Iterable[Any], depth: int) -> Iterator[Any]:
+    """Yield entities, those of blocks and of three-dimensional polylines in place."""
+    for entity in container:
+        if entity.dxftype() == "INSERT" and depth < _DEEPEST:
+            yield from _entities(entity.virtual_entities(), depth + 1)
+        else:
+            yield entity
+
+
+def _layer(entity: Any) -> str:
+    return str(entity.dxf.layer)
+
+
+def _is_off(document: Any, layer: str) -> bool:
+    if layer.lower() == "defpoints":
+        return True
+    if layer not in document.layers:
+        return False
+    found = document.layers.get(layer)
+    return bool(found.is_off() or found.is_frozen())
+
+
+def _strokes(entity: Any, group: str) -> list[Stroke] | None:
+    """Return the strokes of an entity, or None if it is none of those that bound bodies."""
+    match entity.dxftype():
+        case "LINE":
+            return [Stroke(_point(entity.dxf.start), LineTo(_point(entity.dxf.end), group=group))]
+        case "ARC":
+            return [_arc(entity, math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle), group)]
+        case "CIRCLE":
+            return [_arc(entity, k * math.pi / 2.0, (k + 1) * math.pi / 2.0, group) for k in range(4)]
+        case "LWPOLYLINE":
+            corners = [(x, y, bulge) for x, y, bulge in entity.get_points("xyb")]
+            return _polyline(entity, corners, entity.dxf.elevation, entity.closed, group)
+        case "POLYLINE" if entity.is_2d_polyline or entity.is_3d_polyline:
+            places = [vertex.dxf.location for vertex in entity.vertices]
+            corners = [(p.x, p.y, v.dxf.bulge) for p, v in zip(places, entity.vertices, strict=True)]
+            heights = {p.z for p in places} or {0.0}
+            if max(heights) - min(heights) > 0.0:
+                raise GeometryError("it is three-dimensional: give a plane drawing")
+            return _polyline(entity, corners, max(heights), entity.is_closed, group)
+        case "ELLIPSE":
+            return _ellipse(entity, group)
+        case "SPLINE":
+            spline = entity.construction_tool()
+            points = [_point(point) for point in spline.control_points]
+            weights = np.array(spline.weights()) if len(spline.weights()) else np.ones(len(points))
+            return nurbs_strokes(np.array(points), spline.degree, np.array(spline.knots()), weights, group)
+    return None
+
+
+def _point(place: Any) -> Point:
+    """Return x and y of a point of the world, which lies in the plane."""
+    if abs(place.z) > _PLANE * max(abs(place.x), abs(place.y)) and abs(place.z) > 1e-12:
+        raise GeometryError(
+            f"a line passes through z = {place.z:.6g}: bemkit solves plane problems; give a drawing at z = 0"
+        )
+    return float(place.x), float(place.y)
+
+
+def _arc(entity: Any, start: float, end: float, group: str) -> Stroke:
+    """Return an arc by three of its points, which holds for mirrored ones, too."""
+    if end <= start:
+        end += 2.0 * math.pi
+    centre, radius = entity.dxf.center, entity.dxf.radius
+    places = [
+        (centre.x + radius * math.cos(angle), centre.y + radius * math.sin(angle), centre.z)
+        for angle in (start, 0.5 * (start + end), end)
+    ]
+    begin, middle, finish = (_point(each) for each in entity.ocs().points_to_wcs(_vectors(places)))
+    return Stroke(begin, ArcTo(finish, middle, group=group))
+
+
+def _polyline(
+    entity: Any, corners: Sequence[tuple[float, float, float]], height: float, is_closed: bool, group: str
+) -> list[Stroke]:
+    """Return the lines of a polyline, and arcs where it bulges by the tangent of a quarter of their angle."""
+    strokes = []
+    for (x, y, bulge), (x_end, y_end, _) in pairwise([*corners, *corners[: int(is_closed)]]):
+        if (x, y) == (x_end, y_end):
+            continue
+        middle = (0.5 * (x + x_end) + 0.5 * bulge * (y_end - y), 0.5 * (y + y_end) - 0.5 * bulge * (x_end - x))
+        places = [(x, y, height), (*middle, height), (x_end, y_end, height)]
+        begin, through, end = (_point(each) for each in entity.ocs().points_to_wcs(_vectors(places)))
+        is_arc = abs(bulge) > 1e-9
+        strokes.append(Stroke(begin, ArcTo(end, through, group=group) if is_arc else LineTo(end, group=group)))
+    return strokes
+
+
+def _ellipse(entity: Any, group: str) -> list[Stroke]:
+    centre, first, second = (
+        np.array(_point(each)) for each in (entity.dxf.center, entity.dxf.major_axis, entity.minor_axis)
+    )
+    start, end = float(entity.dxf.start_param), float(entity.dxf.end_param)
+    if end <= start + 1e-12:
+        end += 2.0 * math.pi
+    return ellipse_strokes(centre, first, second, start, end, group)
+
+
+def _vectors(places: Sequence[tuple[float, float, float]]) -> list[Any]:
+    from ezdxf.math import Vec3
+
+    return [Vec3(place) for place in places]

@@ -1,0 +1,270 @@
+"""Strokes: the lines and curves of a file, in any order and sense, joined to closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TypeAlias
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
+from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.vectors import cross, norms
+
+StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
+
+_SEEN = np.linspace(0.0, 1.0, 17)
+_ROUND_OFF = 1e-12
+"""Gaps, relative to the coordinates, that are not worth a word."""
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """A line or curve of a file.
+
+    Parameters
+    ----------
+    start : (float, float) [m]
+    side : LineTo, ArcTo, SplineTo or NurbsTo
+        Its group is what the file calls it: a physical group, a layer, an id; empty if it has no name.
+    """
+
+    start: Point
+    side: StrokeSide
+
+    @property
+    def end(self) -> Point:
+        """Where it ends [m]."""
+        return self.side.to
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it ends where it starts."""
+        return self.start == self.end
+
+    def reversed(self) -> Stroke:
+        """Return the stroke drawn the other way."""
+        side = self.side
+        match side:
+            case SplineTo():
+                side = replace(side, through=side.through[::-1])
+            case NurbsTo():
+                knots, weights = side.knots, side.weights
+                turned = None if knots is None else tuple(knots[0] + knots[-1] - knot for knot in knots[::-1])
+                side = replace(
+                    side, points=side.points[::-1], knots=turned, weights=None if weights is None else weights[::-1]
+                )
+        return Stroke(side.to, replace(side, to=self.start))
+
+    def mapped(self, move: Callable[[Point], Point]) -> Stroke:
+        """Return the stroke with every point moved by a similarity."""
+        side = self.side
+        match side:
+            case ArcTo():
+                side = replace(side, through=move(side.through))
+            case SplineTo():
+                side = replace(side, through=tuple(move(each) for each in side.through))
+            case NurbsTo():
+                side = replace(side, points=tuple(move(each) for each in side.points))
+        return Stroke(move(self.start), replace(side, to=move(side.to)))
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(n, 2) array [m]: points along the stroke, which tell its size and its sense."""
+        return self.side.curve(self.start).point(_SEEN)
+
+
+def extent(strokes: Sequence[Stroke]) -> float:
+    """Return the larger of width and height [m] of what strokes end at and pass through."""
+    points = np.concatenate([stroke.points for stroke in strokes])
+    return float(np.ptp(points, axis=0).max())
+
+
+def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list[Stroke]], list[str]]:
+    """Join strokes to closed loops.
+
+    Parameters
+    ----------
+    strokes : sequence of Stroke
+    tolerance : float [m]
+        Ends no farther apart than this become one point.
+
+    Returns
+    -------
+    loops : list of list of Stroke
+        Each stroke starts where the one before it ends, and the first where the last ends.
+    notes : list of str
+        What was done to the strokes.
+
+    Raises
+    ------
+    GeometryError
+        If a stroke ends where no other does, or more than two end in one place.
+    """
+    strokes, notes = _without_repeated(strokes, tolerance)
+    closed = [[stroke] for stroke in strokes if stroke.is_closed]
+    strokes = [stroke for stroke in strokes if not stroke.is_closed]
+    if not strokes:
+        return closed, notes
+    ends = np.array([point for stroke in strokes for point in (stroke.start, stroke.end)])
+    places, place_of_end = _merged(ends, tolerance)
+    gaps = norms(ends - places[place_of_end])
+    if gaps.max() > _ROUND_OFF * np.abs(ends).max():
+        count = int(np.count_nonzero(np.bincount(place_of_end, weights=gaps) > _ROUND_OFF * np.abs(ends).max()))
+        which = "1 gap" if count == 1 else f"{count} gaps"
+        notes.append(f"closed: {which} between ends of lines, of up to {2.0 * gaps.max():.2g}")
+    _check_degrees(places, place_of_end, tolerance)
+    strokes = [
+        _with_ends(stroke, *places[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
+    ]
+    return [*closed, *_followed(strokes, place_of_end.reshape(-1, 2))], notes
+
+
+def _without_repeated(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], list[str]]:
+    """Leave out strokes drawn twice, and those shorter than the tolerance."""
+    long = [stroke for stroke in strokes if np.ptp(stroke.points, axis=0).max() > tolerance]
+    notes = []
+    if n_short := len(strokes) - len(long):
+        notes.append(f"left out, because shorter than {tolerance:.2g}: lines, {n_short}")
+    if not long:
+        return [], notes
+    pairs = cKDTree(np.array([_features(stroke) for stroke in long])).query_pairs(2.0 * tolerance)
+    repeated = {max(pair) for pair in pairs}
+    if repeated:
+        notes.append(f"drawn twice and taken once: lines, {len(repeated)}")
+    return [stroke for k, stroke in enumerate(long) if k not in repeated], notes
+
+
+def _features(stroke: Stroke) -> FloatArray:
+    """Return lengths (8,) [m] that are the same for strokes on top of each other, whichever way they are drawn."""
+    first, quarter, middle, third, last = stroke.points[::4]
+    x, y = last - first
+    chord = float(np.hypot(x, y))
+    turn = ((x * x - y * y) / chord, 2.0 * x * y / chord) if chord > 0.0 else (0.0, 0.0)
+    return np.array([*(0.5 * (first + last)), *middle, *(0.5 * (quarter + third)), *turn])
+
+
+def _merged(points: FloatArray, tolerance: float) -> tuple[FloatArray, IntArray]:
+    """Return places (m, 2), the middles of points closer than a tolerance, and the place (n,) of each point."""
+    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
+    n_places, place = connected_components(graph, directed=False)
+    low = np.full((n_places, 2), np.inf)
+    np.minimum.at(low, place, points)
+    offsets = [np.bincount(place, weights=column) for column in (points - low[place]).T]
+    counts = np.bincount(place)
+    return low + np.stack(offsets, axis=1) / counts[:, None], place.astype(np.intp)  # exact where points are the same
+
+
+def _check_degrees(places: FloatArray, place_of_end: IntArray, tolerance: float) -> None:
+    degree = np.bincount(place_of_end)
+    if (degree > 2).any():
+        crowd = int(np.argmax(degree > 2))
+        raise GeometryError(
+            f"{degree[crowd]} lines meet at {format_point(places[crowd])}, where a boundary has two: leave lines "
+            "inside the body and beside it out, or name the right ones with only"
+        )
+    loose = np.flatnonzero(degree == 1)
+    if loose.size:
+        first, others = places[loose[0]], places[loose[1:]]
+        distances = norms(others - first)
+        nearest = int(np.argmin(distances))
+        raise GeometryError(
+            f"the outline is open: a line ends at {format_point(first)}, and the nearest loose end is "
+            f"{distances[nearest]:.3g} away at {format_point(others[nearest])} ({loose.size} ends are loose): close "
+            f"the gaps, or give a tolerance above {tolerance:.2g}"
+        )
+
+
+def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:
+    ends = [(float(x), float(y)) for x, y in (start, end)]
+    return Stroke(ends[0], replace(stroke.side, to=ends[1]))
+
+
+def _followed(strokes: Sequence[Stroke], pairs: IntArray) -> list[list[Stroke]]:
+    """Follow strokes from place to place, each of which two strokes share."""
+    by_place = np.argsort(pairs.ravel(), kind="stable").reshape(-1, 2) // 2
+    is_seen = np.zeros(len(strokes), dtype=bool)
+    loops = []
+    for first in range(len(strokes)):
+        loop, number, place = [], first, int(pairs[first, 0])
+        while not is_seen[number]:
+            is_seen[number] = True
+            starts_here = int(pairs[number, 0]) == place
+            loop.append(strokes[number] if starts_here else strokes[number].reversed())
+            place = int(pairs[number, 1 if starts_here else 0])
+            one, other = by_place[place].tolist()
+            number = other if one == number else one
+        if loop:
+            loops.append(loop)
+    return loops
+
+
+def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
+    """Put loops in order, the outer one first and anticlockwise, and name their sides.
+
+    Sides of a name of the file keep it; several of one name are numbered and have it as their group. Sides without
+    a name are ``side-1``, ``side-2``, ... along the loops, each of which begins at its lower left corner.
+    """
+    areas = [_signed_area(loop) for loop in loops]
+    outer = int(np.argmax(np.abs(areas)))
+    turned = [
+        loop if (area > 0.0) == (k == outer) else [stroke.reversed() for stroke in loop[::-1]]
+        for k, (loop, area) in enumerate(zip(loops, areas, strict=True))
+    ]
+    begun = [_from_lower_left(loop) for loop in turned]
+    holes = sorted((loop for k, loop in enumerate(begun) if k != outer), key=lambda loop: loop[0].start)
+    ordered = [begun[outer], *holes]
+    groups = [stroke.side.group for loop in ordered for stroke in loop]
+    names = iter(_names(groups))
+    return tuple(
+        Loop(loop[0].start, tuple(_named(stroke.side, next(names), groups) for stroke in loop)) for loop in ordered
+    )
+
+
+def _named(side: StrokeSide, name: str, groups: Sequence[str]) -> StrokeSide:
+    return replace(side, name=name, group="" if name == side.group else side.group)
+
+
+def _names(groups: Sequence[str]) -> list[str]:
+    """Return a name for each side, by the names that the file has for them."""
+    has_choice = len({*groups} - {""}) > 1
+    names: list[str] = []
+    taken = {*groups} - {""}
+    for number, group in enumerate(groups, start=1):
+        if group and groups.count(group) == 1:
+            names.append(group)
+            continue
+        stem = group if group and has_choice else "side"
+        name = f"{stem}-{number if stem == 'side' else groups[:number].count(group)}"
+        while name in taken:  # a layer called side-1
+            name += "'"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _signed_area(loop: Sequence[Stroke]) -> float:
+    points = np.concatenate([stroke.points for stroke in loop])
+    arms = points - points[0]
+    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
+
+
+def _from_lower_left(loop: list[Stroke]) -> list[Stroke]:
+    starts = np.array([stroke.start for stroke in loop])
+    size = float(np.ptp(starts, axis=0).max()) or 1.0
+    low = np.round((starts.sum(axis=1) - starts.sum(axis=1).min()) / size, 9)
+    first = int(np.lexsort((starts[:, 1], low))[0])
+    return [*loop[first:], *loop[:first]]
+
+
+def polyline(points: Sequence[Point], group: str = "") -> list[Stroke]:
+    """Return the straight strokes between points in order."""
+    return [Stroke(a, LineTo(b, group=group)) for a, b in pairwise(points) if a != b]
