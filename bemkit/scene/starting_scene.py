@@ -19,12 +19,10 @@ START = "# A scene to start from"
 _SQUEEZE = 1e-3
 """Share of its height by which the body is pressed together."""
 _LEAST_ELEMENTS, _ELEMENTS_OF_SIDE = 160, 6
-_FACING = 0.7
-"""Mean upward or downward component of the normals of sides that are held or touch the floor."""
+_FACING_UP, _FACING_FLOOR = 0.7, 0.3
+"""Upward component of the normals of sides that are held, in the mean, and downward one of those that may touch."""
 _NEAR = 0.05
-"""Share of the height within which such a side begins from the lowest or highest point."""
-_REACHED = 1e-6
-"""Share of the height within which one of them must come to it."""
+"""Share of the height within which they are near the top or the floor."""
 _STEEL: Mapping[str, tuple[float, str]] = MappingProxyType(
     {"mm": (210000.0, "MPa"), "cm": (2.1e7, "N/cm^2"), "m": (2.1e11, "Pa"), "in": (3.05e7, "psi")}
 )
@@ -52,8 +50,7 @@ def starting_scene(source: ShapeFile, file: str) -> str:
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
     height = high - low
     youngs_modulus, stress = _STEEL.get(source.shape.unit, (210000.0, ""))
-    floor = _facing(outline, -1.0, low, height) or f'where = "y < {low + 0.2 * height:.6g}"'
-    grip = _facing(outline, 1.0, high, height) or f'where = "y > {high - 0.1 * height:.6g}"'
+    floor, grip = _chosen(outline, low, high)
     lines = [
         f"{START}, written by bemkit outline. Sides: {_listed(outline.selectable_names)}",
         f"title = {_text(f'Part of {file}')}",
@@ -83,17 +80,21 @@ def _text(text: str | list[str]) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _facing(outline: Outline, sense: float, level: float, height: float) -> str:
-    """Return the sides that face up (+1) or down (-1) near a level, as TOML; empty if none of them reaches it."""
-    names, reached = [], np.inf
+def _chosen(outline: Outline, low: float, high: float) -> tuple[str, str]:
+    """Return what may touch the floor and what is held at the top, as TOML; they share no piece of boundary."""
+    height = high - low
+    touching, held = [], []
     for side in outline.sides:
-        tangents, points = side.curve.derivative(_SEEN), side.curve.point(_SEEN)
-        upward = (turned_right(tangents) / norms(tangents)[:, None])[:, 1].mean()
-        distance = np.abs(points[:, 1] - level).min()
-        if sense * upward > _FACING and distance <= _NEAR * height:
-            names.append(side.name)
-            reached = min(reached, distance)
-    return f"sides = {_text(names)}" if reached <= _REACHED * height else ""
+        tangents, y = side.curve.derivative(_SEEN), side.curve.point(_SEEN)[:, 1]
+        upward = (turned_right(tangents) / norms(tangents)[:, None])[:, 1]
+        if ((y < low + _NEAR * height) & (upward < -_FACING_FLOOR)).any():
+            touching.append(side.name)
+        elif upward.mean() > _FACING_UP and y.max() > high - _NEAR * height:
+            held.append(side.name)
+    if touching and held:
+        return f"sides = {_text(touching)}", f"sides = {_text(held)}"
+    sides = f"sides = {_text(touching)}\n" if touching else ""
+    return f'{sides}where = "y < {low + 0.3 * height:.6g}"', f'where = "y > {high - 0.1 * height:.6g}"'
 
 
 def _listed(names: Sequence[str]) -> str:
