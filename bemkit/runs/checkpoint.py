@@ -31,8 +31,8 @@ def run_to_file(
 ) -> Solution | AssemblySolution:
     """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
 
-    A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those of
-    a run without interruption, to the last bit, but for times.
+    A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
+    of a run without interruption, to the last bit, but for times.
 
     Parameters
     ----------
