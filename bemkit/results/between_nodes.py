@@ -11,7 +11,9 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.order import along_boundary
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
@@ -64,7 +66,12 @@ class BetweenNodes:
 
 
 def violations_between_nodes(
-    scene: Scene, mesh: BoundaryMesh, contact: ContactTable, displacement: FloatArray, traction_dofs: FloatArray
+    scene: Scene,
+    mesh: BoundaryMesh,
+    contact: ContactTable,
+    displacement: FloatArray,
+    traction_dofs: FloatArray,
+    motion: SlipHistory | None = None,
 ) -> BetweenNodes | None:
     """Measure the displacements and tractions of a result along its contact boundary, without running anything again.
 
@@ -76,6 +83,8 @@ def violations_between_nodes(
     contact : ContactTable
     displacement, traction_dofs : arrays [m], [Pa]
         As in `bemkit.results.solution.BoundaryFields`.
+    motion : SlipHistory, optional
+        Of the contact nodes, for laws that depend on slip or time; interpolated between them.
 
     Returns
     -------
@@ -96,7 +105,7 @@ def violations_between_nodes(
         measured = [
             _violations(
                 _values(scene, part.condition.obstacle, mesh, mesh.part(part.name), displacement, traction_dofs),
-                scene.laws[part.name],
+                _law_between(scene, mesh, part.name, contact, motion),
                 stress,
                 length,
             )
@@ -104,6 +113,23 @@ def violations_between_nodes(
             if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
         ]
     return BetweenNodes(*np.max([list(each.as_dict().values()) for each in measured], axis=0).tolist())
+
+
+def _law_between(
+    scene: Scene, mesh: BoundaryMesh, part: str, contact: ContactTable, motion: SlipHistory | None
+) -> FrictionLaw:
+    """Return the law of a contact part at the points of `_values`."""
+    elements, xi = mesh.part(part), _points_between(scene.discretisation.displacement_space(mesh).degree)
+    law = scene.laws[part].at(mesh.points(elements, xi).reshape(-1, 2))
+    if motion is None or not law.needs_history:
+        return law
+    ordered, begin = along_boundary(mesh, elements), np.zeros(mesh.n_elements)
+    begin[ordered] = np.cumsum(mesh.lengths[ordered]) - mesh.lengths[ordered]
+    s = (begin[elements, None] + 0.5 * mesh.lengths[elements, None] * (xi + 1.0)).ravel()
+    rows = np.flatnonzero(contact.rows(part))
+    rows = rows[np.argsort(contact.s[rows])]
+    slip, last = (np.interp(s, contact.s[rows], each[rows]) for each in (motion.slip, motion.last_slip))
+    return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last))
 
 
 class _Values(NamedTuple):
@@ -137,7 +163,7 @@ def _values(
 
 
 def _violations(values: _Values, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:
-    bound = law.at(values.points).bound(np.minimum(values.sigma_n, 0.0))
+    bound = law.bound(np.minimum(values.sigma_n, 0.0))
     # friction given across the gap is no sign of contact
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress

@@ -196,7 +196,8 @@ class Solution(SolvedBody):
         None without contact.
         """
         displacement, traction_dofs = self.boundary.displacement, self.boundary.traction_dofs
-        return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs)
+        motion = None if self.loading is None else self.loading.motion
+        return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs, motion)
 
     def with_warnings(self, warnings: tuple[str, ...]) -> Solution:
         """Return the same solution with other warnings, and with all that has been estimated of it."""

@@ -15,7 +15,7 @@ from bemkit.runs.steps import joined
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
-from bemkit.solvers.base import StepRecord
+from bemkit.solvers.base import Status, StepRecord
 
 
 @overload
@@ -31,8 +31,8 @@ def run_to_file(
 ) -> Solution | AssemblySolution:
     """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
 
-    A file that holds the beginning of the same history, because a run was killed or a step failed, is continued; the
-    numbers are those of a run without interruption, to the last bit, but for times.
+    A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
+    of a run without interruption, to the last bit, but for times.
 
     Parameters
     ----------
@@ -59,9 +59,8 @@ def run_to_file(
     """
     text, target = scene_to_toml(scene), check_result_target(path)
     known = read_result(target) if target.exists() else None
-    done = None
-    if known is not None and known.loading is not None and not known.loading.is_complete:
-        done = known if scene_to_toml(known.stated) == text else None
+    is_begun = known is not None and known.status is Status.UNFINISHED and scene_to_toml(known.stated) == text
+    done = known if is_begun else None
 
     def write(solution: Solution | AssemblySolution) -> None:
         write_result(target, solution)

@@ -43,6 +43,8 @@ def test_load_factors_are_steps_of_one_kind() -> None:
     factors = load_steps(replace(SCENE, load_factors=(0.5, 1.5)))
     steps = load_steps(replace(SCENE, steps=(bk.Step(1.0, load_factor="t / 2"), bk.Step(2.0, load_factor=1.5))))
     assert factors == steps
+    left = load_steps(replace(SCENE, steps=(bk.Step(0.5, load_factor="t"), bk.Step(2.0))))
+    assert left[1].parts == left[0].parts == load_steps(replace(SCENE, load_factors=(0.5,)))[0].parts
     (single,) = load_steps(replace(SCENE, load_factors=(2.0,)))
     assert single.steps == ()
 

@@ -14,7 +14,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
 
 _LAWS = ("law", "solver")
-_LOADS = ("parts", "body_forces", "load_factors", "contacts", "touching")
+_LOADS = ("parts", "body_forces", "load_factors", "steps", "contacts", "touching")
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,7 @@ def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
         ("law.friction_coefficient", True),
         ("parts.top-load.condition.y", True),
         ("load_factors[0]", True),
+        ("steps[1].load_factor", True),
         ("material.poisson_ratio", False),
         ("mesh.elements", False),
         ("bodies.upper.parts.pushed.condition.y", True),

@@ -56,6 +56,7 @@ def measured_contact(fields: Fields) -> Measured:
     solution, before, _, nodes, scales = fields
     table = solution.contact
     law = solution.scene.law_at(table.part, np.column_stack([table.x, table.y]))
+    law = law if solution.loading is None else law.at_slip(solution.loading.motion)
     motion = nodes.components(nodes.displacement)
     slip = motion[:, 1]
     if before is not None:
