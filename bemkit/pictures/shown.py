@@ -107,7 +107,10 @@ class Shown:
         """(2, 2) array [m]: least and largest x, least and largest y of bodies; of exteriors some of the plane."""
         low = np.min([body.mesh.nodes.min(axis=0) for body in self.bodies], axis=0)
         high = np.max([body.mesh.nodes.max(axis=0) for body in self.bodies], axis=0)
-        spare = 0.5 * float((high - low).max()) if any(body.mesh.is_exterior for body in self.bodies) else 0.0
+        endless = [body.mesh for body in self.bodies if body.mesh.is_exterior]
+        spare = (0.5 if endless else 0.0) * float((high - low).max()) * np.ones(2)
+        if any(mesh.surface is not None for mesh in endless):
+            spare *= np.abs(endless[0].normals[0])  # a strip of a surface ends where it is cut
         return np.stack([low - spare, high + spare], axis=1)
 
     @property

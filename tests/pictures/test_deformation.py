@@ -10,13 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 import bemkit as bk
+from bemkit.geometry.shapes import HalfPlaneBody
 from bemkit.geometry.spaces import dof_points
-from bemkit.pictures import draw_deformation, draw_scene, draw_zoom
+from bemkit.pictures import draw_deformation, draw_scene, draw_zoom, figures
 from bemkit.pictures.magnification import LINE, exaggeration, magnification
 from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.pictures.zoom import is_short
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
+from bemkit.scene.far_field import FarField
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.scene.unit_names import UnitNames
 
@@ -178,6 +180,23 @@ def test_bodies_without_an_end_fill_the_frame() -> None:
     path = axes.patches[0].get_path()
     assert axes.get_xlim()[1] > 1.5
     assert path.contains_point((1.4, 1.4))
+
+
+def test_a_half_plane_is_filled_below_its_surface() -> None:
+    scene = bk.Scene(
+        title="half-plane",
+        shape=HalfPlaneBody(-0.08, 0.08),
+        material=STEEL,
+        parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),
+        far=FarField(force_y=1e-3, x=0.0, turn=0.0),
+        mesh=bk.MeshOptions(elements=60),
+    )
+    solution = run(scene)
+    path = draw_deformation(solution).patches[0].get_path()
+    assert path.contains_point((0.05, -0.02))
+    assert not path.contains_point((0.05, 0.02))
+    with pytest.raises(bk.InputError, match="of a half-plane only the surface is known"):
+        figures(solution, ["von-mises"])
 
 
 def test_a_zoom_shows_a_short_zone_and_says_what_touches() -> None:
