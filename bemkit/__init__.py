@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from bemkit.operators.somigliana.stress import von_mises as von_mises
     from bemkit.operators.steklov_poincare.maps import CollocationMap as CollocationMap
     from bemkit.operators.steklov_poincare.maps import GalerkinMap as GalerkinMap
+    from bemkit.pictures.files import save_pictures as save_pictures
     from bemkit.plan import make_plan as make_plan
     from bemkit.reference.shipped import find_reference as find_reference
     from bemkit.results.assembly_solution import AssemblySolution as AssemblySolution
@@ -174,6 +175,7 @@ _HOME = {
     "operators.somigliana.fields": ("InteriorFields",),
     "operators.somigliana.stress": ("principal_stresses", "von_mises"),
     "operators.steklov_poincare.maps": ("CollocationMap", "GalerkinMap"),
+    "pictures.files": ("save_pictures",),
     "plan": ("make_plan",),
     "reference.shipped": ("find_reference",),
     "results.assembly_solution": ("AssemblySolution",),

@@ -9,7 +9,8 @@ from __future__ import annotations
 import sys
 import time
 import tracemalloc
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -28,12 +29,15 @@ if TYPE_CHECKING:
     from bemkit.results.solution import Solution
     from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
+    from bemkit.solvers.base import StepRecord
 
 NOT_CONVERGED, BAD_INPUT, INACCURATE, INTERRUPTED, PIPE_CLOSED = 1, 2, 3, 130, 141
 _ON_DEMAND = {
     "cite": "cite",
     "critical-friction": "critical_friction",
     "outline": "outline",
+    "plot": "plot",
+    "report": "report",
     "schema": "schema",
     "stability": "study",
     "study": "study",
@@ -111,6 +115,15 @@ def _degree(context: click.Context, parameter: click.Parameter, value: str | Non
     return int(value)
 
 
+def _pictures(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+    """Return the names of pictures, all of them known; None if none is named."""
+    if value is None:
+        return None
+    from bemkit.pictures.catalogue import find_picture
+
+    return tuple(find_picture(name.strip()).name for name in value.split(","))
+
+
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="bemkit")
 def commands() -> None:
@@ -124,6 +137,7 @@ def commands() -> None:
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--what", metavar="NAME,...", callback=_pictures, help="Which figures; bemkit plot --help lists them.")
 @click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
 @click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
 @click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
@@ -140,6 +154,7 @@ def run(
     json_file: str | None,
     csv_file: str | None,
     folder: str | None,
+    what: tuple[str, ...] | None,
     elements: int | None,
     accuracy: float | None,
     discretisation: str | None,
@@ -151,35 +166,39 @@ def run(
     quiet: bool,
 ) -> int:
     """Solve SCENE, a TOML file or the name of a shipped scene."""
-    from bemkit.atomic_files import reserved
-    from bemkit.scene.toml import load_scene, with_overrides
+    with ExitStack() as stack:
+        callback = stack.enter_context(_progress(quiet))  # shown before anything is loaded
+        from bemkit.atomic_files import reserved
+        from bemkit.scene.toml import load_scene, with_overrides
 
-    outputs = _outputs(json_file, csv_file, folder)
-    click.get_current_context().with_resource(reserved(outputs.check(_result_target(output, inside))))
-    chosen = with_overrides(
-        load_scene(scene),
-        elements=elements,
-        accuracy=accuracy,
-        discretisation=discretisation,
-        degree=degree,
-        solver=solver,
-        rho=rho,
-    )
-    is_live = not quiet and sys.stderr.isatty()
-    with concerning(scene):
-        if explain:
-            _start_tracing()
-        try:
-            solution = _solve(chosen, cascade=cascade, is_live=is_live, history_file=_history_file(chosen, output))
-        finally:
-            tracemalloc.stop()
-    begin = time.perf_counter()
-    if output is not None and _history_file(chosen, output) is None:
-        from bemkit.results.export import export_result
+        outputs = _outputs(json_file, csv_file, folder, what=what)
+        click.get_current_context().with_resource(reserved(outputs.check(_result_target(output, inside))))
+        chosen = with_overrides(
+            load_scene(scene),
+            elements=elements,
+            accuracy=accuracy,
+            discretisation=discretisation,
+            degree=degree,
+            solver=solver,
+            rho=rho,
+        )
+        with concerning(scene):
+            history_file = _history_file(chosen, output)
+            if explain:
+                _start_tracing()
+            try:
+                solution = _solve(chosen, cascade=cascade, callback=callback, history_file=history_file)
+            finally:
+                tracemalloc.stop()
+        if outputs.uses_stdout:
+            stack.close()  # no bar among the data
+        begin = time.perf_counter()
+        if output is not None and history_file is None:
+            from bemkit.results.export import export_result
 
-        export_result(output, solution, inside=inside)
-    outputs.write(solution)
-    output_seconds = time.perf_counter() - begin
+            export_result(output, solution, inside=inside)
+        outputs.write(solution)
+        output_seconds = time.perf_counter() - begin
     if not quiet and not outputs.uses_stdout:
         from bemkit.cli.console import print_summary
 
@@ -200,6 +219,7 @@ def run(
 )
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--what", metavar="NAME,...", callback=_pictures, help="Which figures; bemkit plot --help lists them.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
 @click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
 @click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
@@ -208,6 +228,7 @@ def show(
     table: str | None,
     json_file: str | None,
     folder: str | None,
+    what: tuple[str, ...] | None,
     shows_scene: bool,
     output: str | None,
     inside: int,
@@ -218,14 +239,15 @@ def show(
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact")
+    outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
     outputs.check(_result_target(output, inside))
-    solution = read_result(result)
-    if output is not None:
-        from bemkit.results.export import export_result
+    with _progress(not folder or outputs.uses_stdout):
+        solution = read_result(result)
+        if output is not None:
+            from bemkit.results.export import export_result
 
-        export_result(output, solution, inside=inside)
-    outputs.write(solution)
+            export_result(output, solution, inside=inside)
+        outputs.write(solution)
     if shows_scene:
         print_data(scene_to_toml(solution.stated))
     elif not (table or json_file or folder or output):
@@ -266,7 +288,7 @@ def plan(
     chosen = with_overrides(
         load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
     )
-    with concerning(scene):
+    with _progress(is_json), concerning(scene):
         made = _planned(chosen)
     if is_json:
         import json
@@ -295,9 +317,15 @@ def _planned(scene: Scene | Assembly) -> Plan:
 
 
 def _outputs(
-    json_file: str | None, csv_file: str | None, folder: str | None, table: str = "contact"
+    json_file: str | None,
+    csv_file: str | None,
+    folder: str | None,
+    table: str = "contact",
+    what: tuple[str, ...] | None = None,
 ) -> Outputs[Solution | AssemblySolution]:
     """Return where the command line sends a solution, besides a result file."""
+    if what is not None and folder is None:
+        raise click.UsageError("--what names figures: add --plot DIR")
     if json_file is csv_file is folder is None:
         return Outputs()
     from bemkit.results.tables import CSV_STARTS, to_csv, to_json
@@ -308,23 +336,16 @@ def _outputs(
     def as_csv(solution: Solution | AssemblySolution) -> str:
         return to_csv(solution, table)
 
-    def figures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
-        from bemkit.results.assembly_solution import AssemblySolution
-        from bemkit.results.history_figures import history_figures
+    def pictures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
+        from bemkit.pictures.catalogue import figures
 
-        if isinstance(solution, AssemblySolution):
-            from bemkit.results.assembly_figures import all_assembly_figures
-
-            return {**all_assembly_figures(solution), **history_figures(solution)}
-        from bemkit.results.figures import all_figures
-
-        return {**all_figures(solution), **history_figures(solution)}
+        return figures(solution, what)
 
     texts = (
         TextFile(json_file, "JSON file", JSON_START, as_json),
         TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
     )
-    return Outputs(texts, folder, figures, "deformation")
+    return Outputs(texts, folder, pictures, "deformation")
 
 
 def _result_target(output: str | None, inside: int) -> list[Path]:
@@ -343,16 +364,20 @@ def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
     return output if is_stepwise and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
 
 
+def _progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord], None] | None]:
+    """Return what shows a person how far a command is; nothing where nobody looks."""
+    if quiet or not sys.stderr.isatty():
+        return nullcontext()
+    from bemkit.cli.progress import live_progress
+
+    return live_progress(is_live=True)
+
+
 def _solve(
-    scene: Scene | Assembly, *, cascade: bool, is_live: bool, history_file: str | None
+    scene: Scene | Assembly, *, cascade: bool, callback: Callable[[StepRecord], None] | None, history_file: str | None
 ) -> Solution | AssemblySolution:
     from bemkit.runs.run import run as solve_scene
 
-    callback = None
-    if is_live:
-        from bemkit.cli.console import ConvergenceTable
-
-        callback = ConvergenceTable()
     if cascade:
         from bemkit.runs.nested import run_cascade
         from bemkit.scene.toml import single_body

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bemkit.atomic_files import reserved
+from bemkit.cli.progress import live_progress
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, make_folder, plain_table, stdout_console
 from bemkit.scene.toml import load_single_body, scene_to_toml, with_overrides
@@ -173,7 +174,7 @@ def solutions(scene: str, starts: int, elements: int | None, json_file: str | No
     summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
     summaries.check()
     chosen = with_overrides(load_single_body(scene), elements=elements)
-    with concerning(scene):
+    with live_progress(is_live=_is_live(quiet=False)), concerning(scene):
         found = run_probe(chosen, n_starts=starts)
     summaries.write(found)
     if json_file != STDOUT:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import time
 import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+
+PROGRESS = logging.getLogger("bemkit.progress")
+"""Where runs say what they are doing, at the level DEBUG."""
 
 _running: ContextVar[AssemblyTime | None] = ContextVar("assembly time", default=None)
 
@@ -26,6 +30,20 @@ class AssemblyTime:
     seconds: float = 0.0
     peak: int = 0
     peak_outside: int = 0
+
+
+def announce(what: str, seconds: float | None = None) -> None:
+    """Say what happens next, to those who listen to `PROGRESS`.
+
+    Parameters
+    ----------
+    what : str
+        A stage such as ``"solve"``; of a new mesh its size.
+    seconds : float, optional [s]
+        Time that a new mesh will take about.
+    """
+    if PROGRESS.isEnabledFor(logging.DEBUG):
+        PROGRESS.debug(what, extra={"seconds": seconds})
 
 
 def traced_peak() -> int:
@@ -56,6 +74,7 @@ def assembling() -> Iterator[None]:
         yield
         return
     spent.peak_outside = max(spent.peak_outside, traced_peak())
+    announce("assemble")
     begin = time.perf_counter()
     token = _running.set(None)  # a marked function that calls another one counts once
     try:
@@ -64,3 +83,4 @@ def assembling() -> Iterator[None]:
         _running.reset(token)
         spent.seconds += time.perf_counter() - begin
         spent.peak = max(spent.peak, traced_peak())
+        announce("condense")

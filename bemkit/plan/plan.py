@@ -14,11 +14,13 @@ from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.stopwatch import announce
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
@@ -194,7 +196,7 @@ class TooLargeError(InputError):
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(ShownInNotebooks):
     """What a scene takes on a mesh.
 
     Parameters
@@ -286,6 +288,11 @@ def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
     of_step = 2.0 / 3.0 * c**3 + _FLOPS_PER_NUMBER * (60.0 * c * c + u * u) if c else 0.0
     flops = needs.flops + _CONTACT_STEPS * n_steps * of_step
     return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * needs.evaluations + _SECONDS_PER_FLOP * flops
+
+
+def announce_plan(plan: Plan) -> None:
+    """Say how large the next mesh is and how long it will take, to those who listen."""
+    announce(f"{plan.sizes.n_elements} elements", plan.seconds)
 
 
 def check_memory(plan: Plan) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
@@ -61,7 +62,7 @@ class BodyResult(SolvedBody):
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblySolution:
+class AssemblySolution(ShownInNotebooks):
     """What `bemkit.run` returns of an assembly.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What all figures share: colours, frames without ornament, and panels along the boundary.
+"""What all figures share: colours, frames without ornament, and axes that ignore round-off.
 
 Drawn with matplotlib's object interface, so that no display and no global state is involved.
 """
@@ -15,6 +15,11 @@ if TYPE_CHECKING:
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 GREY = "#9A9A9A"
 
+_NOISE = 1e-6
+"""Variation, relative to the scale of a quantity, that is drawn as none: round-off may grow to 1e-10."""
+_FLAT = 0.05
+"""Half the range, in scales, of an axis along which nothing varies."""
+
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure whose parts keep clear of each other; sizes in inches."""
@@ -23,24 +28,44 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def panel_above_strip(title: str, abscissa: str, *, parse_math: bool = True) -> tuple[Figure, Axes, Axes]:
-    """Return a figure with a large panel above a strip of the same abscissa, which shows what lies along it."""
-    figure = new_figure(7.0, 4.6)
-    axes, strip = figure.subplots(2, 1, sharex=True, height_ratios=[9, 1])
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
-    axes.tick_params(labelbottom=False)
-    axes.set_title(title, parse_math=False, fontsize=11)
-    strip.set_ylim(0.0, 1.0)
-    strip.set_yticks([])
-    strip.set_xlabel(abscissa, parse_math=parse_math)
-    return figure, axes, strip
+def axes_or_new(axes: Axes | None, width: float = 7.0, height: float = 4.6) -> Axes:
+    """Return the axes that are given, or those of a new figure; sizes in inches."""
+    return new_figure(width, height).add_subplot() if axes is None else axes
 
 
-def label_values(axes: Axes, name: str) -> None:
-    """Name what is drawn, with a legend and a line at zero."""
+def label_values(axes: Axes, name: str, scale: float = 0.0) -> None:
+    """Name what is drawn, with a legend and a line at zero; see `ignore_round_off`."""
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     axes.set_ylabel(name)
+    ignore_round_off(axes, scale)
     axes.legend(frameon=False)
+
+
+def ignore_round_off(axes: Axes, scale: float) -> None:
+    """Widen the range of values where they do not vary but by round-off, so that these lines are flat.
+
+    Parameters
+    ----------
+    axes : Axes
+    scale : float
+        Size of the quantity where it matters: the largest value of the whole result, say.
+    """
+    low, high = axes.get_ylim()
+    if high - low < _NOISE * scale:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - _FLAT * scale, middle + _FLAT * scale)
+    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True, useOffset=False)
+
+
+def legend_below(axes: Axes, n_columns: int = 3) -> None:
+    """Put the legend below the axes, clear of the label of the abscissa."""
+    from matplotlib.transforms import ScaledTranslation
+
+    scale = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
+    below = axes.transAxes + ScaledTranslation(0.0, -0.5, scale)
+    axes.legend(
+        loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below, ncols=n_columns, frameon=False, fontsize=9
+    )
 
 
 def show_grid(axes: Axes) -> None:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 STDOUT = "-"
 JSON_START = "{"
+FIGURE_FORMATS = {".png": "\x89PNG", ".svg": "<?xml", ".pdf": "%PDF"}
+"""Formats of figures by the ending of the file, with what such files begin."""
 
 Content = TypeVar("Content")
 
@@ -139,12 +141,7 @@ class Outputs(Generic[Content]):
             shown = ", ".join([*map(str, others), *places])
             raise OutputFileError(f"two outputs go to the same place ({shown}): give each its own")
         if self.folder is not None:
-            folder = Path(self.folder)
-            if find_spec("matplotlib") is None:
-                raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
-            if folder.exists() and not folder.is_dir():
-                raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
-            _check_figure(folder / f"{self.figure}.png" if folder.exists() else folder)
+            check_figure_folder(Path(self.folder), self.figure)
         return targets
 
     def write(self, content: Content) -> None:
@@ -171,12 +168,43 @@ def write_figures(figures: Mapping[str, Figure], folder: Path, dots_per_inch: in
         If a file cannot be written, or a file of another kind stands in the way.
     """
     make_folder(folder)
-    targets = [_check_figure(folder / f"{name}.png") for name in figures]
-    for target, figure in zip(targets, figures.values(), strict=True):
-        with replacing(target) as temporary:
-            # without the time and version stamps the same picture is the same file
-            figure.savefig(temporary, dpi=dots_per_inch, format="png", metadata={"Software": None})
-    return tuple(targets)
+    targets = [check_figure(folder / f"{name}.png") for name in figures]
+    return tuple(
+        write_figure(target, figure, dots_per_inch) for target, figure in zip(targets, figures.values(), strict=True)
+    )
+
+
+def write_figure(path: Path, figure: Figure, dots_per_inch: int = 150) -> Path:
+    """Write a figure in the format that the ending names, all or nothing; see `FIGURE_FORMATS`."""
+    target, ending = check_figure(path), path.suffix.lower()
+    with replacing(target) as temporary:
+        # without the time and version stamps the same picture is the same file
+        stamp = {".png": "Software", ".svg": "Date", ".pdf": "CreationDate"}[ending]
+        figure.savefig(
+            temporary,
+            dpi=dots_per_inch,
+            format=ending[1:],
+            metadata={stamp: None},
+            bbox_inches="tight",
+            pad_inches=0.08,
+        )
+    return target
+
+
+def check_figure_folder(folder: Path | None, figure: str = "figure") -> None:
+    """Find out, before any work is done, whether figures can be drawn and written into a folder, by the name of one.
+
+    Raises
+    ------
+    OutputFileError
+    """
+    if find_spec("matplotlib") is None:
+        raise OutputFileError('figures need matplotlib: pip install "bemkit[plot]"')
+    if folder is None:
+        return
+    if folder.exists() and not folder.is_dir():
+        raise OutputFileError(f"{folder}: exists and is not a folder: choose another name for the figures")
+    check_figure(folder / f"{figure}.png" if folder.exists() else folder.with_suffix(".png"))
 
 
 def make_folder(folder: Path) -> None:
@@ -188,8 +216,10 @@ def make_folder(folder: Path) -> None:
         raise OutputFileError(f"{folder}: {reason}: give the name of a folder") from error
 
 
-def _check_figure(path: Path) -> Path:
-    return check_target(path, "figure", lambda existing: begins_with(existing, "\x89PNG"))
+def check_figure(path: Path) -> Path:
+    """Find out whether a figure can be written; return the path with symbolic links resolved."""
+    start = FIGURE_FORMATS[path.suffix.lower()]
+    return check_target(path, "figure", lambda existing: begins_with(existing, start))
 
 
 _CLOSED = io.TextIOWrapper(io.BytesIO())

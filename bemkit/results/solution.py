@@ -17,6 +17,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.certificate import Certificate
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(SolvedBody):
+class Solution(ShownInNotebooks, SolvedBody):
     """What `bemkit.run` returns and a result file holds.
 
     Parameters

@@ -20,7 +20,7 @@ from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
-from bemkit.plan import Plan, check_memory
+from bemkit.plan import Plan, announce_plan, check_memory
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
@@ -117,6 +117,7 @@ def solved_assemblies(
         raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
     plan = plan_assembly(steps)
     check_memory(plan)
+    announce_plan(plan)
     clock = clock.closed(Stage.MESH)
     with blas_threads_for(max(body.space.n_dofs for body in steps[0].bodies)):
         with assembly_time() as assembly:

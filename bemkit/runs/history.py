@@ -22,7 +22,7 @@ from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_held_friction
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
-from bemkit.plan import Plan, check_elements, check_memory, plan_steps
+from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.warnings import find_warnings
@@ -102,6 +102,7 @@ def prepared_and_planned(
     prepared = prepare_steps(steps, mesh)
     plan = plan_steps(prepared)
     check_memory(plan)
+    announce_plan(plan)
     return prepared, plan, clock.closed(Stage.MESH)
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from bemkit.operators.stopwatch import AssemblyTime, traced_peak
+from bemkit.operators.stopwatch import AssemblyTime, announce, traced_peak
 
 
 class Stage(enum.Enum):
@@ -18,6 +18,10 @@ class Stage(enum.Enum):
     CONDENSE = "condense"
     SOLVE = "solve"
     RECOVER = "recover"
+
+
+_FOLLOWING = {Stage.MESH: Stage.ASSEMBLE, Stage.CONDENSE: Stage.SOLVE, Stage.SOLVE: Stage.RECOVER}
+"""What comes after the end of a stage."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,14 @@ class StageClock:
     def start(cls) -> StageClock:
         """Return a clock that has measured nothing yet."""
         traced_peak()
+        announce(Stage.MESH.value)
         return cls(dict.fromkeys(Stage, 0.0), dict.fromkeys(Stage, 0), time.perf_counter())
 
     def closed(self, stage: Stage) -> StageClock:
         """Charge what has happened since the last call to a stage."""
         now = time.perf_counter()
+        if stage in _FOLLOWING:
+            announce(_FOLLOWING[stage].value)
         seconds = {**self.seconds, stage: self.seconds[stage] + now - self.last}
         return StageClock(seconds, {**self.peaks, stage: max(self.peaks[stage], traced_peak())}, now)
 

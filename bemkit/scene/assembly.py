@@ -12,6 +12,7 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
 from bemkit.formulas import closest
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Free, Part
@@ -130,7 +131,7 @@ def _check_reach(reach: float | None, name: str) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assembly:
+class Assembly(ShownInNotebooks):
     """Several elastic bodies with their contacts, supports and loads: everything that determines the solution.
 
     Parameters

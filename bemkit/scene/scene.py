@@ -23,6 +23,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
+from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
@@ -45,7 +46,7 @@ class NoContactError(InputError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class Scene(ShownInNotebooks):
     """One body with its supports, loads and contacts: everything that determines the solution.
 
     Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity alone.

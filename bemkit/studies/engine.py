@@ -146,9 +146,17 @@ def compute_with_progress(
         As `compute` does, also if the cluster cannot be reached.
     """
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    counts = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    times = (TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
     with ExitStack() as stack:
         executor: Executor | None = None
         if cluster is not None:
@@ -157,7 +165,7 @@ def compute_with_progress(
             # spawned processes do not inherit threads that hold locks
             executor = ProcessPoolExecutor(processes, get_context("spawn"), initializer=_prepare_process)
             stack.callback(executor.shutdown, cancel_futures=True)  # what has not begun is left out
-        bar = Progress(*columns, console=Console(stderr=True), transient=True, disable=not is_live)
+        bar = Progress(*counts, *times, console=Console(stderr=True), transient=True, disable=not is_live)
         row = stack.enter_context(bar).add_task(name, total=len(tasks))
         for record in compute(
             tasks,

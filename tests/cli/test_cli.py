@@ -372,7 +372,7 @@ except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
 names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.linear.multigrid", "operators.cache",
-    "results.interior", "results.figures", "results.result_file", "hdf5", "cli.console", "runs.adaptive")
+    "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console", "runs.adaptive")
 wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)
 from importlib.util import find_spec

@@ -18,7 +18,7 @@ from bemkit.model.contact_model import build_model
 from bemkit.model.free_motion import FreeBodyError
 from bemkit.model.prepared import prepare
 from bemkit.model.untouched_body import certified, untouched_state
-from bemkit.results.figures import save_figures
+from bemkit.pictures import draw_boundary_traction, save_pictures
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.tables import to_csv, to_json
@@ -167,12 +167,11 @@ def test_scene_files_say_nothing_of_friction_and_drivers() -> None:
 
 
 def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Path) -> None:
-    paths = save_figures(bent, tmp_path / "figures")
-    assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png"]
-    from bemkit.results.figures import draw_boundary_traction
-
-    axes, strip = draw_boundary_traction(bent, units=bk.UnitNames("mm", "MPa")).axes
-    drawn = {patch.get_label(): patch.get_data().values for patch in axes.patches}
+    paths = save_pictures(bent, tmp_path / "figures")
+    assert [path.name for path in paths] == ["deformation.png", "boundary-traction.png", "von-mises.png"]
+    axes = draw_boundary_traction(bent, units=bk.UnitNames("mm", "MPa"))
+    (strip,) = axes.child_axes
+    drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
     largest = np.abs(bent.boundary.traction).max()
     assert drawn["normal $t_n$"].max() == pytest.approx(largest, rel=1e-12)
     assert np.abs(drawn["tangential $t_t$"]).max() < 1e-9 * largest
@@ -188,9 +187,7 @@ def test_holes_follow_the_outer_boundary_in_the_figure() -> None:
         shape=bk.Ring(1.0, 2.0),
     )
     solution = bk.run(scene)
-    from bemkit.results.figures import draw_boundary_traction
-
-    axes, _ = draw_boundary_traction(solution).axes
+    axes = draw_boundary_traction(solution)
     places = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2 and line.get_xdata()[0] > 0]
     assert places == pytest.approx([solution.mesh.lengths[solution.mesh.loops[0]].sum()], rel=1e-12)
 

@@ -13,8 +13,8 @@ import pytest
 import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.hdf5 import ResultFileError
+from bemkit.pictures import figures as pictures_of
 from bemkit.plan.assembly_plan import make_assembly_plan
-from bemkit.results.assembly_figures import all_assembly_figures
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_csv, to_json
 from bemkit.scene.toml import with_overrides
@@ -91,13 +91,13 @@ def test_tables_name_the_body(solution: AssemblySolution) -> None:
 
 
 def test_pictures_show_all_bodies_and_each_contact_once(solution: AssemblySolution, arch: AssemblySolution) -> None:
-    figures = all_assembly_figures(solution)
-    assert list(figures) == ["deformation", "contacts", "contact-displacement", "contact-traction", "contact-status"]
+    figures = pictures_of(solution)
+    assert list(figures) == ["deformation", "zoom", "contacts", "displacement", "traction", "status", "von-mises"]
     (axes,) = figures["contacts"].axes
     drawn = sum(len(collection.get_offsets()) for collection in axes.collections if hasattr(collection, "get_sizes"))
     assert drawn == solution.contact.n_contact
-    many = all_assembly_figures(arch)
-    assert list(many) == ["deformation", "contacts"]  # too many contacts for figures of each
+    many = pictures_of(arch)
+    assert list(many) == ["deformation", "contacts", "von-mises"]  # too many contacts for figures of each
     assert len(many["deformation"].axes[0].patches) >= len(arch.bodies)
 
 
@@ -124,7 +124,7 @@ def test_the_command_line_takes_assemblies(tmp_path: Path, monkeypatch: pytest.M
     shown = capsys.readouterr().out
     assert "2, with 96 elements" in " ".join(shown.split())
     assert json.loads(Path("r.json").read_text())["converged"]
-    assert sorted(path.name for path in Path("p").iterdir())[:2] == ["contact-displacement.png", "contact-status.png"]
+    assert sorted(path.name for path in Path("p").iterdir())[:2] == ["contacts.png", "deformation.png"]
     assert call("show", "r.h5", "--csv", "boundary") == 0
     assert capsys.readouterr().out.startswith("body,element")
     assert call("show", "r.h5", "--scene") == 0

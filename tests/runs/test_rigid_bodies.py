@@ -13,7 +13,7 @@ from bemkit.cli.console import print_summary
 from bemkit.model.assembled.contacts import OverlapError
 from bemkit.model.assembled.model import build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly
-from bemkit.results.assembly_figures import all_assembly_figures
+from bemkit.pictures import draw_deformation
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_json
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
@@ -421,9 +421,10 @@ def test_every_output_tells_of_rigid_bodies(tmp_path: Path, capsys: pytest.Captu
     assert items["rigid bodies"] == "1 in 1 contacts, 2 motions driven by loads"
     print_summary(solution)
     assert "moved by (0, " in " ".join(capsys.readouterr().out.split())
-    figure = all_assembly_figures(solution)["deformation"]
-    assert "rigid body" in [text.get_text() for text in figure.legends[0].get_texts()]
-    before, after = figure.axes[0].patches[-2:]
-    factor = float(figure.legends[0].get_texts()[1].get_text().split("\u00d7 ")[1])
+    axes = draw_deformation(solution)
+    legend = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "rigid body" in legend
+    before, after = axes.patches[-2:]
+    factor = float(legend[1].split("\u00d7 ")[1])
     moved = after.get_path().vertices[0] - before.get_path().vertices[0]
     assert moved[1] == pytest.approx(factor * solution.rigid["punch"].y, rel=1e-6)

@@ -103,9 +103,9 @@ def test_load_factors_in_files() -> None:
 
 
 def test_plots_show_the_bound_of_each_part() -> None:
-    from bemkit.results.figures import draw_contact_traction
+    from bemkit.pictures import draw_contact_traction
 
     scene = block(law=bk.Coulomb(bk.Expression("0.2 + x")))
-    figure = draw_contact_traction(bk.run(scene), "floor")
-    labels = [line.get_label() for line in figure.axes[0].lines]
+    axes = draw_contact_traction(bk.run(scene), "floor")
+    labels = [line.get_label() for line in axes.lines]
     assert "friction bound" in labels

@@ -9,8 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 
 import bemkit as bk
-from bemkit.results.figures import draw_deformation
-from bemkit.results.obstacle_drawing import draw_obstacles, draw_rigid_bodies, outline_of
+from bemkit.pictures import draw_deformation
+from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, outline_of
+from bemkit.pictures.shown import Shown, shown
 from bemkit.results.rigid_result import RigidResult
 
 FRAME = np.array([[-3.0, 3.0], [-2.0, 2.0]])
@@ -27,6 +28,27 @@ OUTLINES = [
 """With the accuracy of their outlines."""
 
 
+def block(obstacle: bk.Obstacle) -> bk.Scene:
+    """A square that may touch an obstacle at its lower side."""
+    return bk.Scene(
+        title="block",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1.0, 0.3),
+        parts=(
+            bk.Part("top", bk.PrescribedDisplacement(y=-0.01), ("top",)),
+            bk.Part("left", bk.Roller(), ("left",)),
+            bk.Part("bottom", bk.Contact(obstacle), ("bottom",)),
+        ),
+        mesh=bk.MeshOptions(elements=40),
+        discretisation=bk.QuadraticGalerkin(),
+    )
+
+
+def with_rigid(body: bk.RigidBody, result: RigidResult) -> Shown:
+    """A picture of a block and a rigid body."""
+    return replace(shown(block(bk.HalfPlane())), rigid=((body, result),))
+
+
 @pytest.mark.parametrize(("obstacle", "accuracy"), OUTLINES)
 def test_outlines_lie_on_the_surface(obstacle: bk.Obstacle, accuracy: float) -> None:
     (loop,) = outline_of(obstacle, FRAME)
@@ -36,12 +58,22 @@ def test_outlines_lie_on_the_surface(obstacle: bk.Obstacle, accuracy: float) -> 
 
 
 @pytest.mark.parametrize("obstacle", [bk.Gap(0.1), bk.SignedDistance(bk.Expression("y - sqrt(x)"))])
-def test_what_has_no_outline_in_the_frame_is_left_out(obstacle: bk.Obstacle) -> None:
+def test_what_has_no_outline_in_the_frame_is_told(obstacle: bk.Obstacle) -> None:
     assert outline_of(obstacle, FRAME) == []
+
+
+def test_obstacles_known_by_their_gap_are_drawn_where_they_face_the_body() -> None:
+    """A slope below a block that is in sight of half of its side."""
+    gap = bk.Gap(bk.Expression("where(x < 0.5, 0.1 * x, 100)"), direction=(0.0, -1.0))
     axes = Figure().add_subplot()
-    axes.set_xlim(-1.0, 1.0)
-    draw_obstacles(axes, [obstacle, None])
-    assert not axes.patches
+    draw_obstacles(axes, shown(block(gap)))
+    (band,) = axes.patches
+    surface = axes.lines[0].get_xydata()
+    np.testing.assert_allclose(surface[:, 1], -0.1 * surface[:, 0], atol=1e-12)
+    assert surface[:, 0].max() < 0.5
+    assert surface[:, 0].min() == 0.0
+    assert band.get_path().contains_point((0.2, -0.03))
+    assert not band.get_path().contains_point((0.2, -0.01))
 
 
 @pytest.mark.parametrize("obstacle", [obstacle for obstacle, _ in OUTLINES])
@@ -49,9 +81,9 @@ def test_obstacles_are_drawn_and_filled_on_their_side(obstacle: bk.Obstacle) -> 
     axes = Figure().add_subplot()
     axes.set_xlim(*FRAME[0])
     axes.set_ylim(*FRAME[1])
-    draw_obstacles(axes, [obstacle, obstacle])
-    first, second = axes.patches
-    assert (first.get_label(), second.get_label()) == ("obstacle", "_nolegend_") or second.get_label() != "obstacle"
+    draw_obstacles(axes, shown(block(obstacle)))
+    (first,) = axes.patches
+    assert first.get_label() == "obstacle"
     assert first.get_fill() is not isinstance(obstacle, bk.Cavity)
     assert (axes.get_xlim(), axes.get_ylim()) == ((-3.0, 3.0), (-2.0, 2.0))
     if first.get_fill():
@@ -63,7 +95,7 @@ def test_obstacles_are_drawn_and_filled_on_their_side(obstacle: bk.Obstacle) -> 
 
 def test_a_clockwise_spline_is_empty() -> None:
     axes = Figure().add_subplot()
-    draw_obstacles(axes, [bk.SplineObstacle(ROUND[::-1])])
+    draw_obstacles(axes, shown(block(bk.SplineObstacle(ROUND[::-1]))))
     assert not axes.patches[0].get_fill()
 
 
@@ -73,19 +105,19 @@ def test_rigid_bodies_are_drawn_before_and_after_and_widen_the_frame() -> None:
     axes.set_ylim(0.0, 1.0)
     body = bk.RigidBody(name="disc", obstacle=bk.Circle((0.5, 1.2), 0.2), centre=(0.5, 1.2))
     result = RigidResult("disc", 0.0, 0.0, 0.0, 0.01, -0.02, 0.0)
-    draw_rigid_bodies(axes, [(body, result)], 10.0)
+    draw_rigid_bodies(axes, with_rigid(body, result), 10.0)
     before, after = (patch.get_path().vertices for patch in axes.patches)
     np.testing.assert_allclose(after - before, np.broadcast_to([0.1, -0.2], after.shape), atol=1e-12)
     assert axes.get_xlim() == (0.0, 1.0)
     assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
-    draw_rigid_bodies(axes, [(replace(body, obstacle=bk.HalfPlane((0.0, 3.0))), result)], 10.0)
+    draw_rigid_bodies(axes, with_rigid(replace(body, obstacle=bk.HalfPlane((0.0, 3.0))), result), 10.0)
     assert axes.get_ylim() == pytest.approx((0.0, 1.4), rel=1e-3)
 
 
 def test_a_turn_is_drawn_about_the_centre() -> None:
     axes = Figure().add_subplot()
     body = bk.RigidBody(name="bar", obstacle=bk.PolygonalObstacle(((0.0, 0.0), (2.0, 0.0), (2.0, 0.1))))
-    draw_rigid_bodies(axes, [(body, RigidResult("bar", 0.0, 0.0, 0.0, 0.0, 0.0, 0.01))], 5.0)
+    draw_rigid_bodies(axes, with_rigid(body, RigidResult("bar", 0.0, 0.0, 0.0, 0.0, 0.0, 0.01)), 5.0)
     np.testing.assert_allclose(axes.patches[1].get_path().vertices[1], [2.0, 0.1], atol=1e-12)
 
 
@@ -100,26 +132,10 @@ def test_a_turn_is_drawn_about_the_centre() -> None:
 def test_scenes_of_one_body_take_and_draw_them(obstacle: bk.Obstacle) -> None:
     """Instead of a circle, whose force they have to their accuracy."""
 
-    def pressed(obstacle: bk.Obstacle) -> bk.Solution:
-        return bk.run(
-            bk.Scene(
-                title="Pressed",
-                shape=bk.Rectangle(1.0, 1.0),
-                material=bk.Material(1.0, 0.3),
-                parts=(
-                    bk.Part("top", bk.PrescribedDisplacement(y=-0.01), ("top",)),
-                    bk.Part("left", bk.Roller(), ("left",)),
-                    bk.Part("bottom", bk.Contact(obstacle), ("bottom",)),
-                ),
-                mesh=bk.MeshOptions(elements=40),
-                discretisation=bk.QuadraticGalerkin(),
-            )
-        )
-
-    solution = pressed(obstacle)
+    solution = bk.run(block(obstacle))
     assert solution.is_converged
     # 63 corners reach within 1.2e-3 of the circle, an eighth of the motion
     accuracy = 0.2 if isinstance(obstacle, bk.PolygonalObstacle) else 1e-4
-    assert solution.force_normal == pytest.approx(pressed(bk.Circle((0.5, -1.0), 1.0)).force_normal, rel=accuracy)
-    figure = draw_deformation(solution)
-    assert "obstacle" in [text.get_text() for text in figure.legends[0].get_texts()]
+    assert solution.force_normal == pytest.approx(bk.run(block(bk.Circle((0.5, -1.0), 1.0))).force_normal, rel=accuracy)
+    axes = draw_deformation(solution)
+    assert "obstacle" in [text.get_text() for text in axes.get_legend().get_texts()]

@@ -2,45 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
-from bemkit.contact.obstacle import Cavity, Circle, HalfPlane
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle, measure_contact
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.contact.signed_distance import SignedDistance
 from bemkit.contact.spline import SplineObstacle
 from bemkit.errors import InputError
 from bemkit.formulas import evaluate_field
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.order import along_boundary
+from bemkit.pictures.shown import Shown
 from bemkit.results.drawing import GREY
-from bemkit.results.rigid_result import RigidResult
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.conditions import Contact
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_EDGE = "#555555"
+_EDGE, _HATCH = "#555555", "#888888"
 _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
 _EMPTY: dict[str, Any] = {"fill": False, "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
-_POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID = 181, 12, 301
+_POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
+_BAND = 0.04
+"""Thickness of the drawn part of an obstacle known by its gap alone, in sizes of the picture."""
 
 
-def draw_obstacles(axes: Axes, obstacles: Sequence[object]) -> None:
-    """Draw the fixed obstacles whose shape is known, within the frame that the body has set."""
+def draw_obstacles(axes: Axes, shown: Shown) -> None:
+    """Draw the fixed obstacles of all contact parts, within the frame of the axes.
+
+    One that is known by its gap alone is drawn where it faces the body: at the distance of the gap from each point.
+    """
     frame = _frame(axes)
-    is_labelled = False
-    for obstacle in obstacles:
-        loops = outline_of(obstacle, frame)
-        if loops:
-            _draw(axes, loops, _EMPTY if _is_hollow(obstacle) else _FILLED, None if is_labelled else "obstacle")
-            is_labelled = True
+    drawn: list[object] = []
+    for body in shown.bodies:
+        for part, elements in body.parts:
+            if not isinstance(part.condition, Contact):
+                continue
+            obstacle, label = part.condition.obstacle, None if drawn else "obstacle"
+            if loops := outline_of(obstacle, frame):
+                if not any(obstacle is other for other in drawn):
+                    _draw(axes, loops, _EMPTY if _is_hollow(obstacle) else _FILLED, label)
+                drawn.append(obstacle)
+            elif bands := facing_bands(obstacle, body.mesh, elements, _BAND * shown.size):
+                _draw(axes, bands, _FILLED | {"edgecolor": _HATCH, "linewidth": 0.0}, label)
+                for band in bands:
+                    axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
+                drawn.append(obstacle)
     _set_frame(axes, frame)
 
 
-def draw_rigid_bodies(axes: Axes, bodies: Iterable[tuple[RigidBody, RigidResult]], factor: float) -> None:
+def facing_bands(obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, thickness: float) -> list[FloatArray]:
+    """Return bands (2 n, 2) [m] along an obstacle where it faces some elements.
+
+    The first half of each lies on the obstacle, at the gap from points of the elements along the direction of contact;
+    the second half, traversed backwards, behind it. There are none where the gap is infinite.
+    """
+    elements = along_boundary(mesh, elements)
+    xi = np.linspace(-1.0, 1.0, _POINTS_OF_ELEMENT)
+    points = mesh.points(elements, xi).reshape(-1, 2)
+    gap, directions = measure_contact(obstacle, points, mesh.normals_at(elements, xi).reshape(-1, 2))
+    is_seen = np.isfinite(gap) & (np.abs(gap) < mesh.diameter)
+    surface = points + np.where(is_seen, gap, 0.0)[:, None] * directions
+    is_end = ~is_seen | np.append(np.hypot(*(points[1:] - points[:-1]).T) > mesh.lengths.max(), True)
+    bands = []
+    for run in np.split(np.arange(len(points)), np.flatnonzero(is_end) + 1):
+        run = run[is_seen[run]]
+        if run.size > 1:
+            bands.append(np.concatenate([surface[run], (surface[run] + thickness * directions[run])[::-1]]))
+    return bands
+
+
+def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
     """Draw rigid bodies whose shape is known, before they move and after it, their motions times a factor.
 
     The frame grows to hold them, by half its size at most.
@@ -49,7 +85,7 @@ def draw_rigid_bodies(axes: Axes, bodies: Iterable[tuple[RigidBody, RigidResult]
     farthest = 0.5 * float(np.ptp(frame, axis=1).max())
     widest = np.stack([frame[:, 0] - farthest, frame[:, 1] + farthest], axis=1)
     is_labelled = False
-    for body, result in bodies:
+    for body, result in shown.rigid:
         loops = outline_of(body.obstacle, widest)
         if not loops:
             continue

@@ -1,0 +1,57 @@
+"""The command ``bemkit plot``; what it needs is loaded behind its progress bar."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from bemkit.cli.progress import live_progress
+
+
+def picture_names(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+    """Return the names of pictures in an option, None if it is not given."""
+    return None if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
+
+
+class _PlotCommand(click.Command):
+    """Lists all pictures below its options."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a line for each picture."""
+        from bemkit.pictures.catalogue import PICTURES
+        from bemkit.pictures.files import ANIMATION
+
+        rows = [(picture.name, picture.shows) for picture in PICTURES.values()]
+        with formatter.section("Pictures"):
+            formatter.write_dl([*rows, (ANIMATION, "the load steps as a moving picture: .gif, or .mp4 with ffmpeg")])
+
+
+@click.command(cls=_PlotCommand)
+@click.argument("source")
+@click.option("--what", metavar="NAME,...", callback=picture_names, help="The pictures, from the list below.")
+@click.option("-o", "--output", "place", default="figures", metavar="PLACE", help="Folder, or file for one picture.")
+@click.option("--dpi", "dots_per_inch", type=click.IntRange(20, 1200), default=150, help="Dots per inch (150).")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the names of the files.")
+def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: int, quiet: bool) -> None:
+    """Draw SOURCE: a result file, or a scene, which is solved first.
+
+    Without --what the pictures that suit the result are drawn. The place is a folder, or a file ending in .png, .svg
+    or .pdf for one picture, in .gif or .mp4 for the animation.
+    """
+    with live_progress(is_live=not quiet and sys.stderr.isatty()) as callback:
+        from bemkit.atomic_files import reserved
+        from bemkit.cli.sources import solved, solved_steps
+        from bemkit.pictures.files import ANIMATION, check_place, save_pictures
+
+        if what is None and Path(place).suffix in (".gif", ".mp4"):
+            what = (ANIMATION,)
+        click.get_current_context().with_resource(reserved(check_place(place, what)))
+        moves = what is not None and ANIMATION in what
+        steps = solved_steps(source, callback) if moves else [solved(source, callback)]
+        paths = save_pictures(steps, place, what, dots_per_inch=dots_per_inch)
+    for path in paths if not quiet else ():
+        print(path)
+    if not steps[-1].is_converged:
+        print(f"bemkit: {steps[-1].status.name.lower()}: {steps[-1].message}", file=sys.stderr)

@@ -1,0 +1,103 @@
+"""What a person sees while a command computes: stage, mesh and step, and a bar with the time left."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeElapsedColumn
+from rich.progress_bar import ProgressBar
+from rich.text import Text
+
+from bemkit.operators.stopwatch import PROGRESS
+
+if TYPE_CHECKING:
+    from bemkit.solvers.base import StepRecord
+
+_ALMOST = 0.98
+"""Share of the bar at which it waits when a run takes longer than planned."""
+
+
+@contextmanager
+def live_progress(*, is_live: bool) -> Iterator[Callable[[StepRecord], None] | None]:
+    """Show on standard error what is going on inside a ``with`` statement.
+
+    Parameters
+    ----------
+    is_live : bool
+        Whether a person looks at a terminal; if not, nothing is shown.
+
+    Yields
+    ------
+    callable or None
+        What to hand to a run as its callback: it prints a line for each step of the solver above the bar.
+    """
+    if not is_live:
+        yield None
+        return
+    console = Console(stderr=True, highlight=False)
+    columns = TextColumn("{task.description}"), _PlannedBar(bar_width=24), TimeElapsedColumn(), _TimeLeft()
+    # what goes to standard output stays there
+    with Progress(*columns, console=console, transient=True, redirect_stdout=False, redirect_stderr=False) as bar:
+        display = _Display(bar, console)
+        level = PROGRESS.level
+        PROGRESS.addHandler(display)
+        PROGRESS.setLevel(logging.DEBUG)
+        try:
+            yield display.step
+        finally:
+            PROGRESS.removeHandler(display)
+            PROGRESS.setLevel(level)
+
+
+class _Display(logging.Handler):
+    """Shows what `bemkit.operators.stopwatch.announce` announces."""
+
+    def __init__(self, bar: Progress, console: Console) -> None:
+        super().__init__()
+        self._bar, self._console = bar, console
+        self._row = bar.add_task("begin", total=None)
+        self._table: Callable[[StepRecord], None] | None = None
+        self._mesh, self._n_meshes = "", 0
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show a stage; a plan tells the elements of the next mesh and the time for it."""
+        seconds: float | None = getattr(record, "seconds", None)
+        if seconds is None:
+            self._bar.update(self._row, description=f"{self._mesh}{record.getMessage()}")
+            return
+        self._n_meshes += 1
+        number = f"mesh {self._n_meshes}, " if self._n_meshes > 1 else ""
+        self._mesh = f"{number}{record.getMessage()}: "
+        self._bar.reset(self._row, total=max(seconds, 1e-3), description=f"{self._mesh}assemble")
+
+    def step(self, record: StepRecord) -> None:
+        """Print a line for a step of the solver."""
+        if self._table is None:
+            from bemkit.cli.console import ConvergenceTable  # loads what a run loads anyway
+
+            self._table = ConvergenceTable(self._console)
+        self._bar.update(self._row, description=f"{self._mesh}solve, step {record.step}", refresh=True)
+        self._table(record)
+
+
+class _PlannedBar(BarColumn):
+    """A bar that is as long as the time that has passed of the time that is planned."""
+
+    def render(self, task: Task) -> ProgressBar:
+        """Return the bar; without a plan it pulses."""
+        if task.total is not None:
+            task.completed = min(task.elapsed or 0.0, _ALMOST * task.total)
+        return super().render(task)
+
+
+class _TimeLeft(ProgressColumn):
+    """What is left of the planned time."""
+
+    def render(self, task: Task) -> Text:
+        """Return nothing without a plan, and when it is over."""
+        left = (task.total or 0.0) - (task.elapsed or 0.0)
+        return Text(f"about {left:.0f} s left" if left >= 1.0 else "", style="cyan")

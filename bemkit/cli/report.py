@@ -1,0 +1,29 @@
+"""The command ``bemkit report``; what it needs is loaded behind its progress bar."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from bemkit.cli.progress import live_progress
+
+
+@click.command()
+@click.argument("source")
+@click.option("-o", "--output", "place", default="report.html", metavar="FILE", help="The page (report.html).")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the name of the file.")
+def report(source: str, place: str, quiet: bool) -> None:
+    """Write a page on SOURCE: a result file, or a scene, which is solved first.
+
+    The page holds summary, pictures, tables, certificate, plan, scene and versions, and needs no other file.
+    """
+    with live_progress(is_live=not quiet and sys.stderr.isatty()) as callback:
+        from bemkit.atomic_files import reserved
+        from bemkit.cli.sources import solved
+        from bemkit.report.page import check_report, save_report
+
+        click.get_current_context().with_resource(reserved([check_report(place)]))
+        path = save_report(place, solved(source, callback))
+    if not quiet:
+        print(path)

@@ -1,0 +1,44 @@
+"""What commands draw and report: a result file, or a scene, which is solved first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from bemkit.errors import InputError, concerning
+from bemkit.pictures.shown import Result
+from bemkit.results.result_file import read_result
+from bemkit.runs.assembly import run_assembly_history
+from bemkit.runs.history import run_history
+from bemkit.runs.run import run
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.toml import load_scene
+from bemkit.solvers.base import StepRecord
+
+RESULT_ENDINGS = (".h5", ".hdf5")
+
+
+def solved(source: str, callback: Callable[[StepRecord], None] | None) -> Result:
+    """Return the solution in a result file, or that of a scene; the callback as for `run`."""
+    if Path(source).suffix.lower() in RESULT_ENDINGS:
+        return read_result(source)
+    scene = load_scene(source)
+    with concerning(source):
+        return run(scene, callback=callback)
+
+
+def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> Sequence[Result]:
+    """Return the solutions of all load steps of a scene.
+
+    Raises
+    ------
+    InputError
+        If the source is a result file, which holds the fields of the last step alone.
+    """
+    if Path(source).suffix.lower() in RESULT_ENDINGS:
+        raise InputError(f"{source}: a result file holds the fields of the last step alone: give the scene to animate")
+    scene = load_scene(source)
+    with concerning(source):
+        if isinstance(scene, Assembly):
+            return run_assembly_history([scene], callback=callback)
+        return run_history([scene], callback=callback)

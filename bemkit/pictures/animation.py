@@ -1,0 +1,86 @@
+"""Load histories as moving pictures: the deformed bodies step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bemkit.atomic_files import OutputFileError, check_target, replacing
+from bemkit.errors import InputError
+from bemkit.pictures.deformation import draw_deformation
+from bemkit.pictures.magnification import magnification
+from bemkit.pictures.plane import joined_frame, set_frame
+from bemkit.pictures.shown import Result, shown
+from bemkit.results.drawing import new_figure
+from bemkit.results.outputs import begins_with
+from bemkit.scene.unit_names import UnitNames
+
+GIF, MP4 = ".gif", ".mp4"
+_DOTS_PER_INCH = 80
+_MARGIN = 0.15
+"""Room for loads and supports around the bodies, in shares of the longer side."""
+
+
+def save_animation(
+    path: str | Path, steps: Sequence[Result], *, units: UnitNames | None = None, steps_per_second: int = 3
+) -> Path:
+    """Write a moving picture of the deformed bodies over the steps of a load history.
+
+    Displacements of all steps are enlarged by the same factor: the smallest of those of the steps alone.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends in ``.gif``, or in ``.mp4`` where the encoder ffmpeg is installed.
+    steps : sequence of Solution or AssemblySolution
+        As `bemkit.run_history` and `bemkit.run_assembly_history` return them.
+    units : UnitNames, optional
+        Those of the scene by default.
+    steps_per_second : int
+
+    Raises
+    ------
+    InputError
+        If there is no step, or the speed is not from 1 to 60.
+    OutputFileError
+        If the ending is unknown, the encoder is missing, or the file cannot be written.
+    """
+    if not steps:
+        raise InputError("steps is empty: give the solutions of a load history")
+    if not 1 <= steps_per_second <= 60:
+        raise InputError(f"steps_per_second is {steps_per_second}: give a whole number from 1 to 60")
+    target = check_animation(path)
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    writer = (PillowWriter if target.suffix == GIF else FFMpegWriter)(fps=steps_per_second)
+    scenes = [shown(step) for step in steps]
+    factor = min(magnification(scene) for scene in scenes)
+    loops = [loop for scene in scenes for body in scene.bodies for loop in body.outlines(factor)]
+    frame = joined_frame(scenes[0].frame.T, *loops)
+    figure = new_figure(6.4, 5.6)
+    with TemporaryDirectory() as folder, replacing(target) as temporary:
+        film = Path(folder) / target.name
+        with writer.saving(figure, str(film), dpi=_DOTS_PER_INCH):
+            for number, step in enumerate(steps, start=1):
+                figure.clear()
+                axes = draw_deformation(step, figure.add_subplot(), factor=factor, units=units)
+                axes.set_title(f"{step.title}\nstep {number} of {len(steps)}", parse_math=False)
+                set_frame(axes, frame, margin=_MARGIN)
+                writer.grab_frame()
+        temporary.write_bytes(film.read_bytes())
+    return target
+
+
+def check_animation(path: str | Path) -> Path:
+    """Find out whether a moving picture can be written, and return its path; OutputFileError if not."""
+    target = Path(path)
+    if target.suffix not in (GIF, MP4):
+        raise OutputFileError(f"{target}: unknown ending of a moving picture: choose .gif or .mp4")
+    if target.suffix == MP4:
+        from matplotlib.animation import FFMpegWriter
+
+        if not FFMpegWriter.isAvailable():
+            raise OutputFileError(f"{target}: .mp4 needs the encoder ffmpeg, which is not installed: choose .gif")
+    starts = {GIF: "GIF8", MP4: "\x00\x00\x00"}
+    return check_target(target, "moving picture", lambda existing: begins_with(existing, starts[target.suffix]))

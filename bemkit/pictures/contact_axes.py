@@ -1,0 +1,109 @@
+"""Axes along a contact: a panel of values above a strip that shows the status."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.pictures.shown import Result
+from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, axes_or_new
+from bemkit.scene.unit_names import UnitNames, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
+_STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "slip": "#000000", "stick": "#FFFFFF"})
+FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6})
+SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
+LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
+_NAMED = 0.12
+"""Share of the length of a contact from which on a zone has room for its name."""
+
+
+def contact_axes(
+    axes: Axes | None, solution: Result, part: str, units: UnitNames | None, subject: str
+) -> tuple[Axes, UnitNames | None]:
+    """Return axes above a strip that shows the status along a contact, and the names of units.
+
+    Parameters
+    ----------
+    axes : Axes or None
+        Those of a new figure by default.
+    solution : Solution or AssemblySolution
+    part : str
+        Name of the contact part, or of the contact of several bodies.
+    units : UnitNames or None
+        Those of the scene by default.
+    subject : str
+        First line of the title.
+    """
+    units = units or solution.units
+    axes = axes_or_new(axes)
+    strip = axes_with_strip(axes, f"{subject}\n{solution.title}")
+    label = with_unit(f"arc length $s$ along '{part}'", "length", units)
+    strip.set_xlabel(label, parse_math="$" not in part)
+    _draw_status(strip, solution, part)
+    for transition in solution.transitions:
+        if transition.part == part:
+            axes.axvline(transition.s, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
+    return axes, units
+
+
+def axes_with_strip(axes: Axes, title: str) -> Axes:
+    """Put a strip of the same abscissa below axes, which shows what lies along it, and return the strip."""
+    strip = axes.inset_axes((0.0, -0.11, 1.0, 0.08), sharex=axes)
+    axes.tick_params(labelbottom=False)
+    axes.set_title(title, parse_math=False, fontsize=11)
+    strip.set_ylim(0.0, 1.0)
+    strip.set_yticks([])
+    return strip
+
+
+def _draw_status(strip: Axes, solution: Result, part: str) -> None:
+    """Paint the status along a part; name it where there is room, and in a legend where there is none."""
+    from matplotlib.patches import Patch
+
+    chosen = solution.contact.rows(part)
+    length = solution.part_length(part)
+    transitions = [transition for transition in solution.transitions if transition.part == part]
+    first = solution.contact.status_words()[int(np.flatnonzero(chosen)[0])]
+    words = [first, *(transition.to_status for transition in transitions)]
+    edges = [0.0, *(transition.s for transition in transitions), length]
+    named = set()
+    for (begin, end), word in zip(pairwise(edges), words, strict=True):
+        strip.axvspan(begin, end, color=STATUS_COLOURS[word], linewidth=0)
+        if end - begin > _NAMED * length:
+            style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, "color": _STATUS_TEXT[word]}
+            strip.text((begin + end) / 2.0, 0.5, word, **style)
+            named.add(word)
+    handles = [Patch(color=colour, label=word) for word, colour in STATUS_COLOURS.items() if word in {*words} - named]
+    if handles:
+        place = (1.0, -1.8)  # below the name of the abscissa
+        strip.legend(handles=handles, loc="upper right", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
+    strip.set_xlim(0.0, length)
+
+
+def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:
+    """Blank out distances to the obstacle that would dwarf the displacements."""
+    contact = solution.contact
+    largest = max(float(np.abs(component[chosen]).max()) for component in (contact.u_n, contact.u_t))
+    return np.where(np.abs(distance) <= 2.0 * largest, distance, np.nan)
+
+
+def displacement_scale(solution: Result) -> float:
+    """Return the largest relative displacement or finite gap of any contact node [m]."""
+    contact = solution.contact
+    columns = (contact.u_n, contact.u_t, np.where(np.isfinite(contact.gap), contact.gap, 0.0))
+    return max(float(np.abs(column).max(initial=0.0)) for column in columns)
+
+
+def traction_scale(solution: Result) -> float:
+    """Return the largest contact traction [Pa]."""
+    contact = solution.contact
+    return max(float(np.abs(column).max(initial=0.0)) for column in (contact.sigma_n, contact.sigma_t))

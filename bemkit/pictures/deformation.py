@@ -1,0 +1,68 @@
+"""The bodies before and after, with supports, loads and obstacles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.pictures.loads import draw_loads
+from bemkit.pictures.magnification import magnification
+from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
+from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
+from bemkit.pictures.shown import Drawable, Result, Shown, shown
+from bemkit.pictures.supports import draw_supports
+from bemkit.results.drawing import legend_below
+from bemkit.scene.unit_names import UnitNames
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_deformation(
+    solution: Result, axes: Axes | None = None, *, factor: float | None = None, units: UnitNames | None = None
+) -> Axes:
+    """Draw all bodies before and after, with supports, loads and obstacles.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+    axes : Axes, optional
+        Of matplotlib; those of a new figure by default.
+    factor : float, optional
+        By which displacements are enlarged; by default so small that what touches seems to touch. The picture tells.
+    units : UnitNames, optional
+        Those of the scene by default.
+
+    Returns
+    -------
+    Axes
+    """
+    scene = shown(solution)
+    factor = magnification(scene) if factor is None else factor
+    axes = plane_axes(axes, scene.frame, scene.title, units or scene.units)
+    draw_bodies(axes, scene, factor)
+    loops = [loop for body in scene.bodies for loop in body.outlines(factor)]
+    _complete(axes, scene, factor, loops)
+    return axes
+
+
+def draw_scene(scene: Drawable, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+    """Draw what a scene states: bodies, supports, loads and obstacles; see `draw_deformation`."""
+    stated = shown(scene)
+    axes = plane_axes(axes, stated.frame, stated.title, units or stated.units)
+    draw_initial(axes, stated, is_filled=True)
+    _complete(axes, stated, 0.0, [])
+    return axes
+
+
+def _complete(axes: Axes, scene: Shown, factor: float, loops: list[np.ndarray]) -> None:
+    """Draw what is around bodies whose outlines are drawn, and choose the frame."""
+    for body in scene.bodies[:1]:
+        draw_symmetry_lines(axes, body.scene.symmetry)
+    draw_supports(axes, scene, factor)
+    ends = draw_loads(axes, scene, factor)
+    set_frame(axes, joined_frame(scene.frame.T, *loops, ends))
+    draw_rigid_bodies(axes, scene, factor)
+    draw_obstacles(axes, scene)
+    legend_below(axes)

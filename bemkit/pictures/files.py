@@ -1,0 +1,89 @@
+"""Pictures in files: a folder of them, or one in the format that the ending names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bemkit.atomic_files import OutputFileError
+from bemkit.errors import InputError
+from bemkit.pictures.animation import GIF, MP4, check_animation, save_animation
+from bemkit.pictures.catalogue import figures, find_picture
+from bemkit.pictures.shown import Result
+from bemkit.results.outputs import FIGURE_FORMATS, check_figure, check_figure_folder, write_figure, write_figures
+
+ANIMATION = "animation"
+"""The one picture that moves; see `bemkit.pictures.animation`."""
+
+
+def save_pictures(
+    result: Result | Sequence[Result], place: str | Path, what: Sequence[str] | None = None, *, dots_per_inch: int = 150
+) -> tuple[Path, ...]:
+    """Draw pictures of a result into a folder, or one picture into a file.
+
+    Parameters
+    ----------
+    result : Solution or AssemblySolution, or a sequence of them
+        The steps of a load history, for those that move; others show the last one.
+    place : str or Path
+        A folder, which is made if need be, for ``NAME.png`` of each picture; or a file that ends in ``.png``,
+        ``.svg`` or ``.pdf``, for a picture that moves in ``.gif`` or ``.mp4``.
+    what : sequence of str, optional
+        Names from `bemkit.pictures.catalogue.PICTURES`, or ``"animation"``; by default those that suit the result.
+    dots_per_inch : int
+
+    Returns
+    -------
+    tuple of Path
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or there is no such picture of the result.
+    OutputFileError
+        If the folder or a file cannot be written, or matplotlib is missing.
+    """
+    place = Path(place)
+    check_place(place, what)
+    steps = result if isinstance(result, Sequence) else [result]
+    if not steps:
+        raise InputError("steps is empty: give the solutions of a load history")
+    still = None if what is None else [name for name in what if name != ANIMATION]
+    if place.suffix in (GIF, MP4):
+        return (save_animation(place, steps),)
+    if place.suffix in FIGURE_FORMATS:
+        drawn = figures(steps[-1], still)
+        if len(drawn) > 1:
+            raise OutputFileError(f"{place}: one file for {len(drawn)} pictures: give a folder, or name one picture")
+        return tuple(write_figure(place, figure, dots_per_inch) for figure in drawn.values())
+    paths = write_figures(figures(steps[-1], still), place, dots_per_inch)
+    return (
+        paths if what is None or ANIMATION not in what else (*paths, save_animation(place / f"{ANIMATION}{GIF}", steps))
+    )
+
+
+def check_place(place: str | Path, what: Sequence[str] | None) -> list[Path]:
+    """Find out, before any work is done, whether pictures are known and can be written; return the file, if it is one.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown.
+    OutputFileError
+        If the place does not take them, or matplotlib is missing.
+    """
+    place = Path(place)
+    for name in what or ():
+        if name != ANIMATION:
+            find_picture(name)
+    check_figure_folder(None)
+    if place.suffix in (GIF, MP4):
+        if what is not None and list(what) != [ANIMATION]:
+            raise OutputFileError(f"{place}: a moving picture is the picture 'animation' alone: name it, and no other")
+        return [check_animation(place)]
+    if place.suffix in FIGURE_FORMATS:
+        if what is None or len(set(what)) != 1 or ANIMATION in what:
+            raise OutputFileError(f"{place}: one file takes one picture: name one, or give a folder")
+        return [check_figure(place)]
+    check_figure_folder(place)
+    return []

@@ -1,0 +1,79 @@
+"""Pictures of a load history: the friction loop, and work and energy over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.errors import InputError
+from bemkit.pictures.shown import Result
+from bemkit.results.drawing import BLUE, GREEN, GREY, VERMILION, axes_or_new, ignore_round_off, show_grid
+from bemkit.results.load_history import LoadHistory
+from bemkit.scene.unit_names import UnitNames, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def history_of(solution: Result) -> LoadHistory:
+    """Return the load history of a result; InputError without one."""
+    if solution.loading is None:
+        raise InputError(f"{solution.title!r} has no load history: give load factors or steps to the scene")
+    return solution.loading
+
+
+def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+    """Draw the friction force over the mean tangential displacement of the contact nodes, step by step.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+        Of a load history.
+    axes, units : optional
+        As for `bemkit.pictures.contact_displacement.draw_contact_displacement`.
+
+    Raises
+    ------
+    InputError
+        If there is no load history.
+    """
+    loading, units = history_of(solution), units or solution.units
+    axes = axes_or_new(axes, 6.0, 4.2)
+    places = np.array([0.0, *(step.mean_displacement for step in loading.steps)])
+    forces = np.array([0.0, *(step.force_tangential for step in loading.steps)])
+    axes.plot(places, forces, color=BLUE, linewidth=1.4, marker="o", markersize=3.0)
+    axes.plot(places[:1], forces[:1], color=GREY, marker="o", markersize=6.0)
+    axes.plot(places[-1:], forces[-1:], color=VERMILION, marker="o", markersize=6.0)
+    axes.annotate("begin", (places[0], forces[0]), textcoords="offset points", xytext=(8, 6), color=GREY)
+    axes.annotate("end", (places[-1], forces[-1]), textcoords="offset points", xytext=(-34, 8), color=VERMILION)
+    axes.set_xlabel(with_unit("mean tangential displacement", "length", units))
+    axes.set_ylabel(with_unit("friction force on the body", "force", units))
+    axes.set_title(f"Friction over displacement\n{solution.title}", parse_math=False, fontsize=11)
+    axes.margins(0.08)
+    show_grid(axes)
+    ignore_round_off(axes, max(float(np.abs(forces).max()), *(abs(step.force_normal) for step in loading.steps)))
+    return axes
+
+
+def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+    """Draw over time what loads have put in, what friction has taken, and the elastic energy.
+
+    See `draw_friction_loop`.
+    """
+    loading, units = history_of(solution), units or solution.units
+    axes = axes_or_new(axes, 6.0, 4.2)
+    times = np.concatenate([[0.0], loading.times])
+    external = np.cumsum([0.0, *(step.work.external_work for step in loading.steps)])
+    taken = np.cumsum([0.0, *(step.work.dissipation for step in loading.steps)])
+    energy = np.array([0.0, *(step.elastic_energy for step in loading.steps)])
+    axes.plot(times, external, color=BLUE, label="external work")
+    axes.plot(times, taken, color=VERMILION, linestyle="--", label="taken by friction")
+    axes.plot(times, energy, color=GREEN, linestyle="-.", label="elastic energy")
+    axes.set_xlabel("time $t$")
+    axes.set_ylabel(with_unit("work and energy", "energy", units))
+    axes.set_title(f"Work and energy\n{solution.title}", parse_math=False, fontsize=11)
+    axes.legend(frameon=False)
+    show_grid(axes)
+    ignore_round_off(axes, float(np.abs(np.concatenate([external, taken, energy])).max()))
+    return axes

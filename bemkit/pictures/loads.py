@@ -1,0 +1,105 @@
+"""Loads as arrows: tractions and pressures along the boundary, the weight, forces on rigid bodies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.pictures.plane import draw_arrows
+from bemkit.pictures.shown import Shown, ShownBody
+from bemkit.pictures.stations import Stations, stations
+from bemkit.results.drawing import VERMILION
+from bemkit.scene.body_forces import Gravity
+from bemkit.scene.conditions import Pressure, Traction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SPACING, _LONGEST = 0.04, 0.1
+"""Distance of arrows, and length of the longest, in sizes of the picture."""
+_LEAST = 0.02
+"""Share of the largest load below which there is no arrow."""
+_MANY = 12
+"""Bodies from which on the weight is drawn once for all."""
+
+
+def draw_loads(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+    """Draw what acts on the bodies where they are drawn, moved by a factor times their displacements.
+
+    Returns
+    -------
+    (n, 2) array [m]
+        The ends of the arrows, which the frame should hold.
+    """
+    loaded: list[tuple[Stations, FloatArray]] = []
+    for body in shown.bodies:
+        for part, elements in body.parts:
+            if isinstance(part.condition, Traction | Pressure):
+                places = stations(body, elements, _SPACING * shown.size, factor)
+                loaded.append((places, part.condition.at(places.points, places.normals)))
+    largest = max((float(np.hypot(*load.T).max()) for _, load in loaded), default=0.0)
+    ends = [np.zeros((0, 2))]
+    for places, load in loaded if largest > 0.0 else ():
+        label = "load" if len(ends) == 1 else None
+        ends.append(_draw_load(axes, places, _LONGEST * shown.size * load / largest, _LEAST, shown.size, label))
+    ends.append(_draw_weights(axes, shown, factor))
+    ends.append(_draw_forces(axes, shown, factor))
+    return np.concatenate(ends)
+
+
+def _draw_load(
+    axes: Axes, places: Stations, arrows: FloatArray, least: float, size: float, label: str | None
+) -> FloatArray:
+    """Draw arrows whose heads are on the boundary where they press, their tails where they pull; return their ends."""
+    seen = np.hypot(*arrows.T) > least * _LONGEST * size
+    arrows, drawn, normals = arrows[seen], places.drawn[seen], places.normals[seen]
+    presses = np.sum(arrows * normals, axis=1) <= 0.0
+    tails = np.where(presses[:, None], drawn - arrows, drawn)
+    draw_arrows(axes, tails, arrows, VERMILION, label)
+    return np.concatenate([tails, tails + arrows])
+
+
+def _draw_weights(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+    """Draw the direction of gravity in the middle of each body, or beside many bodies once."""
+    heavy = [
+        (body, force)
+        for body in shown.bodies
+        for force in body.scene.body_forces
+        if isinstance(force, Gravity) and any(force.acceleration)
+    ]
+    if not heavy:
+        return np.zeros((0, 2))
+    length = 0.8 * _LONGEST * shown.size
+    down = np.array(heavy[0][1].acceleration) / np.hypot(*heavy[0][1].acceleration)
+    if len(shown.bodies) <= _MANY:
+        directions = [np.array(force.acceleration) / np.hypot(*force.acceleration) for _, force in heavy]
+        arrows = length * np.array(directions)
+        tails = np.array([_middle(body, factor) for body, _ in heavy]) - 0.5 * arrows
+    else:
+        beside = shown.frame[:, 1] + 0.03 * shown.size
+        tails, arrows = beside[None] - length * down, length * down[None]
+    draw_arrows(axes, tails, arrows, VERMILION, "weight", is_hollow=True)
+    return np.concatenate([tails, tails + arrows])
+
+
+def _middle(body: ShownBody, factor: float) -> FloatArray:
+    """Return the middle of the bounding box of a body as it is drawn."""
+    loop = body.outlines(factor)[0]
+    return np.asarray(0.5 * (loop.min(axis=0) + loop.max(axis=0)))
+
+
+def _draw_forces(axes: Axes, shown: Shown, factor: float) -> FloatArray:
+    """Draw the forces on rigid bodies at their centres."""
+    driven = [
+        (np.array(body.centre) + factor * np.array([result.x, result.y]), force)
+        for body, result in shown.rigid
+        if np.any(force := np.array([body.force_x or 0.0, body.force_y or 0.0]))
+    ]
+    if not driven:
+        return np.zeros((0, 2))
+    heads, forces = np.array([place for place, _ in driven]), np.array([force for _, force in driven])
+    arrows = _LONGEST * shown.size * forces / np.hypot(*forces.T).max()
+    draw_arrows(axes, heads - arrows, arrows, VERMILION, "force")
+    return np.concatenate([heads, heads - arrows])

@@ -1,0 +1,163 @@
+"""What pictures show of a scene or a result: all bodies in their places, moved or not, with their contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.reflection import reflected_to_whole
+from bemkit.geometry.spaces import BoundarySpace
+from bemkit.model.assembled.placed import place
+from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.rigid_result import RigidResult
+from bemkit.results.solution import Solution
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.conditions import Part
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.scene import Scene
+from bemkit.scene.unit_names import UnitNames
+
+Result: TypeAlias = Solution | AssemblySolution
+Drawable: TypeAlias = Result | Scene | Assembly
+
+_POINTS_OF_CURVE = 9
+"""Points of an element whose displacement or shape is curved."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShownBody:
+    """One body on its whole boundary, images by symmetry included.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is said of it, under its last load.
+    mesh : BoundaryMesh
+        In its place.
+    space : BoundarySpace
+        Of the displacement.
+    displacement : (n_scalar, 2) array [m]
+        Zero of a scene that is not solved.
+    """
+
+    scene: Scene
+    mesh: BoundaryMesh
+    space: BoundarySpace
+    displacement: FloatArray
+
+    @property
+    def parts(self) -> Sequence[tuple[Part, IntArray]]:
+        """The parts with their elements, those that have any."""
+        return [(part, self.mesh.part(part.name)) for part in self.scene.parts if part.name in self.mesh.parts]
+
+    def displacement_at(self, elements: IntArray, xi: FloatArray) -> FloatArray:
+        """Return the displacement (m, q, 2) [m] on (m,) elements at (q,) or (m, q) local coordinates."""
+        xi = np.broadcast_to(xi, (elements.size, xi.shape[-1]))
+        if self.space.is_continuous:
+            at_nodes = self.displacement[self.space.element_dofs[elements]]
+            basis = self.space.basis(xi.ravel()).reshape(-1, *xi.shape)
+        else:  # constant elements move like a polygon through their ends
+            at_nodes = at_mesh_nodes(self.space, self.displacement)[self.mesh.elements[elements]]
+            basis = np.stack([0.5 - 0.5 * xi, 0.5 + 0.5 * xi])
+        return np.asarray(np.einsum("pmq,mpc->mqc", basis, at_nodes))
+
+    def outlines(self, factor: float) -> list[FloatArray]:
+        """Return the closed loops (n, 2), or the strip, of the body moved by a multiple of its displacement."""
+        is_polygon = self.space.degree <= 1 and bool(self.mesh.is_straight.all())
+        xi = np.linspace(-1.0, 1.0, 2 if is_polygon else _POINTS_OF_CURVE)[:-1]
+        elements = np.arange(self.mesh.n_elements)
+        moved = self.mesh.points(elements, xi) + factor * self.displacement_at(elements, xi)
+        loops = [moved[loop].reshape(-1, 2) for loop in self.mesh.loops]
+        if self.mesh.surface is not None:
+            last = self.mesh.nodes[-1] + factor * at_mesh_nodes(self.space, self.displacement)[-1]
+            return [np.concatenate([*loops, [last]])]
+        return [np.concatenate([loop, loop[:1]]) for loop in loops]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """All that a picture of bodies needs.
+
+    Parameters
+    ----------
+    title : str
+    units : UnitNames or None
+    bodies : tuple of ShownBody
+    rigid : tuple of (RigidBody, RigidResult)
+    contact : ContactTable
+        Without rows where nothing is solved.
+    """
+
+    title: str
+    units: UnitNames | None
+    bodies: tuple[ShownBody, ...]
+    rigid: tuple[tuple[RigidBody, RigidResult], ...]
+    contact: ContactTable
+
+    @cached_property
+    def frame(self) -> FloatArray:
+        """(2, 2) array [m]: least and largest x, least and largest y of bodies; of exteriors some of the plane."""
+        low = np.min([body.mesh.nodes.min(axis=0) for body in self.bodies], axis=0)
+        high = np.max([body.mesh.nodes.max(axis=0) for body in self.bodies], axis=0)
+        endless = [body.mesh for body in self.bodies if body.mesh.is_exterior]
+        spare = (0.5 if endless else 0.0) * float((high - low).max()) * np.ones(2)
+        if any(mesh.surface is not None for mesh in endless):
+            spare *= np.abs(endless[0].normals[0])  # a strip of a surface ends where it is cut
+        return np.stack([low - spare, high + spare], axis=1)
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the frame [m]."""
+        return float(np.hypot(*np.ptp(self.frame, axis=1)))
+
+    @property
+    def displacement(self) -> FloatArray:
+        """(n, 2) array [m]: of all bodies."""
+        return np.concatenate([body.displacement for body in self.bodies])
+
+
+def shown(subject: Drawable) -> Shown:
+    """Collect what pictures show of a scene or a result."""
+    match subject:
+        case Solution():
+            body = _body(subject.scene, subject.mesh, subject.boundary.displacement)
+            return Shown(subject.title, subject.units, (body,), (), subject.contact)
+        case AssemblySolution():
+            bodies = tuple(_body_of(body) for body in subject.bodies.values())
+            rigid = tuple((body, subject.rigid[body.name]) for body in subject.assembly.rigid)
+            return Shown(subject.title, subject.units, bodies, rigid, subject.contact)
+        case Scene():
+            body = _body(subject, subject.build_mesh())
+            return Shown(subject.title, subject.units, (body,), (), ContactTable.empty())
+        case Assembly():
+            bodies = tuple(_body(placed.scene, placed.mesh) for placed in place(subject))
+            rigid = tuple((body, RigidResult(body.name, *(0.0,) * 6)) for body in subject.rigid)
+            return Shown(subject.title, subject.units, bodies, rigid, ContactTable.empty())
+
+
+def _body_of(body: BodyResult) -> ShownBody:
+    return _body(body.scene, body.mesh, body.boundary.displacement)
+
+
+def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
+    space, half = (scene.discretisation.displacement_space(each) for each in (mesh.whole, mesh))
+    if displacement is None:
+        displacement = np.zeros((half.n_dofs // 2, 2))
+    return ShownBody(load_steps(scene)[-1], mesh.whole, space, reflected_to_whole(half, space, displacement))
+
+
+def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:
+    """Return displacements (n_scalar, 2) at the nodes of the mesh, between the two elements where they differ."""
+    mesh = space.mesh
+    at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+    before, after = mesh.node_elements.T
+    share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
+    return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])

@@ -1,0 +1,154 @@
+"""Stresses inside the bodies as filled contours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.operators.material import Material
+from bemkit.operators.somigliana.stress import principal_stresses, von_mises
+from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
+from bemkit.pictures.plane import draw_initial, inside, plane_axes, set_frame
+from bemkit.pictures.shown import Result, shown
+from bemkit.pictures.stress_points import StressPoints, stress_points
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.scene.unit_names import UnitNames, amount, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class StressMeasure:
+    """A number that is drawn of each stress: its symbol, whether it is never negative, and how it is computed."""
+
+    symbol: str
+    is_positive: bool
+    of: Callable[[FloatArray, Material], FloatArray]
+
+
+def _von_mises(stress: FloatArray, material: Material) -> FloatArray:
+    return von_mises(stress, material.poisson_ratio, material.plane)
+
+
+def _shear(stress: FloatArray, material: Material) -> FloatArray:
+    principal = principal_stresses(stress)
+    return np.asarray(0.5 * (principal[..., 0] - principal[..., 1]))
+
+
+STRESSES: Mapping[str, StressMeasure] = MappingProxyType(
+    {
+        "von-mises": StressMeasure("equivalent stress of von Mises", True, _von_mises),
+        "stress-xx": StressMeasure(r"stress $\sigma_{xx}$", False, lambda stress, material: stress[..., 0, 0]),
+        "stress-yy": StressMeasure(r"stress $\sigma_{yy}$", False, lambda stress, material: stress[..., 1, 1]),
+        "stress-xy": StressMeasure(r"stress $\sigma_{xy}$", False, lambda stress, material: stress[..., 0, 1]),
+        "principal-stress": StressMeasure(
+            "larger principal stress", False, lambda stress, material: principal_stresses(stress)[..., 0]
+        ),
+        "shear-stress": StressMeasure("largest shear stress in the plane", True, _shear),
+    }
+)
+"""By the names of their pictures."""
+
+_ACROSS = 48
+"""Points of the picture far from the boundary, along its longer side."""
+_LEVELS = 18
+_SHOWN = 99.5
+"""Percentile of the stresses at which colours end: corners of supports have infinite ones."""
+_FLAT = 1e-6
+"""Variation of stresses, relative to the largest, that is drawn as none."""
+
+
+def draw_stress(
+    solution: Result, axes: Axes | None = None, *, measure: str = "von-mises", units: UnitNames | None = None
+) -> Axes:
+    """Draw a stress inside of all bodies, as they are before they move.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+    axes : Axes, optional
+        Of matplotlib; those of a new figure by default.
+    measure : str
+        One of `STRESSES`.
+    units : UnitNames, optional
+        Those of the scene by default.
+
+    Returns
+    -------
+    Axes
+        Colours end where only half a per cent of the points have more; the title tells the largest drawn stress.
+
+    Raises
+    ------
+    InputError
+        If the measure is unknown.
+    """
+    if measure not in STRESSES:
+        raise InputError(f"measure is {measure!r}: give one of {', '.join(STRESSES)}")
+    chosen, scene, units = STRESSES[measure], shown(solution), units or solution.units
+    bodies = list(solution.bodies.values()) if isinstance(solution, AssemblySolution) else [solution]
+    spacing = float(np.ptp(scene.frame, axis=1).max()) / _ACROSS
+    found = [stress_points(body, spacing, scene.frame) for body in bodies]
+    values = [chosen.of(each.stresses, body.scene.material) for each, body in zip(found, bodies, strict=True)]
+    every = np.concatenate(values)
+    extreme = float(every[np.argmax(np.abs(every))])
+    title = f"{chosen.symbol}, up to {amount(extreme, 'stress', units)}\n{scene.title}"
+    axes = plane_axes(axes, scene.frame, title[0].upper() + title[1:], units)
+    levels = _levels(every, chosen.is_positive)
+    for body, points, value in zip(scene.bodies, found, values, strict=True):
+        outline = inside(body, body.outlines(0.0), scene.frame)
+        _draw_contours(axes, points, value, levels, chosen, outline)
+    draw_initial(axes, scene)
+    set_frame(axes, scene.frame, margin=0.05)
+    draw_rigid_bodies(axes, scene, 0.0)
+    draw_obstacles(axes, scene)
+    _draw_scale(axes, levels, chosen, units)
+    return axes
+
+
+def _levels(values: FloatArray, is_positive: bool) -> FloatArray:
+    """Return where colours change, round numbers: from zero of what is positive, else as far below zero as above."""
+    from matplotlib.ticker import MaxNLocator
+
+    largest = float(np.percentile(np.abs(values), _SHOWN)) or float(np.abs(values).max()) or 1.0
+    return np.asarray(MaxNLocator(_LEVELS, steps=[1, 2, 5, 10]).tick_values(0.0 if is_positive else -largest, largest))
+
+
+def _draw_contours(
+    axes: Axes, found: StressPoints, values: FloatArray, levels: FloatArray, chosen: StressMeasure, outline: object
+) -> None:
+    """Fill the triangles between the points of a body, cut along its outline."""
+    from matplotlib.tri import Triangulation
+
+    smooth = np.where(np.abs(values) < _FLAT * levels[-1], 0.0, values)
+    net = Triangulation(*found.points.T)
+    extend = "max" if chosen.is_positive else "both"
+    contours = axes.tricontourf(net, smooth, levels=levels, cmap=_colours(chosen), extend=extend)
+    contours.set_clip_path(outline, axes.transData)  # type: ignore[arg-type]
+
+
+def _colours(chosen: StressMeasure) -> str:
+    return "viridis" if chosen.is_positive else "RdBu_r"
+
+
+def _draw_scale(axes: Axes, levels: FloatArray, chosen: StressMeasure, units: UnitNames | None) -> None:
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import BoundaryNorm
+    from matplotlib.ticker import MaxNLocator
+
+    norm = BoundaryNorm(levels.tolist(), 256, extend="max" if chosen.is_positive else "both")
+    scale = ScalarMappable(norm, colormaps[_colours(chosen)])
+    figure = axes.get_figure(root=True)
+    place = axes.inset_axes((1.03, 0.0, 0.04, 1.0))
+    ticks = MaxNLocator(6, steps=[1, 2, 5, 10])
+    bar = figure.colorbar(scale, cax=place, ticks=ticks, spacing="proportional")  # type: ignore[union-attr]
+    bar.ax.ticklabel_format(scilimits=(-2, 3), useMathText=True, useOffset=False)
+    bar.set_label(with_unit(chosen.symbol, "stress", units))

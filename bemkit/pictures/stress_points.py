@@ -1,0 +1,172 @@
+"""Stresses of a body at many points: on its boundary from the boundary data, inside from its interior fields.
+
+Close to the boundary the fields inside have peaks at the ends of elements, where boundary data kink. Points are
+therefore chosen opposite the middle of elements, and stresses on the boundary itself follow from tractions and from
+the strain along it by Hooke's law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.reflection import reflected_to_whole
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
+from bemkit.geometry.vectors import turned_right
+from bemkit.operators.material import Material
+from bemkit.results.interior import interior_fields
+from bemkit.results.solved_body import SolvedBody
+
+_STEP = 0.7
+"""Distance of the first points inside from the boundary, in lengths of their elements."""
+_GROWTH = 2.0
+"""Of the distances from the boundary, from one layer of points to the next."""
+_PER_ELEMENT = 2
+"""Points of an element whose fields vary along it."""
+_DIFFERENCE = 1e-4
+"""Half step of differences in the local coordinate: their error is its square."""
+
+
+@dataclass(frozen=True, eq=False)
+class StressPoints:
+    """Stresses (n, 2, 2) [Pa] at points (n, 2) [m] on the boundary and inside of it."""
+
+    points: FloatArray
+    stresses: FloatArray
+
+
+def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> StressPoints:
+    """Evaluate the stress of a body.
+
+    Parameters
+    ----------
+    body : Solution or BodyResult
+    spacing : float [m]
+        Of points far from the boundary; closer to it they are as dense as its elements.
+    frame : (2, 2) array [m]
+        Where points are wanted, of bodies without an end.
+    """
+    mesh = body.mesh.whole
+    space, displacement, tractions, traction = _whole_data(body)
+    n = 1 if space.degree <= 1 else _PER_ELEMENT
+    xi = (2.0 * np.arange(n) + 1.0) / n - 1.0
+    elements = np.arange(mesh.n_elements)
+    on_elements = _on_boundary(mesh, body.scene.material, xi, space, displacement, tractions, traction)
+    on_boundary = mesh.points(elements, xi).reshape(-1, 2)
+    stresses = on_elements.reshape(-1, 2, 2)
+    if body.particular is not None:
+        stresses = stresses + body.particular.stress(on_boundary)
+    normals = mesh.normals_at(elements, xi).reshape(-1, 2)
+    lengths = np.repeat(mesh.lengths / n, n)
+    fields = interior_fields(body)
+    inner = _inner_points(on_boundary, normals, lengths, spacing, frame, mesh.is_exterior)
+    inner = inner[fields.is_inside(inner)]
+    corners, at_corners = _at_nodes(mesh, stresses.reshape(mesh.n_elements, n, 2, 2))
+    return StressPoints(
+        np.concatenate([on_boundary, corners, inner]), np.concatenate([stresses, at_corners, fields.stress(inner)])
+    )
+
+
+def _whole_data(body: SolvedBody) -> tuple[BoundarySpace, FloatArray, ElementwiseSpace, FloatArray]:
+    """Return displacements and tractions on the whole boundary, less the particular solution of body forces."""
+    mesh, discretisation, boundary = body.mesh, body.scene.discretisation, body.map_boundary
+    space, half = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
+    displacement = reflected_to_whole(half, space, boundary.displacement)
+    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
+    tractions, half_tractions = (
+        ElementwiseSpace(discretisation.traction_space(each) if has_dofs else ConstantSpace(each))
+        for each in (mesh.whole, mesh)
+    )
+    return space, displacement, tractions, reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
+
+
+def _on_boundary(
+    mesh: BoundaryMesh,
+    material: Material,
+    xi: FloatArray,
+    space: BoundarySpace,
+    displacement: FloatArray,
+    tractions: BoundarySpace,
+    traction: FloatArray,
+) -> FloatArray:
+    """Return stresses (n_elements, q, 2, 2) from tractions and the strain along the boundary."""
+    elements = np.arange(mesh.n_elements)
+    normals = mesh.normals_at(elements, xi)
+    tangents = -turned_right(normals)
+    if space.is_continuous:
+        ahead, behind = (space.basis(np.clip(xi + step, -1.0, 1.0)) for step in (_DIFFERENCE, -_DIFFERENCE))
+        slopes = np.einsum("pq,epc->eqc", (ahead - behind) / (2.0 * _DIFFERENCE), displacement[space.element_dofs])
+        derivative = slopes / mesh.jacobian(elements, xi)[..., None]
+    else:
+        derivative = np.repeat(_slopes(mesh, space, displacement)[:, None], xi.size, axis=1)
+    strain = np.sum(derivative * tangents, axis=2)
+    t = np.einsum("lq,elc->eqc", tractions.basis(xi), traction[tractions.element_dofs])
+    normal, shear = np.sum(t * normals, axis=2), np.sum(t * tangents, axis=2)
+    ratio = material.effective_poisson_ratio
+    along = material.plane_modulus * strain + ratio / (1.0 - ratio) * normal
+    frame = np.stack([normals, tangents], axis=2)
+    local = np.stack([np.stack([normal, shear], axis=2), np.stack([shear, along], axis=2)], axis=3)
+    return np.asarray(np.einsum("eqki,eqkl,eqlj->eqij", frame, local, frame))
+
+
+def _slopes(mesh: BoundaryMesh, space: BoundarySpace, displacement: FloatArray) -> FloatArray:
+    """Return derivatives (n_elements, 2) along the boundary of what is constant on each element.
+
+    At corners, where differences of neighbours mean nothing, from the other neighbour alone.
+    """
+    values = displacement[space.element_dofs[:, 0]]
+    before, after = mesh.node_elements[mesh.elements[:, 0], 0], mesh.node_elements[mesh.elements[:, 1], 1]
+    slopes, weights = np.zeros_like(values), np.zeros(len(values))
+    for other, sign in ((before, -1.0), (after, 1.0)):
+        distance = 0.5 * (mesh.lengths + mesh.lengths[other])
+        is_smooth = np.sum(mesh.normals * mesh.normals[other], axis=1) > 0.5
+        slopes += np.where(is_smooth, sign / distance, 0.0)[:, None] * (values[other] - values)
+        weights += is_smooth
+    return np.asarray(slopes / np.maximum(weights, 1.0)[:, None])
+
+
+def _at_nodes(mesh: BoundaryMesh, stresses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the nodes and the means of the stresses beside them, so that pictures reach into corners."""
+    before, after = mesh.node_elements.T
+    return mesh.nodes, 0.5 * (stresses[before, -1] + stresses[after, 0])
+
+
+def _inner_points(
+    on_boundary: FloatArray,
+    normals: FloatArray,
+    lengths: FloatArray,
+    spacing: float,
+    frame: FloatArray,
+    is_exterior: bool,
+) -> FloatArray:
+    """Return layers of points along the inner normals, the denser the shorter the elements, and a grid between them."""
+    tree = KDTree(on_boundary)
+    layers = []
+    depth = _STEP * lengths
+    while (going := depth < 1.5 * spacing).any():
+        points = on_boundary[going] - depth[going, None] * normals[going]
+        distance, _ = tree.query(points)
+        is_kept = distance > _STEP * depth[going]
+        layers.append(_thinned(points[is_kept], depth[going][is_kept]))
+        depth = np.where(going, _GROWTH * depth, np.inf)
+    inner = np.concatenate([np.zeros((0, 2)), *layers])
+    low, high = (frame[:, 0], frame[:, 1]) if is_exterior else (on_boundary.min(axis=0), on_boundary.max(axis=0))
+    x, y = (np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    distance, nearest = tree.query(grid)
+    grid = grid[distance > np.maximum(0.7 * spacing, lengths[nearest])]
+    if len(inner) and len(grid):
+        grid = grid[KDTree(inner).query(grid)[0] > 0.5 * spacing]
+    return np.concatenate([inner, grid])
+
+
+def _thinned(points: FloatArray, distance: FloatArray) -> FloatArray:
+    """Return one of those points (n, 2) that are closer to each other than distances (n,), about."""
+    cell = 2.0 ** np.floor(np.log2(distance))
+    keys = np.column_stack([np.round(points / cell[:, None]), cell])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    return points[np.sort(first)]

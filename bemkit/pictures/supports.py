@@ -1,0 +1,108 @@
+"""Supports by the usual symbols: hatching where a body is clamped, rollers, arrows where displacements are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.pictures.plane import draw_arrows
+from bemkit.pictures.shown import Shown
+from bemkit.pictures.stations import Stations, stations
+from bemkit.results.drawing import GREEN
+from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SPACING, _SIZE = 0.035, 0.012
+"""Distance of symbols, and their radius, in sizes of the picture."""
+_ARROW, _LEAST = 0.06, 1e-9
+"""Length of arrows in sizes of the picture, and share of the largest displacement below which one is none."""
+_COLOUR = "#333333"
+
+
+def draw_supports(axes: Axes, shown: Shown, factor: float) -> None:
+    """Draw the supports of all bodies where these are drawn, moved by a factor times their displacements."""
+    size = shown.size
+    labelled: set[str] = set()
+    for body in shown.bodies:
+        for part, elements in body.parts:
+            match part.condition:
+                case Clamped():
+                    places = stations(body, elements, 0.6 * _SPACING * size, factor)
+                    _draw_clamped(axes, places, _SIZE * size, _new("clamped", labelled))
+                case Roller():
+                    places = stations(body, elements, _SPACING * size, factor)
+                    _draw_rollers(axes, places, _SIZE * size, _new("roller", labelled))
+                case PrescribedDisplacement() as given:
+                    places = stations(body, elements, 2.0 * _SPACING * size, factor)
+                    values = given.at(places.points)
+                    _draw_given(axes, places, values, given.is_prescribed, size, _new("given displacement", labelled))
+
+
+def _new(label: str, labelled: set[str]) -> str | None:
+    """Return a label the first time, None later."""
+    if label in labelled:
+        return None
+    labelled.add(label)
+    return label
+
+
+def _draw_clamped(axes: Axes, places: Stations, size: float, label: str | None) -> None:
+    """Hatch the outside of the boundary."""
+    from matplotlib.collections import LineCollection
+
+    tangents = np.stack([-places.normals[:, 1], places.normals[:, 0]], axis=1)
+    ends = places.drawn + 1.6 * size * (places.normals - tangents)
+    lines = np.stack([places.drawn, ends], axis=1)
+    axes.add_collection(LineCollection(list(lines), colors=_COLOUR, linewidths=0.9))
+    axes.plot([], [], linestyle="", marker=r"$/\!/\!/$", markersize=13, color=_COLOUR, label=label)
+
+
+def _draw_rollers(axes: Axes, places: Stations, size: float, label: str | None) -> None:
+    """Draw circles between the boundary and a line on which they roll."""
+    from matplotlib.collections import EllipseCollection, LineCollection
+
+    widths = np.full(len(places.drawn), 2.0 * size)
+    centres = places.drawn + size * places.normals
+    circles = EllipseCollection(
+        widths,
+        widths,
+        np.zeros_like(widths),
+        units="xy",
+        offsets=centres,
+        transOffset=axes.transData,
+        facecolors="white",
+        edgecolors=_COLOUR,
+        linewidths=0.9,
+        zorder=2,
+    )
+    axes.add_collection(circles)
+    axes.plot([], [], linestyle="", marker="o", color=_COLOUR, markerfacecolor="white", label=label)
+    tangents = np.stack([-places.normals[:, 1], places.normals[:, 0]], axis=1)
+    ground = centres + 1.1 * size * places.normals
+    lines = np.stack([ground - 1.6 * size * tangents, ground + 1.6 * size * tangents], axis=1)
+    axes.add_collection(LineCollection(list(lines), colors=_COLOUR, linewidths=0.9))
+
+
+def _draw_given(
+    axes: Axes, places: Stations, values: FloatArray, is_given: tuple[bool, bool], size: float, label: str | None
+) -> None:
+    """Draw arrows along given displacements, with their heads on the boundary; bars along what must not move."""
+    from matplotlib.collections import LineCollection
+
+    lengths = np.hypot(*values.T)
+    largest = float(lengths.max(initial=0.0))
+    if largest > 0.0:
+        is_moved = lengths > _LEAST * largest
+        arrows = _ARROW * size * values[is_moved] / lengths[is_moved, None]
+        draw_arrows(axes, places.drawn[is_moved] - arrows, arrows, GREEN, label)
+        return
+    marker = "+" if all(is_given) else "_" if is_given[0] else "|"
+    for axis in (axis for axis in (0, 1) if is_given[axis]):
+        along = _SIZE * size * np.eye(2)[axis]
+        bars = np.stack([places.drawn - along, places.drawn + along], axis=1)
+        axes.add_collection(LineCollection(list(bars), colors=GREEN, linewidths=1.6, zorder=3))
+    axes.plot([], [], linestyle="", marker=marker, markersize=9, color=GREEN, label=label)

@@ -1,0 +1,122 @@
+"""Tractions along the boundary as what they are: polynomials on each element."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.obstacle import measure_contact
+from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
+from bemkit.pictures.contact_nodes import node_points
+from bemkit.pictures.shown import Result
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.conditions import Contact
+
+_POINTS_OF_CURVE = 9
+
+
+@dataclass(frozen=True, eq=False)
+class TractionCurve:
+    """Tractions along some elements, each with points of its own, so that they may jump.
+
+    Parameters
+    ----------
+    s : (n,) array [m]
+        Arc length from the start of the first element.
+    normal, tangential : (n,) arrays [Pa]
+    """
+
+    s: FloatArray
+    normal: FloatArray
+    tangential: FloatArray
+
+
+def traction_curve(solution: Result, part: str) -> TractionCurve:
+    """Return the tractions along a contact, in the directions in which it counts.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+    part : str
+        Name of a contact part, or of a contact of several bodies.
+    """
+    body, name = _side_of(solution, part) if isinstance(solution, AssemblySolution) else (solution, part)
+    elements = along_boundary(body.mesh, body.mesh.part(name))
+    xi = local_points(body)
+    s = arc_length(body, elements, xi)
+    directions = _directions(solution, part, body, elements, xi, s)
+    return _resolved(body, elements, xi, s, directions)
+
+
+def boundary_curve(solution: Solution, elements: IntArray) -> TractionCurve:
+    """Return the tractions along some elements, in their order, along the normals and tangents of the body."""
+    xi = local_points(solution)
+    normals = solution.mesh.normals_at(elements, xi).reshape(-1, 2)
+    return _resolved(solution, elements, xi, arc_length(solution, elements, xi), normals)
+
+
+def local_points(body: SolvedBody) -> FloatArray:
+    """Return the local coordinates (q,) at which an element is drawn: its ends, and more where tractions are curved."""
+    is_straight = traction_space(body).degree <= 1 and bool(body.mesh.is_straight.all())
+    return np.linspace(-1.0, 1.0, 2 if is_straight else _POINTS_OF_CURVE)
+
+
+def arc_length(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
+    """Return the arc length (m q,) [m] of points of elements that follow each other."""
+    lengths = body.mesh.lengths[elements]
+    begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    return np.asarray((begin[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)).ravel())
+
+
+def traction_space(body: SolvedBody) -> BoundarySpace:
+    """Return the space of the tractions that are kept of a body: constant ones in files of older versions."""
+    space = body.scene.discretisation.traction_space(body.mesh)
+    return space if len(body.boundary.traction_dofs) == space.element_dofs.size else ConstantSpace(body.mesh)
+
+
+def _resolved(
+    body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray, directions: FloatArray
+) -> TractionCurve:
+    dofs = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements]
+    traction = np.einsum("lq,elc->eqc", traction_space(body).basis(xi), dofs).reshape(-1, 2)
+    normal, tangential = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
+    return TractionCurve(s, normal, tangential)
+
+
+def _side_of(solution: AssemblySolution, contact: str) -> tuple[SolvedBody, str]:
+    """Return the body and the part whose nodes decide on a contact."""
+    points = node_points(solution.contact)[solution.contact.rows(contact)]
+    sides = [side.split(".", 1) for side in contact.split(" / ") if "." in side]
+
+    def distance(side: list[str]) -> float:
+        body = solution.bodies[side[0]]
+        space = body.scene.discretisation.displacement_space(body.mesh)
+        nodes = dof_points(space)[np.unique(space.element_dofs[body.mesh.part(side[1])])]
+        return float(max(np.hypot(*(nodes - point).T).min() for point in points))
+
+    name, part = min(sides, key=distance)
+    return solution.bodies[name], part
+
+
+def _directions(
+    solution: Result, part: str, body: SolvedBody, elements: IntArray, xi: FloatArray, s: FloatArray
+) -> FloatArray:
+    """Return the directions of contact (n, 2) at points of elements, between bodies those of the nodes near by."""
+    if isinstance(solution, AssemblySolution):
+        rows = solution.contact.rows(part)
+        order = np.argsort(solution.contact.s[rows])
+        at_nodes = solution.contact_directions[rows][order]
+        found = np.stack([np.interp(s, solution.contact.s[rows][order], column) for column in at_nodes.T], axis=1)
+        return np.asarray(found / np.hypot(*found.T)[:, None])
+    (condition,) = (each.condition for each in solution.scene.contact_parts if each.name == part)
+    if not isinstance(condition, Contact):
+        raise TypeError(f"part {part!r} is no contact")
+    points, normals = body.mesh.points(elements, xi), body.mesh.normals_at(elements, xi)
+    _, directions = measure_contact(condition.obstacle, points.reshape(-1, 2), normals.reshape(-1, 2))
+    return directions

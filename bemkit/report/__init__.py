@@ -1,0 +1,1 @@
+"""Results as pages: reports in one file, and what notebooks show."""

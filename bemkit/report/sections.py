@@ -1,0 +1,139 @@
+"""What reports say of a result in words and tables, from its summary."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from bemkit.pictures.shown import Result
+from bemkit.plan import Plan
+from bemkit.report.html import Element, element, facts, number, table
+from bemkit.results.tables import history_columns
+from bemkit.scene.serialisation import UnstructureError
+from bemkit.scene.toml import SceneError, scene_to_toml
+from bemkit.scene.unit_names import UnitNames, unit_of
+from bemkit.version import __version__
+
+_MOST_ROWS = 200
+"""Of a table; the files hold all."""
+_QUANTITIES = {"force_normal": "force", "force_tangential": "force", "energy": "energy"}
+_COUNTED = ("n_bodies", "n_elements", "n_contact", "linear_solves", "outer_steps")
+_PACKAGES = ("numpy", "scipy", "h5py", "matplotlib")
+
+
+def badge(result: Result) -> Element:
+    """Return the status in a word, with a class for its colour."""
+    kind = "good" if result.is_converged else "doubtful" if result.is_certified else "bad"
+    return element("strong", result.status.name.lower().replace("_", " "), class_=f"badge {kind}")
+
+
+def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
+    """Yield the numbers that sum a result up."""
+    summary = result.summary()
+    for name in _COUNTED:
+        if name in summary:
+            yield _words(name), str(summary[name])
+    for name, quantity in _QUANTITIES.items():
+        yield _words(name), _amount(summary[name], quantity, result.units)
+    for name in ("estimated_error", "estimated_traction_error"):
+        if summary.get(name) is not None:
+            yield _words(name), number(summary[name], 2)
+    yield "largest violation", number(result.certificate.worst, 2)
+
+
+def warnings_section(result: Result) -> list[Element]:
+    """Return what is doubtful, one sentence each."""
+    sentences = [element("li", warning) for warning in result.warnings]
+    return [element("ul", *sentences) if sentences else element("p", "Nothing is known to be doubtful.")]
+
+
+def forces_section(result: Result) -> list[Element]:
+    """Return what contacts and parts carry, and where the status changes."""
+    summary, found = result.summary(), []
+    if summary["contacts"]:
+        found.append(table(_shortened(summary["contacts"]), "What each contact transmits"))
+    parts = summary.get("parts") or [
+        {"body": name, **part} for name, body in summary.get("bodies", {}).items() for part in body["parts"]
+    ]
+    if parts:
+        found.append(table(_shortened(parts), "Resultants of the tractions on each part"))
+    if summary["transitions"]:
+        found.append(table(_shortened(summary["transitions"]), "Where the contact status changes"))
+    return found or [element("p", "No part of the boundary has a name.")]
+
+
+def certificate_section(result: Result) -> list[Element]:
+    """Return the largest violation of each condition, at the nodes and between them."""
+    summary = result.summary()
+    rows = [(_words(name), number(value, 2)) for name, value in summary["certificate"].items()]
+    found = [
+        element("p", "The largest violation of each condition, measured after the solve; zero is perfect."),
+        facts(rows, "Certificate, at the nodes"),
+    ]
+    if (between := summary.get("between_nodes")) is not None:
+        rows = [(_words(name), number(value, 2)) for name, value in between.items()]
+        found.append(facts(rows, "Between the nodes: errors of the discretisation"))
+    return found
+
+
+def convergence_section(result: Result) -> list[Element]:
+    """Return the history of the solver."""
+    columns = history_columns(result.history)
+    columns["worst"] = [record.certificate.worst for record in result.history]
+    names = ("step", "linear_solves", "n_separated", "n_stick", "n_slip", "n_changed", "relative_change", "worst")
+    rows = [{name: _plain(columns[name][k]) for name in (*names, "message")} for k in range(len(result.history))]
+    return [element("p", result.message or result.status.value), table(_shortened(rows), "Steps of the solver")]
+
+
+def plan_section(plan: Plan) -> list[Element]:
+    """Return what was needed and what was left out, and why."""
+    rows = [{"item": item.name, "needed": item.is_needed, "why": item.reason} for item in plan.items]
+    size = f"{plan.memory / 1e6:.3g} MB of memory, about {plan.seconds:.2g} s on a common computer."
+    return [element("p", size), table(rows, "What the scene needs and what is left out")]
+
+
+def scene_section(result: Result) -> list[Element]:
+    """Return the scene as a scene file."""
+    try:
+        text = scene_to_toml(result.stated)
+    except (SceneError, UnstructureError) as error:
+        return [element("p", f"The scene cannot be written as text: {error}")]
+    return [element("pre", element("code", text), tabindex="0")]
+
+
+def timing_section(result: Result) -> list[Element]:
+    """Return how long each stage took."""
+    return [facts([(name, f"{seconds:.3g} s") for name, seconds in result.timings.items()], "Run times")]
+
+
+def version_section() -> list[Element]:
+    """Return the versions of what computed and drew."""
+    rows = [("bemkit", __version__), ("Python", platform.python_version()), ("system", platform.system())]
+    for name in _PACKAGES:
+        try:
+            rows.append((name, version(name)))
+        except PackageNotFoundError:
+            rows.append((name, "not installed"))
+    return [facts(rows, "Versions")]
+
+
+def _words(name: str) -> str:
+    return {"n_bodies": "bodies", "n_elements": "elements", "n_contact": "contact nodes"}.get(
+        name, name.replace("_", " ")
+    )
+
+
+def _amount(value: float, quantity: str, units: UnitNames | None) -> str:
+    return f"{value:.6g} {unit_of(quantity, units)}".rstrip()
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of numpy as one of Python."""
+    return value.item() if hasattr(value, "item") else value
+
+
+def _shortened(rows: list[Mapping[str, Any]] | list[dict[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the first rows of a long table."""
+    return [{key: _plain(value) for key, value in row.items()} for row in rows[:_MOST_ROWS]]

@@ -1,0 +1,147 @@
+"""Pictures along contacts: tractions as what they are, flat lines without round-off, the status, the friction cone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib.colors
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import bemkit as bk
+from bemkit.pictures import (
+    draw_contact_clearance,
+    draw_contact_displacement,
+    draw_contact_map,
+    draw_contact_traction,
+    draw_convergence,
+    draw_friction_cone,
+)
+from bemkit.pictures.contact_axes import STATUS_COLOURS
+from bemkit.pictures.traction_curves import traction_curve
+from bemkit.results.drawing import ignore_round_off
+from bemkit.results.solution import Solution
+from bemkit.runs.run import run
+from bemkit.scene.toml import load_scene, with_overrides
+
+Draw = Callable[[Solution, str], Axes]
+
+
+@pytest.fixture(scope="module", params=["quadratic", "linear", "constant"])
+def solution(request: pytest.FixtureRequest) -> Solution:
+    return run(with_overrides(load_scene("paper-1"), elements=40, discretisation=request.param))
+
+
+@pytest.mark.parametrize(
+    ("draw", "label"),
+    [
+        (draw_contact_displacement, "displacement"),
+        (draw_contact_traction, "traction"),
+        (draw_contact_clearance, "pressure"),
+    ],
+)
+def test_contact_pictures_have_labels_curves_and_a_status_strip(solution: Solution, draw: Draw, label: str) -> None:
+    axes = draw(solution, "foundation")
+    (strip,) = axes.child_axes
+    assert axes.get_ylabel() == label
+    assert strip.get_xlabel() == "arc length $s$ along 'foundation'"
+    assert axes.get_title()
+    assert len(axes.get_legend().get_texts()) >= 2
+    bars = [(patch.get_x(), patch.get_x() + patch.get_width(), patch.get_facecolor()) for patch in strip.patches]
+    places = [transition.s for transition in solution.transitions]
+    np.testing.assert_allclose([end for _, end, _ in bars], [*places, 1.0], rtol=1e-12)
+    colours = [matplotlib.colors.to_hex(colour).upper() for _, _, colour in bars]
+    assert colours == [STATUS_COLOURS[word].upper() for word in ("separated", "slip", "stick")]
+
+
+def test_they_draw_into_axes_that_are_given(solution: Solution) -> None:
+    first, second = Figure().subplots(1, 2)
+    assert draw_contact_traction(solution, "foundation", first) is first
+    assert draw_friction_cone(solution, "foundation", second) is second
+
+
+@pytest.mark.parametrize(
+    ("degree", "points_of_element", "variation"), [("constant", 2, 0), ("linear", 2, 0), ("quadratic", 2, 1), (4, 9, 3)]
+)
+def test_tractions_are_drawn_as_polynomials_of_their_degree(
+    degree: str | int, points_of_element: int, variation: int
+) -> None:
+    discretisation = bk.Galerkin(degree=degree) if isinstance(degree, int) else degree
+    overrides = {"degree": degree} if isinstance(degree, int) else {"discretisation": discretisation}
+    solution = run(with_overrides(load_scene("paper-1"), elements=24, **overrides))  # type: ignore[arg-type]
+    curve = traction_curve(solution, "foundation")
+    n = solution.mesh.part("foundation").size
+    assert curve.s.size == points_of_element * n
+    values = curve.normal.reshape(n, points_of_element)
+    nodes = np.linspace(-1.0, 1.0, points_of_element)
+    size = np.abs(values).max()
+    fitted = np.array(
+        [np.polynomial.Polynomial.fit(nodes, row, min(variation, points_of_element - 1))(nodes) for row in values]
+    )
+    np.testing.assert_allclose(values, fitted, atol=1e-9 * size)  # of no higher degree
+    if variation:
+        assert np.ptp(values, axis=1).max() > 1e-3 * size  # and not of a lower one
+    # as the force that the contact feels says
+    force = np.sum(np.diff(curve.s.reshape(n, -1)) * 0.5 * (values[:, 1:] + values[:, :-1]))
+    assert -force == pytest.approx(solution.force_normal, rel=0.01)  # trapezoids of 8 points of an element
+
+
+def test_tractions_between_bodies_are_those_of_the_side_with_the_nodes() -> None:
+    solution = run(load_scene("two-cylinders"))
+    (part,) = solution.contact.parts
+    curve = traction_curve(solution, part)
+    # quadratic elements: the tractions at the ends of elements are those of neighbours, too
+    assert curve.normal.min() == pytest.approx(solution.contact.sigma_n.min(), rel=0.05)
+    assert np.abs(curve.normal[-1]) < 0.01 * np.abs(curve.normal).max()
+
+
+def test_a_uniform_pressure_is_drawn_as_a_flat_line() -> None:
+    """And a clearance that is nothing but round-off as zero."""
+    solution = run(with_overrides(load_scene("uniform-slip"), elements=24))
+    axes = draw_contact_clearance(solution, "floor")
+    bottom, top = axes.get_ylim()
+    assert bottom <= 0.0 < 1.0 < top  # the pressure is 1 Pa
+    (right,) = (other for other in axes.get_figure().axes if other.get_ylabel() == "clearance")
+    assert np.ptp(right.get_ylim()) > 0.01 * np.abs(solution.contact.u_t).max()
+    assert np.abs(solution.contact.clearance).max() < 1e-9 * np.abs(solution.contact.u_t).max()
+
+
+def test_axes_are_as_wide_as_the_scale_where_nothing_varies() -> None:
+    axes = Figure().add_subplot()
+    axes.plot([0.0, 1.0, 2.0], [96.0, 96.0 + 1e-10, 96.0 - 2e-10])
+    ignore_round_off(axes, 96.0)
+    assert axes.get_ylim() == pytest.approx((91.2, 100.8))
+    axes.clear()
+    axes.plot([0.0, 1.0], [96.0, 96.001])  # more than round-off
+    ignore_round_off(axes, 96.0)
+    assert np.ptp(axes.get_ylim()) < 0.01
+
+
+def test_the_friction_cone_holds_all_nodes_and_slip_lies_on_its_bounds() -> None:
+    solution = run(with_overrides(load_scene("paper-1"), elements=80, discretisation="linear"))
+    axes = draw_friction_cone(solution, "foundation")
+    upper = axes.lines[0].get_xydata()
+    np.testing.assert_allclose(upper[:, 1], 0.5 * np.maximum(upper[:, 0], 0.0), atol=1e-12)
+    points = {each.get_label(): each.get_offsets() for each in axes.collections}
+    scale = np.abs(solution.contact.sigma_n).max()
+    slipping, sticking = points["slip"], points["stick"]
+    np.testing.assert_allclose(np.abs(slipping[:, 1]), 0.5 * slipping[:, 0], atol=1e-9 * scale)
+    assert np.all(np.abs(sticking[:, 1]) < 0.5 * sticking[:, 0])
+
+
+def test_the_map_draws_each_contact_node_of_one_body_once(solution: Solution) -> None:
+    axes = draw_contact_map(solution)
+    drawn = sum(len(each.get_offsets()) for each in axes.collections if hasattr(each, "get_sizes"))
+    assert drawn == solution.contact.n_contact
+    teeth = np.concatenate([each.get_segments() for each in axes.collections if hasattr(each, "get_segments")])
+    assert teeth[..., 1].min() > -1e-12  # into the body, away from the obstacle below
+    assert teeth[..., 1].max() > 0.05
+
+
+def test_the_convergence_ends_where_the_certificate_is(solution: Solution) -> None:
+    axes = draw_convergence(solution)
+    worst = axes.lines[0].get_ydata()
+    assert len(worst) == len(solution.history)
+    assert worst[-1] == pytest.approx(max(solution.history[-1].certificate.worst, 1e-300))

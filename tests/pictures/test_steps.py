@@ -1,0 +1,85 @@
+"""Load histories in pictures: the status over the steps, and what moves."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import bemkit as bk
+from bemkit.atomic_files import OutputFileError
+from bemkit.pictures import draw_friction_loop, draw_status_over_time, draw_work, figures, save_animation
+from bemkit.scene.toml import with_overrides
+
+FACTORS = (0.3, 0.6, 1.0)
+
+
+@pytest.fixture(scope="module")
+def steps() -> tuple[bk.Solution, ...]:
+    scene = with_overrides(bk.load_scene("paper-1"), elements=40, discretisation="linear")
+    return bk.run_history([dataclasses.replace(scene, load_factors=FACTORS)])
+
+
+def test_each_step_is_a_row_of_statuses(steps: tuple[bk.Solution, ...]) -> None:
+    axes = draw_status_over_time(steps[-1], "foundation")
+    (mesh,) = axes.collections
+    rows = np.asarray(mesh.get_array()).reshape(len(FACTORS), -1)
+    order = ["separated", "slip", "stick"]
+    for row, step in zip(rows, steps, strict=True):
+        assert [order[number] for number in row] == step.contact.status_words()
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == order
+
+
+def test_loops_and_work_are_those_of_the_steps(steps: tuple[bk.Solution, ...]) -> None:
+    loop, work = draw_friction_loop(steps[-1]), draw_work(steps[-1])
+    assert loop.lines[0].get_ydata().tolist() == pytest.approx([0.0, *(step.force_tangential for step in steps)])
+    external, taken, energy = (line.get_ydata() for line in work.lines)
+    assert energy.tolist() == pytest.approx([0.0, *(step.energy for step in steps)])
+    # what is put in is stored or taken, but for the round-off of both, and the gaps that close
+    assert external[-1] == pytest.approx(energy[-1] + taken[-1], rel=0.01)
+    drawn = figures(steps[-1])
+    assert [*drawn][-3:] == ["friction-loop", "work", "status-over-time"]
+
+
+def test_results_without_a_history_have_no_pictures_of_it() -> None:
+    solution = bk.run(with_overrides(bk.load_scene("paper-1"), elements=24))
+    for draw in (draw_friction_loop, draw_work, lambda each: draw_status_over_time(each, "foundation")):
+        with pytest.raises(bk.InputError, match="has no load history: give load factors or steps to the scene"):
+            draw(solution)
+    with pytest.raises(bk.InputError, match="steps is empty"):
+        save_animation("a.gif", [])
+
+
+def test_the_animation_has_a_picture_of_each_step(steps: tuple[bk.Solution, ...], tmp_path: Path) -> None:
+    path = save_animation(tmp_path / "square.gif", steps, steps_per_second=5)
+    with Image.open(path) as film:
+        assert film.n_frames == len(FACTORS)  # type: ignore[attr-defined]
+        assert film.info["duration"] == 200
+        pictures = []
+        for number in range(len(FACTORS)):
+            film.seek(number)
+            pictures.append(np.asarray(film.convert("L"), dtype=float))
+    assert all(np.abs(one - two).max() > 100.0 for one, two in pairwise(pictures))
+    assert save_animation(path, steps[:1]) == path  # replaced
+    assert [each.name for each in tmp_path.iterdir()] == ["square.gif"]
+
+
+def test_animations_that_cannot_be_written_are_refused(
+    steps: tuple[bk.Solution, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    for name, message in (
+        ("a.avi", "unknown ending of a moving picture: choose .gif or .mp4"),
+        ("a.mp4", r"needs the encoder ffmpeg, which is not installed: choose \.gif"),
+    ):
+        with pytest.raises(OutputFileError, match=message):
+            save_animation(tmp_path / name, steps)
+    with pytest.raises(bk.InputError, match="steps_per_second is 0: give a whole number from 1 to 60"):
+        save_animation(tmp_path / "a.gif", steps, steps_per_second=0)
+    (tmp_path / "a.gif").write_text("mine", "utf-8")
+    with pytest.raises(OutputFileError, match="is not a moving picture"):
+        save_animation(tmp_path / "a.gif", steps)

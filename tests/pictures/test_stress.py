@@ -1,0 +1,127 @@
+"""Stresses inside: true at every point that is drawn, the boundary among them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import bemkit as bk
+from bemkit.pictures import draw_stress
+from bemkit.pictures.shown import shown
+from bemkit.pictures.stress import STRESSES
+from bemkit.pictures.stress_points import StressPoints, stress_points
+
+INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
+STRESS_MATERIAL = bk.Material(100.0, 0.3, bk.Plane.STRESS)
+
+
+def points_of(solution: bk.Solution) -> StressPoints:
+    return stress_points(solution, 0.1, shown(solution).frame)
+
+
+@pytest.mark.parametrize(("discretisation", "accuracy"), [("constant", 0.06), ("linear", 0.04), ("quadratic", 0.01)])
+def test_a_ring_under_pressure_has_lames_stresses_everywhere(discretisation: str, accuracy: float) -> None:
+    """A quarter of a ring of radii 1 and 2 with a pressure of 3 inside: errors of 20 to 48 elements."""
+    scene = bk.Scene(
+        title="ring",
+        shape=bk.Ring(1.0, 2.0),
+        material=bk.Material(100.0, 0.3),
+        parts=(bk.Part("hole", bk.Pressure(3.0), INNER),),
+        symmetry=bk.Symmetry(x=0.0, y=0.0),
+        mesh=bk.MeshOptions(elements=96),
+        discretisation=bk.scene_from_toml(SCENE_TEXT.format(word=discretisation)).discretisation,  # type: ignore[union-attr]
+    )
+    found = points_of(bk.run(scene))
+    radius = np.hypot(*found.points.T)
+    radial = found.points / radius[:, None]
+    hoop = np.stack([-radial[:, 1], radial[:, 0]], axis=1)
+    pressure, a = 3.0, 3.0 * 1.0 / (4.0 - 1.0)  # p a^2 / (b^2 - a^2)
+    exact_radial, exact_hoop = a * (1.0 - 4.0 / radius**2), a * (1.0 + 4.0 / radius**2)
+    for direction, exact in ((radial, exact_radial), (hoop, exact_hoop)):
+        value = np.einsum("ni,nij,nj->n", direction, found.stresses, direction)
+        assert np.abs(value - exact).max() < accuracy * (pressure + 2.0)
+    assert radius.min() < 1.001
+    assert radius.max() > 1.999
+    assert len(found.points) > 600
+
+
+SCENE_TEXT = """
+title = "any"
+discretisation = "{word}"
+[shape]
+kind = "rectangle"
+width = 1.0
+height = 1.0
+[material]
+youngs_modulus = 1.0
+poisson_ratio = 0.3
+[parts.all]
+condition = "clamped"
+"""
+
+
+@pytest.mark.parametrize("material", [bk.Material(100.0, 0.3), STRESS_MATERIAL, bk.Material(100.0, 0.5)])
+def test_uniform_stresses_are_exact(material: bk.Material) -> None:
+    parts = (
+        bk.Part("left", bk.Roller(), ("left",)),
+        bk.Part("bottom", bk.Roller(), ("bottom",)),
+        bk.Part("pull", bk.Traction(x=2.0), ("right",)),
+    )
+    scene = bk.Scene(title="bar", shape=bk.Rectangle(2.0, 1.0), material=material, parts=parts)
+    found = points_of(bk.run(scene))
+    np.testing.assert_allclose(
+        found.stresses, np.broadcast_to([[2.0, 0.0], [0.0, 0.0]], found.stresses.shape), atol=1e-7
+    )
+
+
+def test_the_weight_counts() -> None:
+    """The column between smooth walls: sigma_yy = -density g depth."""
+    solution = bk.run(bk.load_scene("gravity-column"))
+    found = points_of(solution)
+    (weight,) = solution.scene.body_forces
+    expected = -weight.density * 9.81 * (10.0 - found.points[:, 1])  # type: ignore[union-attr]
+    # at corners the stresses beside them stand for those in them
+    np.testing.assert_allclose(found.stresses[:, 1, 1], expected, atol=0.03 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        np.median(np.abs(found.stresses[:, 1, 1] - expected)), 0.0, atol=1e-6 * np.abs(expected).max()
+    )
+
+
+def test_bodies_without_an_end_are_drawn_as_far_as_the_frame() -> None:
+    scene = bk.Scene(
+        title="hole",
+        shape=bk.ExteriorOf(bk.Disk(1.0)),
+        material=STRESS_MATERIAL,
+        parts=(bk.Part("wall", bk.Pressure(1.0)),),
+        mesh=bk.MeshOptions(elements=24),
+        discretisation=bk.QuadraticGalerkin(),
+    )
+    found = points_of(bk.run(scene))
+    radius = np.hypot(*found.points.T)
+    value = np.einsum("nij,nij->n", found.stresses, found.stresses)
+    np.testing.assert_allclose(np.sqrt(value), np.sqrt(2.0) / radius**2, atol=0.02)
+    assert radius.max() > 2.5
+
+
+@pytest.mark.parametrize("measure", STRESSES)
+def test_each_measure_has_a_scale_and_a_largest_value(measure: str) -> None:
+    solution = bk.run(bk.load_scene("bending"))
+    axes = draw_stress(solution, measure=measure, units=bk.UnitNames("mm", "MPa"))
+    assert axes.collections
+    assert axes.get_title().splitlines()[0].endswith("MPa")
+    (scale,) = axes.child_axes
+    assert STRESSES[measure].symbol in scale.get_ylabel()
+    assert (scale.get_ylim()[0] == 0.0) == STRESSES[measure].is_positive
+
+
+def test_several_bodies_share_a_scale_and_the_axes_are_returned() -> None:
+    given = Figure().add_subplot()
+    solution = bk.run(bk.load_scene("masonry-arch"))
+    assert draw_stress(solution, given) is given
+    assert len(given.child_axes) == 1
+
+
+def test_an_unknown_measure_is_refused() -> None:
+    with pytest.raises(bk.InputError, match="measure is 'tresca': give one of von-mises"):
+        draw_stress(bk.run(bk.load_scene("bending")), measure="tresca")

@@ -1,0 +1,80 @@
+"""What notebooks show: tables and pictures of values, and the tutorial, executed."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import bemkit as bk
+from bemkit.report.notebook import notebook_html
+from bemkit.scene.toml import with_overrides
+from tests.report.test_page import Page
+
+NOTEBOOKS = sorted((Path(__file__).parents[2] / "docs" / "tutorials").glob("*.ipynb"))
+
+
+def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
+    scene = with_overrides(bk.load_scene("paper-1"), elements=24)
+    solution = bk.run(scene)
+    several = bk.load_scene("two-cylinders")
+    for value, words in (
+        (solution, ("converged", "contact nodes", "24")),
+        (scene, ("Rectangle", "Coulomb(friction_coefficient=0.5)", "24 elements")),
+        (several, ("bodies", "2", "contacts")),
+        (bk.run(with_overrides(several, elements=60)), ("converged", "bodies")),
+    ):
+        page = Page(value._repr_html_())
+        assert all(word in page.texts for word in words)
+        (picture,) = page.of("img")
+        assert value.title in picture["alt"]
+        assert len(value._repr_html_()) < 150_000
+    plan = Page(solution.plan._repr_html_())
+    assert all(item.reason in plan.texts for item in solution.plan.items)
+    assert not plan.of("img")
+
+
+def test_doubts_are_shown() -> None:
+    solution = bk.run(with_overrides(bk.load_scene("paper-1"), elements=24))
+    doubted = solution.with_warnings(("Something is doubtful.",))
+    assert "Something is doubtful." in Page(doubted._repr_html_()).texts
+
+
+def test_a_scene_that_cannot_be_divided_says_why_it_has_no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = bk.load_scene("paper-1")
+    far = bk.Part("far", bk.Clamped(), where=bk.Expression("x > 5"))
+    texts = " ".join(Page(dataclasses.replace(scene, parts=(*scene.parts, far))._repr_html_()).texts)
+    assert "No picture: " in texts
+    assert "far" in texts
+    monkeypatch.setattr("bemkit.report.notebook.has_pictures", lambda: False)
+    assert not Page(scene._repr_html_()).of("img")
+
+
+def test_other_values_show_their_repr() -> None:
+    assert notebook_html(3) == "<pre>3</pre>"
+
+
+@pytest.mark.skipif(
+    find_spec("nbclient") is None or find_spec("ipykernel") is None, reason="nbclient and ipykernel are not installed"
+)
+@pytest.mark.filterwarnings("default")  # of the kernel's own packages
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_tutorials_run_from_beginning_to_end(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join([str(Path(bk.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    )
+    notebook = nbformat.read(path, as_version=4)
+    assert all(not cell.get("outputs") for cell in notebook.cells), "outputs are made by who reads it"
+    NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    shown = [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", [])]
+    assert any("text/html" in data for data in shown)
+
+
+def test_there_is_a_tutorial() -> None:
+    assert NOTEBOOKS
