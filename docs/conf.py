@@ -2,12 +2,12 @@
 
 import json
 import sys
-from importlib.metadata import version as installed_version
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
 from bemkit.scene.schema import scene_schema
+from bemkit.version import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -18,7 +18,7 @@ from docstring_marks import as_restructured_text
 project = "bemkit"
 author = "The bemkit developers"
 copyright = author
-release = installed_version("bemkit")
+release = __version__
 version = release
 
 extensions = [
