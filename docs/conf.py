@@ -40,6 +40,7 @@ autodoc_preserve_defaults = True
 autosummary_generate = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True
 napoleon_use_param = False  # types are words and shapes: nothing to link
 
 PUBLISHED = Path(__file__).parent / "_build" / "published"
