@@ -2,12 +2,12 @@
 
 import json
 import sys
-from importlib.metadata import version as installed_version
 from pathlib import Path
 
 from sphinx.application import Sphinx
 
 from bemkit.scene.schema import scene_schema
+from bemkit.version import __version__
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -18,7 +18,7 @@ from docstring_marks import as_restructured_text
 project = "bemkit"
 author = "The bemkit developers"
 copyright = author
-release = installed_version("bemkit")
+release = __version__
 version = release
 
 extensions = [
@@ -40,6 +40,7 @@ autodoc_preserve_defaults = True
 autosummary_generate = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True
 napoleon_use_param = False  # types are words and shapes: nothing to link
 
 PUBLISHED = Path(__file__).parent / "_build" / "published"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 _CODE = re.compile(r"(``.*?``|`[^`]*`)")
 _ITEM = re.compile(r"\s*([*-]|\d+\.) ")
@@ -11,9 +12,10 @@ _ITEM = re.compile(r"\s*([*-]|\d+\.) ")
 def as_restructured_text(lines: list[str]) -> list[str]:
     """Return the lines with formulas protected.
 
-    An indented block after a line that ends with a colon is shown as it stands; bars
-    such as those of ``|x|`` are no marks.
+    An indented block after a line that ends with a colon is shown as it stands, and so is a paragraph that begins with
+    a slash, a list of places in a file; bars such as those of ``|x|`` are no marks.
     """
+    lines = list(_with_places_indented(lines))
     written: list[str] = []
     literal_beyond: int | None = None
     for k, line in enumerate(lines):
@@ -30,6 +32,16 @@ def as_restructured_text(lines: list[str]) -> list[str]:
             line, literal_beyond = f"{line}:", indent
         written.append(line)
     return written
+
+
+def _with_places_indented(lines: list[str]) -> Iterator[str]:
+    """Make a literal block of each paragraph that begins with a slash."""
+    is_inside = False
+    for line, before in zip(lines, ["", *lines[:-1]], strict=True):
+        is_inside = bool(line) and (is_inside or (not before and line.startswith("/")))
+        if is_inside and not before:
+            yield from ("::", "")
+        yield f"    {line}" if is_inside else line
 
 
 def _is_block(following: list[str], indent: int) -> bool:

@@ -68,7 +68,7 @@ def write(entry: Entry) -> str:
     pictures = []
     for name, figure in figures.items():
         pictures.append(f"{entry.page}-{name}.png")
-        figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH)
+        figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
     (FOLDER / pictures[0]).rename(FOLDER / f"{entry.page}.png")
     shown = "".join(f".. image:: {name}\n   :alt: {title}\n\n" for name in (f"{entry.page}.png", *pictures[1:]))
     page = heading(title) + text.replace("PICTURES", f"**What to look at.** {entry.look}\n\n{shown}")

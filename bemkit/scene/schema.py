@@ -90,6 +90,8 @@ class _Definitions:
         for plain, schema in _PLAIN:
             if declared is plain:
                 return dict(schema)
+        if declared is Any:
+            return {}
         origin, inner = get_origin(declared), get_args(declared)
         if origin is np.ndarray:
             return {"type": "array", "items": {"type": ["number", "array"]}}

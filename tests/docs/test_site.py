@@ -66,8 +66,9 @@ def test_names_of_the_package_are_not_documented_twice(make_api: ModuleType) -> 
         (["It is::", "", "    |a|"], ["It is::", "", "    |a|"]),
         (["These:", "", "  * |a|"], ["These:", "", r"  * \|a\|"]),
         (["x : float", "    Size:", "    |x|"], ["x : float", "    Size:", r"    \|x\|"]),
+        (["Places.", "", "/a  |x|", "/b", "", "End."], ["Places.", "", "::", "", "    /a  |x|", "    /b", "", "End."]),
     ],
-    ids=["bars", "formula", "literal", "list", "parameter"],
+    ids=["bars", "formula", "literal", "list", "parameter", "places"],
 )
 def test_formulas_of_docstrings_stay_as_they_are(
     lines: list[str], shown: list[str], monkeypatch: pytest.MonkeyPatch
