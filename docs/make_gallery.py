@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
+from bemkit.results.assembly_figures import all_assembly_figures
+from bemkit.results.figures import all_figures
 from matplotlib.figure import Figure
 
 import bemkit as bk
-from bemkit.results.assembly_figures import all_assembly_figures
-from bemkit.results.figures import all_figures
 from bemkit.scene.toml import shipped_files
 
 FOLDER = Path(__file__).parent / "gallery"
