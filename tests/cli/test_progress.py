@@ -92,9 +92,9 @@ def test_a_terminal_shows_stage_and_step(
 def test_the_bar_appears_before_anything_is_loaded() -> None:
     code = """
 import sys
-from bemkit.cli.main import _progress
+from bemkit.cli.options import shown_progress
 sys.stderr.isatty = lambda: True
-with _progress(False):
+with shown_progress(False):
     print([name for name in ("scipy", "h5py", "cattrs", "matplotlib") if name in sys.modules])
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

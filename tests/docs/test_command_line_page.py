@@ -14,6 +14,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from bemkit.cli import exit_codes
 from bemkit.cli import main as cli
 from bemkit.results.tables import TABLES
 from bemkit.scene.toml import load_scene, scene_to_toml
@@ -64,7 +65,14 @@ def test_every_option_is_listed_and_accepted(path: str) -> None:
 
 
 def test_exit_codes() -> None:
-    codes = [0, cli.NOT_CONVERGED, cli.BAD_INPUT, cli.INACCURATE, cli.INTERRUPTED, cli.PIPE_CLOSED]
+    codes = [
+        0,
+        exit_codes.NOT_CONVERGED,
+        exit_codes.BAD_INPUT,
+        exit_codes.INACCURATE,
+        exit_codes.INTERRUPTED,
+        exit_codes.PIPE_CLOSED,
+    ]
     assert [int(row[0]) for row in table(section(PAGE, "Exit codes"))] == codes
 
 
