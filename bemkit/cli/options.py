@@ -1,0 +1,92 @@
+"""What several commands have in common: degrees, pictures, where results go, progress."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from bemkit.results.outputs import JSON_START, Outputs, TextFile
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.solution import Solution
+    from bemkit.solvers.base import StepRecord
+
+
+def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
+    """Return a polynomial degree, or the word for degrees that rise until an accuracy is reached."""
+    if value is None:
+        return None
+    if value == "hp":
+        return "hp"
+    if not value.lstrip("+-").isdecimal():
+        raise click.BadParameter(f"{value} is no whole number: give one from 1 to 12, or hp", context, parameter)
+    return int(value)
+
+
+def pictures_of(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+    """Return the names of pictures, all of them known; None if none is named."""
+    if value is None:
+        return None
+    from bemkit.pictures.catalogue import find_picture
+
+    return tuple(find_picture(name.strip()).name for name in value.split(","))
+
+
+def outputs_of(
+    json_file: str | None,
+    csv_file: str | None,
+    folder: str | None,
+    table: str = "contact",
+    what: tuple[str, ...] | None = None,
+) -> Outputs[Solution | AssemblySolution]:
+    """Return where the command line sends a solution, besides a result file."""
+    if what is not None and folder is None:
+        raise click.UsageError("--what names figures: add --plot DIR")
+    if json_file is csv_file is folder is None:
+        return Outputs()
+    from bemkit.results.tables import CSV_STARTS, to_csv, to_json
+
+    def as_json(solution: Solution | AssemblySolution) -> str:
+        return to_json(solution) + "\n"
+
+    def as_csv(solution: Solution | AssemblySolution) -> str:
+        return to_csv(solution, table)
+
+    def pictures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
+        from bemkit.pictures.catalogue import figures
+
+        return figures(solution, what)
+
+    texts = (
+        TextFile(json_file, "JSON file", JSON_START, as_json),
+        TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
+    )
+    return Outputs(texts, folder, pictures, "deformation")
+
+
+def result_target(output: str | None, inside: int) -> list[Path]:
+    """Return the file of ``-o``, checked for its ending; ``--inside`` goes with it."""
+    if output is None:
+        if inside:
+            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
+        return []
+    from bemkit.results.export import format_of
+
+    return [format_of(output, inside).check(Path(output))]
+
+
+def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord], None] | None]:
+    """Return what shows a person how far a command is; nothing where nobody looks."""
+    if quiet or not sys.stderr.isatty():
+        return nullcontext()
+    from bemkit.cli.progress import live_progress
+
+    return live_progress(is_live=True)

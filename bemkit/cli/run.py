@@ -1,0 +1,140 @@
+"""The command ``bemkit run``."""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from bemkit.cli.exit_codes import INACCURATE, NOT_CONVERGED
+from bemkit.cli.options import degree_of, outputs_of, pictures_of, result_target, shown_progress
+from bemkit.errors import concerning
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.solution import Solution
+    from bemkit.scene.assembly import Assembly
+    from bemkit.scene.scene import Scene
+    from bemkit.solvers.base import StepRecord
+
+
+@click.command()
+@click.argument("scene")
+@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
+@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
+@click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
+@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
+@click.option("--accuracy", type=float, metavar="E", help="Refine until the estimated relative error is below E.")
+@click.option("--discretisation", metavar="WORD", help="hp, quadratic, linear or constant, instead of the scene's.")
+@click.option(
+    "--degree", metavar="P|hp", callback=degree_of, help="Galerkin elements of that degree, or of rising ones."
+)
+@click.option("--solver", metavar="WORD", help="Such as augmented-lagrangian, instead of the scene's.")
+@click.option("--rho", type=float, metavar="R", help="Penalty of the solver in units of E'/L, instead of the scene's.")
+@click.option("--cascade", is_flag=True, help="Solve on coarser meshes first and start from there.")
+@click.option("--explain", is_flag=True, help="Print planned against measured time and memory, and what was left out.")
+@click.option("-q", "--quiet", is_flag=True, help="Print neither the convergence table nor the summary.")
+def run(
+    scene: str,
+    output: str | None,
+    inside: int,
+    json_file: str | None,
+    csv_file: str | None,
+    folder: str | None,
+    what: tuple[str, ...] | None,
+    elements: int | None,
+    accuracy: float | None,
+    discretisation: str | None,
+    degree: int | Literal["hp"] | None,
+    solver: str | None,
+    rho: float | None,
+    cascade: bool,
+    explain: bool,
+    quiet: bool,
+) -> int:
+    """Solve SCENE, a TOML file or the name of a shipped scene."""
+    with ExitStack() as stack:
+        callback = stack.enter_context(shown_progress(quiet))  # shown before anything is loaded
+        from bemkit.atomic_files import reserved
+        from bemkit.scene.toml import load_scene, with_overrides
+
+        outputs = outputs_of(json_file, csv_file, folder, what=what)
+        click.get_current_context().with_resource(reserved(outputs.check(result_target(output, inside))))
+        chosen = with_overrides(
+            load_scene(scene),
+            elements=elements,
+            accuracy=accuracy,
+            discretisation=discretisation,
+            degree=degree,
+            solver=solver,
+            rho=rho,
+        )
+        with concerning(scene):
+            history_file = _history_file(chosen, output)
+            if explain:
+                _start_tracing()
+            try:
+                solution = _solve(chosen, cascade=cascade, callback=callback, history_file=history_file)
+            finally:
+                tracemalloc.stop()
+        if outputs.uses_stdout:
+            stack.close()  # no bar among the data
+        begin = time.perf_counter()
+        if output is not None and history_file is None:
+            from bemkit.results.export import export_result
+
+            export_result(output, solution, inside=inside)
+        outputs.write(solution)
+        output_seconds = time.perf_counter() - begin
+    if not quiet and not outputs.uses_stdout:
+        from bemkit.cli.console import print_summary
+
+        print_summary(solution)
+    if explain:
+        from bemkit.cli.console import print_explanation
+
+        print_explanation(solution, output_seconds, to_stderr=outputs.uses_stdout)
+    if solution.is_converged:
+        return 0
+    return INACCURATE if solution.is_certified else NOT_CONVERGED
+
+
+def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
+    """Return the result file of a load history on one mesh, which is written step by step; None of other runs."""
+    is_stepwise = scene.n_steps > 1 and scene.mesh.accuracy is None
+    return output if is_stepwise and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+
+
+def _solve(
+    scene: Scene | Assembly, *, cascade: bool, callback: Callable[[StepRecord], None] | None, history_file: str | None
+) -> Solution | AssemblySolution:
+    from bemkit.runs.run import run as solve_scene
+
+    if cascade:
+        from bemkit.runs.nested import run_cascade
+        from bemkit.scene.toml import single_body
+
+        return run_cascade(single_body(scene, scene.title), callback=callback)[-1]
+    if history_file is not None:
+        from bemkit.runs.checkpoint import run_to_file
+
+        return run_to_file(scene, history_file, callback=callback)
+    return solve_scene(scene, callback=callback)
+
+
+def _start_tracing() -> None:
+    """Trace memory from now on, with what every run loads on first use behind it."""
+    import scipy.linalg  # noqa: F401
+
+    import bemkit.results.error_indicators
+    import bemkit.runs.run  # noqa: F401
+
+    tracemalloc.start()

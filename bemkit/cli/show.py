@@ -1,0 +1,52 @@
+"""The command ``bemkit show``."""
+
+from __future__ import annotations
+
+import click
+
+from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress
+from bemkit.results.outputs import STDOUT, print_data
+
+
+@click.command()
+@click.argument("result")
+@click.option(
+    "--csv", "table", type=click.Choice(["contact", "boundary", "history", "steps"]), help="Print a table as CSV."
+)
+@click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
+@click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
+@click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
+@click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
+@click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
+def show(
+    result: str,
+    table: str | None,
+    json_file: str | None,
+    folder: str | None,
+    what: tuple[str, ...] | None,
+    shows_scene: bool,
+    output: str | None,
+    inside: int,
+) -> None:
+    """Show RESULT, a file written by bemkit run -o."""
+    from bemkit.results.result_file import read_result
+    from bemkit.scene.toml import scene_to_toml
+
+    if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
+        raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
+    outputs = outputs_of(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
+    outputs.check(result_target(output, inside))
+    with shown_progress(not folder or outputs.uses_stdout):
+        solution = read_result(result)
+        if output is not None:
+            from bemkit.results.export import export_result
+
+            export_result(output, solution, inside=inside)
+        outputs.write(solution)
+    if shows_scene:
+        print_data(scene_to_toml(solution.stated))
+    elif not (table or json_file or folder or output):
+        from bemkit.cli.console import print_summary
+
+        print_summary(solution)
