@@ -9,9 +9,6 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
@@ -135,6 +132,8 @@ def _without_repeated(strokes: Sequence[Stroke], tolerance: float) -> tuple[list
         notes.append(f"left out, because shorter than {tolerance:.2g}: lines, {n_short}")
     if not long:
         return [], notes
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(np.array([_features(stroke) for stroke in long])).query_pairs(2.0 * tolerance)
     repeated = {max(pair) for pair in pairs}
     if repeated:
@@ -153,6 +152,10 @@ def _features(stroke: Stroke) -> FloatArray:
 
 def _merged(points: FloatArray, tolerance: float) -> tuple[FloatArray, IntArray]:
     """Return places (m, 2), the middles of points closer than a tolerance, and the place (n,) of each point."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
     n_places, place = connected_components(graph, directed=False)
