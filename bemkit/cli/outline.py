@@ -17,6 +17,7 @@ from bemkit.geometry.files.shape_file import DrawingFile, MeshFile, is_drawing
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.vectors import norms
+from bemkit.results.drawing import new_figure
 from bemkit.results.outputs import Outputs, TextFile, plain_table, stdout_console
 from bemkit.scene.starting_scene import START, starting_scene
 from bemkit.scene.toml import load_single_body
@@ -107,6 +108,8 @@ def _kind(side: Side) -> str:
 
 
 def _figure(sides: Outline, file: str, units: UnitNames | None) -> Figure:
-    from bemkit.results.outline_figure import outline_figure
+    from bemkit.pictures.outline import draw_outline
 
-    return outline_figure(sides, Path(file).name, units)
+    figure = new_figure(7.0, 5.2)
+    draw_outline(sides, Path(file).name, figure.add_subplot(), units=units)
+    return figure

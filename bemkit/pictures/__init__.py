@@ -14,6 +14,7 @@ from bemkit.pictures.files import save_pictures as save_pictures
 from bemkit.pictures.friction_cone import draw_friction_cone as draw_friction_cone
 from bemkit.pictures.load_history import draw_friction_loop as draw_friction_loop
 from bemkit.pictures.load_history import draw_work as draw_work
+from bemkit.pictures.outline import draw_outline as draw_outline
 from bemkit.pictures.status_over_time import draw_status_over_time as draw_status_over_time
 from bemkit.pictures.stress import draw_stress as draw_stress
 from bemkit.pictures.zoom import draw_zoom as draw_zoom

@@ -8,11 +8,11 @@ import numpy as np
 
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.vectors import norms, turned_right
-from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _SEEN = np.linspace(0.0, 1.0, 65)
@@ -20,10 +20,9 @@ _MANY = 40
 """Sides of which each is still named."""
 
 
-def outline_figure(outline: Outline, title: str, units: UnitNames | None = None) -> Figure:
+def draw_outline(outline: Outline, title: str, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
     """Draw the sides of an outline in turning colours, their names beside them, and a dot where each begins."""
-    figure = new_figure(7.0, 5.2)
-    axes = figure.add_subplot()
+    axes = axes_or_new(axes, 7.0, 5.2)
     outwards = [1.0 if k == 0 or outline.is_exterior else -1.0 for k, loop in enumerate(outline.loops) for _ in loop]
     for number, (side, sense) in enumerate(zip(outline.sides, outwards, strict=True)):
         points = side.curve.point(_SEEN)
@@ -53,4 +52,4 @@ def outline_figure(outline: Outline, title: str, units: UnitNames | None = None)
     axes.set_xlabel(with_unit("x", "length", units), parse_math=False)
     axes.set_ylabel(with_unit("y", "length", units), parse_math=False)
     show_grid(axes)
-    return figure
+    return axes
