@@ -66,8 +66,9 @@ def test_names_of_the_package_are_not_documented_twice(make_api: ModuleType) -> 
         (["These:", "", "  * |a|"], ["These:", "", r"  * \|a\|"]),
         (["x : float", "    Size:", "    |x|"], ["x : float", "    Size:", r"    \|x\|"]),
         (["Places.", "", "/a  |x|", "/b", "", "End."], ["Places.", "", "::", "", "    /a  |x|", "    /b", "", "End."]),
+        ([], []),
     ],
-    ids=["bars", "formula", "literal", "list", "parameter", "places"],
+    ids=["bars", "formula", "literal", "list", "parameter", "places", "nothing"],
 )
 def test_formulas_of_docstrings_stay_as_they_are(
     lines: list[str], shown: list[str], monkeypatch: pytest.MonkeyPatch
