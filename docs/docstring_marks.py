@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 _CODE = re.compile(r"(``.*?``|`[^`]*`)")
 _ITEM = re.compile(r"\s*([*-]|\d+\.) ")
@@ -37,7 +38,7 @@ def as_restructured_text(lines: list[str]) -> list[str]:
 def _with_places_indented(lines: list[str]) -> Iterator[str]:
     """Make a literal block of each paragraph that begins with a slash."""
     is_inside = False
-    for line, before in zip(lines, ["", *lines[:-1]], strict=True):
+    for before, line in pairwise(["", *lines]):
         is_inside = bool(line) and (is_inside or (not before and line.startswith("/")))
         if is_inside and not before:
             yield from ("::", "")

@@ -47,9 +47,11 @@ class Entry:
 
 
 def entries() -> tuple[Entry, ...]:
-    """Return the entries in the order of the gallery."""
+    """Return the entries in the order of the list, and the shipped scenes that it does not name after them."""
+    listed = tomllib.loads((FOLDER / "entries.toml").read_text("utf-8"))
     return tuple(
-        Entry(name, look) for name, look in tomllib.loads((FOLDER / "entries.toml").read_text("utf-8")).items()
+        Entry(name, look)
+        for name, look in (listed | {name: "" for name in shipped_files() if name not in listed}).items()
     )
 
 
@@ -71,7 +73,8 @@ def write(entry: Entry) -> str:
         figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
     (FOLDER / pictures[0]).rename(FOLDER / f"{entry.page}.png")
     shown = "".join(f".. image:: {name}\n   :alt: {title}\n\n" for name in (f"{entry.page}.png", *pictures[1:]))
-    page = heading(title) + text.replace("PICTURES", f"**What to look at.** {entry.look}\n\n{shown}")
+    look = f"**What to look at.** {entry.look}\n\n" if entry.look else ""
+    page = heading(title) + text.replace("PICTURES", look + shown)
     (FOLDER / f"{entry.page}.rst").write_text(page, "utf-8")
     return title
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from bemkit.geometry.curves import Segment
+from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody
 from bemkit.operators.linear.solvers import Krylov
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.bibliography import PACKAGE, Work, works
@@ -14,7 +15,7 @@ from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation
-from bemkit.scene.registry import SOLVERS
+from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
 
@@ -28,6 +29,11 @@ DRIVERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     }
 )
 """The works behind each built-in driver, by its word in scene files."""
+
+LAW_WORKS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {"slip-weakening": ("Ida1972",), "rate-strengthening": ("Dieterich1979",)}
+)
+"""The works behind friction laws that are no textbook matter, by their words in scene files."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +116,12 @@ _CONJUGATE_GRADIENTS = Method(
 def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
     bodies: tuple[Scene | Body, ...] = stated.bodies if isinstance(stated, Assembly) else (stated,)
     is_adaptive = stated.mesh.accuracy is not None
-    for discretisation in (body.discretisation or stated.discretisation for body in bodies):
+    with_boundary = [body for body in bodies if not isinstance(body.shape, HalfPlaneBody | PeriodicHalfPlaneBody)]
+    if len(with_boundary) < len(bodies):
+        yield Method("flexibility of the surface of a half-plane in closed form", ("Johnson1985",))
+    for discretisation in (body.discretisation or stated.discretisation for body in with_boundary):
         yield from _of_discretisation(discretisation, is_adaptive=is_adaptive)
-    sides = [side for body in bodies for side in body.shape.outline().sides]
+    sides = [side for body in with_boundary for side in body.shape.outline().sides]
     if any(not isinstance(side.curve, Segment) for side in sides):
         yield Method("integrals near curved elements", ("AfKlintebergBarnett2021",))
     if any(body.body_forces for body in bodies):
@@ -140,6 +149,10 @@ def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
     if isinstance(stated, Scene) and not stated.contact_parts:
         return
     yield Method("contact and friction as projection equations", ("Paper", "AlartCurnier1991", "QiSun1993"))
+    own = stated.laws.values() if isinstance(stated, Scene) else [pair.law for pair in stated.contacts if pair.law]
+    for law in (stated.law, *own):
+        if keys := LAW_WORKS.get(LAWS.word_of(law)):
+            yield Method(f"law {LAWS.word_of(law)}", keys)
     word = SOLVERS.word_of(stated.solver)
     yield Method(f"driver {word}", DRIVERS.get(word, ()))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -67,8 +66,9 @@ def test_names_of_the_package_are_not_documented_twice(make_api: ModuleType) -> 
         (["These:", "", "  * |a|"], ["These:", "", r"  * \|a\|"]),
         (["x : float", "    Size:", "    |x|"], ["x : float", "    Size:", r"    \|x\|"]),
         (["Places.", "", "/a  |x|", "/b", "", "End."], ["Places.", "", "::", "", "    /a  |x|", "    /b", "", "End."]),
+        ([], []),
     ],
-    ids=["bars", "formula", "literal", "list", "parameter", "places"],
+    ids=["bars", "formula", "literal", "list", "parameter", "places", "nothing"],
 )
 def test_formulas_of_docstrings_stay_as_they_are(
     lines: list[str], shown: list[str], monkeypatch: pytest.MonkeyPatch
@@ -79,6 +79,12 @@ def test_formulas_of_docstrings_stay_as_they_are(
     assert as_restructured_text(lines) == shown
 
 
+def test_every_page_has_its_place_in_the_navigation() -> None:
+    index = (DOCS / "index.md").read_text("utf-8")
+    for page in DOCS.glob("*.md"):
+        assert page.stem == "index" or re.search(rf"^{page.stem}$", index, re.MULTILINE), page.name
+
+
 @pytest.fixture
 def make_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     monkeypatch.syspath_prepend(DOCS)
@@ -87,8 +93,8 @@ def make_gallery(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return make_gallery
 
 
-def test_the_gallery_shows_every_shipped_scene_and_every_file_of_its_folder() -> None:
-    names = list(tomllib.loads((DOCS / "gallery" / "entries.toml").read_text("utf-8")))
+def test_the_gallery_shows_every_shipped_scene_and_every_file_of_its_folder(make_gallery: ModuleType) -> None:
+    names = [entry.name for entry in make_gallery.entries()]
     files = [path.name for path in (DOCS / "gallery").iterdir() if path.suffix in (".toml", ".py")]
     assert sorted(names) == sorted([*shipped_files(), *(name for name in files if name != "entries.toml")])
     assert len(names) >= 20

@@ -11,9 +11,10 @@ from click.testing import CliRunner
 
 import bemkit as bk
 from bemkit.cli.main import commands
+from bemkit.contact.history_laws import SlipWeakening
 from bemkit.results.bibliography import PACKAGE, Work, works
-from bemkit.results.citations import DRIVERS, Citations, Method, cite
-from bemkit.scene.registry import SOLVERS
+from bemkit.results.citations import DRIVERS, LAW_WORKS, Citations, Method, cite
+from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.toml import shipped_files, with_overrides
 from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE
 from bemkit.version import __version__
@@ -66,11 +67,23 @@ def test_options_cite_works_that_other_options_do_not(options: dict[str, str], k
         ("two-cylinders", "Wohlmuth2000"),
         ("gravity-column", "TimoshenkoGoodier1970"),
         ("disc-between-plates", "AfKlintebergBarnett2021"),
+        ("cylinder-on-half-plane", "Johnson1985"),
     ],
 )
 def test_what_scenes_hold_cites_works(name: str, key: str) -> None:
     assert key in keys(cite(bk.load_scene(name)))
     assert key not in keys(cite(PAPER_1))
+
+
+def test_a_half_plane_cites_no_elements() -> None:
+    assert not keys(cite(bk.load_scene("rough-surface"))) & {"Steinbach2008", "Betti1872"}
+
+
+def test_a_law_cites_its_work() -> None:
+    law = SlipWeakening(static_friction=0.5, kinetic_friction=0.3, slip_distance=1.0)
+    assert "Ida1972" in keys(cite(replace(PAPER_1, law=law, steps=(bk.Step(1.0),))))
+    assert "Ida1972" not in keys(cite(PAPER_1))
+    assert LAW_WORKS.keys() <= LAWS.built_in.keys()
 
 
 def test_a_scene_without_contact_cites_nothing_of_contact() -> None:
