@@ -88,6 +88,43 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
     assert contact.peak_pressure == pytest.approx(peak * load, rel=1e-3)
 
 
+def test_cylinders_approach_each_other_as_the_closed_form_says() -> None:
+    """Two discs between smooth rigid plates: each centre nears each contact by (P / pi E') (2 ln(4 R / a) - 1).
+
+    The closed form leaves out (a / R)^2 = 3e-4; the force drives the upper plate.
+    """
+    load, material = 2e-4, bk.Material(0.91, 0.3)  # E' = 1
+    near, low, high = bk.Expression("abs(x) < 0.06"), ("arc-3", "arc-4"), ("arc-1", "arc-2")
+    top = bk.Part("top", bk.Free(), high, near)
+    floor = bk.Part("floor", bk.Contact(bk.HalfPlane()), low, near)
+    lower = bk.Body(name="lower", shape=bk.Disk(1.0, (0.0, 1.0)), material=material, parts=(top, floor))
+    bottom = bk.Part("bottom", bk.Free(), low, near)
+    upper = bk.Body(name="upper", shape=bk.Disk(1.0, (0.0, 3.0)), material=material, parts=(top, bottom))
+    plate = bk.RigidBody(name="plate", obstacle=bk.HalfPlane((0.0, 4.0), (0.0, -1.0)), force_y=-load)
+    solution = bk.run(
+        bk.Assembly(
+            title="Cylinders between plates",
+            bodies=(lower, upper),
+            rigid=(plate,),
+            contacts=(bk.ContactPair(("upper.bottom", "lower.top")), bk.ContactPair(("upper.top", "plate"))),
+            discretisation=bk.QuadraticGalerkin(),
+            mesh=bk.MeshOptions(accuracy=0.01),
+        )
+    )
+    assert solution.is_converged
+    half_width = np.sqrt(4.0 * load / np.pi)  # R E* are 1/2 and 1/2 between the discs, 1 and 1 at the plates
+    expected = 2.0 * load / np.pi * (2.0 * np.log(4.0 / half_width) - 1.0)
+    heights = {"lower": 1.0, "upper": 3.0}
+    sinks = [
+        bk.interior_fields(solution.bodies[name]).displacement(np.array([[0.0, y]]))[0, 1]
+        for name, y in heights.items()
+    ]
+    assert sinks[0] - sinks[1] == pytest.approx(expected, rel=1e-3)
+    assert -solution.rigid["plate"].y == pytest.approx(2.0 * expected, rel=1e-3)
+    for contact in solution.contacts:
+        assert contact.peak_pressure == pytest.approx(2.0 * load / (np.pi * half_width), rel=1e-3)
+
+
 def test_cylinders_pressed_then_sheared_are_those_of_cattaneo_and_mindlin() -> None:
     """Two steps on meshes that fit the sheared state: stick zone, shear and slip at the edge to half a per cent."""
     scene, friction = bk.load_scene("two-cylinders"), 0.5

@@ -67,6 +67,16 @@ def test_a_force_and_the_displacement_it_causes_are_one_problem(law: bk.Friction
     assert by_motion.rigid["punch"].force_y == pytest.approx(-FORCE, rel=1e-10)
 
 
+def test_the_shipped_punch_tilts_as_on_a_half_plane() -> None:
+    """The block is twenty half-widths deep, its mesh that of 2 %: tilt and pressure of [Johnson1985], section 2.8."""
+    solution = solved(bk.load_scene("tilted-punch"))
+    force, moment = 1e-3, 2e-4
+    assert -solution.rigid["punch"].turn == pytest.approx(4.0 * moment / np.pi, rel=3e-3)
+    table = solution.contact
+    x, pressure = (column[np.abs(table.x) < 0.9] for column in (table.x, -table.sigma_n))
+    np.testing.assert_allclose(pressure, (force + 2.0 * moment * x) / (np.pi * np.sqrt(1.0 - x**2)), rtol=1e-2)
+
+
 def test_an_eccentric_force_tilts_the_punch_and_its_moment_is_balanced() -> None:
     by_moment = solved(driven(moment=-0.1 * FORCE)).rigid["punch"]
     by_place = solved(driven(centre=(1.1, 1.0), moment=0.0)).rigid["punch"]  # type: ignore[arg-type]

@@ -111,9 +111,13 @@ def couple(
     directions = mean_directions(non_mortar, mortar, reach)
     segments = common_refinement(non_mortar, mortar, directions, reach)
     if not segments.is_covered.any():
+        longest = float(max(non_mortar.lengths.max(), mortar.lengths.max()))
+        coarse = (
+            f", or elements shorter than {longest:.3g}, which are judged by their middles" if longest > reach else ""
+        )
         raise NotFacingError(
             f"the sides at {format_point(non_mortar.start[0])} and {format_point(mortar.start[0])} face each other "
-            f"nowhere within the distance {reach:g}: choose sides whose outward normals point at each other"
+            f"nowhere within the distance {reach:g}: choose sides whose outward normals point at each other{coarse}"
         )
     may_carry = np.ones(non_mortar.dofs.shape, bool) if without is None else ~np.isin(non_mortar.dofs, without)
     while may_carry[segments.row[segments.is_covered]].any():

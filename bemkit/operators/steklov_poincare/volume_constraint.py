@@ -59,7 +59,8 @@ class VolumeConstraint:
         yielded = self.volume.T @ displacement + self.yields
         if yielded.size and not yielded.min() > 0.0:
             raise SingularMatrixError(
-                "the incompressible body (poisson_ratio 0.5) has no free boundary to make room: leave a part free"
+                "the incompressible body (poisson_ratio 0.5) has no free boundary to make room, as supports and "
+                "contact take all of it: leave a part free, or give a poisson_ratio of 0.4999"
             )
         return displacement, yielded
 

@@ -240,6 +240,12 @@ def test_a_side_around_a_whole_disc() -> None:
         np.testing.assert_allclose(coupling.gap, 0.01, rtol=1e-4)
 
 
+def test_elements_too_long_for_a_short_reach_are_named() -> None:
+    upper, lower = block((0.0, 0.2), (1.0, 1.2), 2, 2), block((0.0, -1.0), (1.0, 0.0), 4, 2)
+    with pytest.raises(NotFacingError, match=r"or elements shorter than 0\.5, which are judged by their middles"):
+        couple(side_of(upper, 2, "bottom"), side_of(lower, 2, "top"), reach=0.1)
+
+
 @pytest.mark.parametrize(
     ("parts", "lift"),
     [(("bottom", "bottom"), 0.0), (("top", "bottom"), 0.0), (("left", "top"), 0.0), (("bottom", "top"), 5.0)],
