@@ -76,6 +76,7 @@ WRONG = {
     "bound": lambda: kirsch(bounds=(1e-3, 1e-7, 1e-7)),
     "order": lambda: kirsch(order=3.5),
     "scene": fails,
+    "zone": lambda: kirsch(measure=lambda solution: solution.transitions[0].s),
 }
 
 
@@ -91,6 +92,8 @@ def test_a_row_made_wrong_is_missed(
     assert f"missed: {name}, " in out
     if name == "scene":
         assert "no-such-scene" in out
+    if name == "zone":
+        assert "the solution lacks what is compared (IndexError: " in out
     if name == "value":  # the other rows of the case are right
         assert "2 of 3 rows met" in out
 
