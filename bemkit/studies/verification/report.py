@@ -12,7 +12,7 @@ from bemkit.results.outputs import stdout_console
 from bemkit.studies.verification.records import Verification, VerifiedRow
 
 HEAD = ("case", "quantity", "source", "expected", "errors", "order", "bound")
-_LINE = "  {:<26} {:>11}  {:<23} {:>5}  {:>7}"
+_LINE = "  {:<27}{:>11}  {:<23} {:>5} {:>7}"
 MARKDOWN_START = "| case | quantity |"
 
 
