@@ -42,7 +42,7 @@ def test_data_takes_nine_forms_in_this_order() -> None:
 def test_every_kind_of_addition_has_its_row() -> None:
     names = (
         "law, driver, space, discretisation, obstacle, file of a body, operator, body, body force, rule for copies, "
-        "sequence of meshes, scene word, picture, study"
+        "sequence of meshes, scene word, picture, known answer, study"
     )
     assert [row[0] for row in PLACES] == names.split(", ")
 

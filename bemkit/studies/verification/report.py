@@ -12,7 +12,7 @@ from bemkit.results.outputs import stdout_console
 from bemkit.studies.verification.records import Verification, VerifiedRow
 
 HEAD = ("case", "quantity", "source", "expected", "errors", "order", "bound")
-_LINE = "  {:<26} {:>11}  {:<23} {:>5}  {:>5}"
+_LINE = "  {:<27}{:>11}  {:<23} {:>5} {:>7}"
 MARKDOWN_START = "| case | quantity |"
 
 
@@ -47,4 +47,4 @@ def _cells(row: VerifiedRow) -> tuple[str, ...]:
     expected = f"{row.quantity.expected:.6g}" if row.quantity.expected else "-"
     errors = " ".join(f"{error:.1e}" for error in row.errors)
     order = "-" if math.isnan(row.order) else f"{row.order:.1f}"
-    return row.name, row.quantity.name, row.case.source, expected, errors, order, f"{row.bounds[-1]:.0e}"
+    return row.name, row.quantity.name, row.case.source, expected, errors, order, f"{row.bounds[-1]:.1e}"

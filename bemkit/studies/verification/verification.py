@@ -15,7 +15,7 @@ from bemkit.formulas import closest
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.verification.case import Case
+from bemkit.studies.verification.case import Case, Quantity
 from bemkit.studies.verification.cases import CASES
 from bemkit.studies.verification.records import FILE, Verification, VerificationRecord, rows_of
 from bemkit.version import __version__
@@ -99,7 +99,9 @@ def compare(name: str, case: Case, resolution: float) -> Comparison:
     is_certified = solution is not None and solution.is_certified
     records = []
     for quantity in case.quantities:
-        value = float(quantity.measure(solution)) if is_certified else np.nan
+        value, message = np.nan, found.message
+        if is_certified:
+            value, message = _measured(quantity, solution)
         error = quantity.error(value)
         records.append(
             VerificationRecord(
@@ -110,10 +112,18 @@ def compare(name: str, case: Case, resolution: float) -> Comparison:
                 value=value,
                 error=error if np.isfinite(error) else np.inf,
                 seconds=found.seconds,
-                message="" if is_certified else found.message,
+                message=message,
             )
         )
     return Comparison((name, resolution), tuple(records))
+
+
+def _measured(quantity: Quantity, solution: Solution | AssemblySolution | None) -> tuple[float, str]:
+    """Return what came out, or nan and a message: a wrong solution may lack the zones that are compared."""
+    try:
+        return float(quantity.measure(solution)), ""
+    except (LookupError, ArithmeticError, ValueError) as error:
+        return np.nan, f"the solution lacks what is compared ({type(error).__name__}: {error})"
 
 
 def _keys(name: str, case: Case, *, quick: bool) -> Iterator[tuple[str, str, float]]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from bemkit.studies.verification.case import Case
-from bemkit.studies.verification.cases import elastic, half_plane, obstacles, pairs
+from bemkit.studies.verification.cases import elastic, half_plane, layers, obstacles, pairs
 
 CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(
     {
@@ -18,7 +18,7 @@ CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(
         "gravity-column": obstacles.gravity_column,
         "westergaard": obstacles.westergaard,
         "disc-between-plates": obstacles.disc_between_plates,
-        "receding-layer": obstacles.receding_layer,
+        "receding-layer": layers.receding_layer,
         "ring-on-shaft": obstacles.ring_on_shaft,
         "paper-1": obstacles.paper_1,
         "paper-2": obstacles.paper_2,
@@ -29,6 +29,7 @@ CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(
         "cattaneo-mindlin": pairs.cattaneo_mindlin,
         "pin-in-hole": pairs.pin_of_the_same,
         "pin-in-stiffer-hole": pairs.pin_of_another,
+        "receding-pair": layers.receding_pair,
         "hertz-half-plane": half_plane.hertz,
         "flat-punch": half_plane.flat_punch,
         "tilted-punch": half_plane.tilted_punch,

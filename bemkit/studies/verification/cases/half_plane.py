@@ -131,7 +131,12 @@ def static_cylinder() -> Case:
     ratio = static_cylinder_stick_ratio(FRICTION, STEEL)
     scene = _scene(PARABOLA, 1.5 * HertzLine(1.0, 1.0, 1.0).half_width, PRESSED, Coulomb(FRICTION))
     return _stick(
-        "cylinder with friction, static law", "Johnson1985", "one step, static law", scene, ratio, (6e-2, 2e-3, 1e-4)
+        "cylinder with friction, static law",
+        "Johnson1985",
+        "one step, static law; by panels in bemkit.reference.spence",
+        scene,
+        ratio,
+        (6e-2, 2e-3, 1e-4),
     )
 
 

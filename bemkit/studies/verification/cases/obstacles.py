@@ -10,7 +10,7 @@ from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap
 from bemkit.geometry.shapes import Ring
 from bemkit.operators.material import Material
-from bemkit.reference import LameRing, RecedingLayer, find_reference
+from bemkit.reference import LameRing, find_reference
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Contact, Part, Pressure
 from bemkit.scene.discretisation import QuadraticGalerkin
@@ -105,24 +105,6 @@ def paper_2() -> Case:
         sigma_t=(1e-3, 1e-4, 6e-6),
         energy=(1e-8, 2e-10, 1e-12),
         transitions=(1e-4, 1e-5, 1e-6),
-    )
-
-
-def receding_layer() -> Case:
-    """Return a layer that lifts off a rigid base."""
-    exact = RecedingLayer(1.0, 0.5, 1.0)
-    scene = with_overrides(load_single_body("receding-layer"), accuracy=RISING[0], degree="hp")
-    half_width, peak = (3e-3, 1e-5, 1e-6), (3e-4, 1e-6, 1e-8)
-    return Case(
-        title=scene.title,
-        source="KeerDundursTsai1972",
-        validity="no friction, no weight; any load and material",
-        solve=at_resolution(scene),
-        resolutions=RISING,
-        quantities=(
-            Quantity("half-width", lambda solution: solution.contacts[0].contact_length, half_width, exact.half_width),
-            Quantity("peak pressure", lambda solution: solution.contacts[0].peak_pressure, peak, exact.peak_pressure),
-        ),
     )
 
 

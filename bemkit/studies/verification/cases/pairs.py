@@ -11,7 +11,15 @@ from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, ExteriorOf, Rectangle, Ring
 from bemkit.operators.material import Material
-from bemkit.reference import GravityColumn, HertzLine, LameRing, PartialSlip, PinInHole, ShrinkFit, pair_modulus
+from bemkit.reference import (
+    GravityColumn,
+    HertzLine,
+    LameRing,
+    PartialSlip,
+    PinInHole,
+    ShrinkFit,
+    pair_modulus,
+)
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.runs.assembly import run_assembly_history
 from bemkit.runs.run import run
