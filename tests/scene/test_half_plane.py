@@ -81,6 +81,16 @@ def test_a_load_step_under_another_load_is_that_of_a_run_of_its_own() -> None:
     np.testing.assert_allclose(second.contact.u_n, alone.contact.u_n, atol=1e-9)
 
 
+@pytest.mark.parametrize("scene", [PUNCH, ROUGH], ids=lambda scene: scene.title)
+def test_steps_change_what_acts_far_away(scene: bk.Scene) -> None:
+    assert scene.far is not None
+    sheared = bk.Step(2.0, {"far.force_x": "0.002 * (t - 1)"}, increments=2)
+    pressed = replace(scene, far=replace(scene.far, force_x=0.0))
+    history = bk.run_history([replace(pressed, steps=(bk.Step(1.0), sheared))])
+    assert all(step.is_converged for step in history)
+    np.testing.assert_allclose([-step.contacts[0].force_x for step in history], [0.0, 0.001, 0.002], atol=1e-12)
+
+
 def test_displacement_and_force_tell_the_same_story() -> None:
     """What a force drives, driven by the displacement that it has caused."""
     pressed = replace(PUNCH, law=bk.Frictionless(), far=bk.FarField(x=0.0, force_y=0.05, turn=0.0))
