@@ -27,11 +27,13 @@ def main() -> None:
     """Solve Example 1 of the paper with linear elements, an arch, a pin and a friction loop, and draw them."""
     solution = bk.run(with_overrides(bk.load_scene("paper-1"), discretisation="linear"))
     loop = bk.run(bk.load_scene("friction-loop"))
+    rough = bk.run(with_overrides(bk.load_scene("rough-surface"), elements=1024))
     arch, pin = bk.run(bk.load_scene("masonry-arch")), bk.run(bk.load_scene("pin-in-plate"))
     pictures = {
         "paper-1-deformed": draw_deformation(solution),
         "paper-1-displacement": draw_contact_displacement(solution, "foundation"),
         "paper-1-traction": draw_contact_traction(solution, "foundation"),
+        "rough-surface-displacement": draw_contact_displacement(rough, "zone"),
         "masonry-arch-deformed": draw_deformation(arch),
         "masonry-arch-contacts": draw_contact_map(arch),
         "pin-in-plate-contacts": draw_contact_map(pin),

@@ -202,13 +202,19 @@ class _System:
             raise SingularResponse(f"{_MOST_CORRECTIONS} corrections have not led to a response")
         return solution[:n], solution[n:] / self._sizes
 
-    @property
+    @cached_property
     def _motions(self) -> ComplexArray:
+        """(n_driven, n_contact) array: unit driven motions."""
         return self.body._motions[self.body._driven]
+
+    @cached_property
+    def _works(self) -> ComplexArray:
+        """(n_driven, n_contact) array: what tractions are multiplied by for their work on these."""
+        return np.asarray(self.body.weights * self._motions.conj())
 
     def _resultants(self, traction: ComplexArray) -> FloatArray:
         """Return the work of tractions on the driven motions."""
-        return np.asarray((self.body.weights * traction * self._motions.conj()).real.sum(axis=1))
+        return np.asarray((self._works @ traction).real)
 
     def _left(self, x: FloatArray) -> FloatArray:
         """Return the left-hand sides of the equations."""

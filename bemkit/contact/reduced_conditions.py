@@ -120,8 +120,18 @@ class ReducedConditions:
 
     def rows(self, displacement: ComplexArray, traction: ComplexArray) -> FloatArray:
         """Return the left-hand sides (n_unknowns,) of the equations."""
-        of_displacement = self.on_displacement.conj() * displacement[self.node]
-        return np.asarray((of_displacement + self.on_traction.conj() * traction[self.node]).real)
+        left = self._displacement_factor * displacement[self.node]
+        if self._traction_factor.any():
+            left += self._traction_factor * traction[self.node]
+        return np.asarray(left.real)
+
+    @cached_property
+    def _displacement_factor(self) -> ComplexArray:
+        return np.asarray(self.on_displacement.conj())
+
+    @cached_property
+    def _traction_factor(self) -> ComplexArray:
+        return np.asarray(self.on_traction.conj())
 
     def displacements(self, rows: FloatArray) -> ComplexArray:
         """Return displacements (n_contact,) that have these left-hand sides, as small as they can be."""
@@ -132,9 +142,15 @@ class ReducedConditions:
 
         Equations that involve tractions, too, are softer, each for itself, at the stiffness [Pa/m] of a node.
         """
-        own = (self.direction.conj() * traction[self.node]).real
-        softer = (self.on_traction.conj() * self.direction).real
+        own = (self._along * traction[self.node]).real
+        if not self._traction_factor.any():
+            return np.asarray(own)
+        softer = (self._traction_factor * self.direction).real
         return np.asarray(np.where(softer == 0.0, own, rows * stiffness / (1.0 + np.abs(softer) * stiffness)))
+
+    @cached_property
+    def _along(self) -> ComplexArray:
+        return np.asarray(self.direction.conj())
 
     def met_exactly(self, displacement: FloatArray, traction: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return displacements and tractions (n_contact, 2) that meet conditions on one of them to the digit."""

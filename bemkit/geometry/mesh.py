@@ -305,9 +305,9 @@ class BoundaryMesh:
                 f"BoundaryMesh: marked contains elements from {marked.min()} to {marked.max()}: "
                 f"use numbers from 0 to {self.n_elements - 1}"
             )
-        is_halved = np.zeros(self.n_elements, dtype=bool)
-        is_halved[marked] = True
-        return BoundaryMesh(*bisected(self._content, is_halved, self.centres), self.is_exterior, self.symmetry)
+        is_halved = np.isin(np.arange(self.n_elements), marked)
+        halves = bisected(self._content, is_halved, self.centres)
+        return BoundaryMesh(*halves, self.is_exterior, self.symmetry, self.surface)
 
     def transformed(self, shift: tuple[float, float] = (0.0, 0.0), factor: float = 1.0) -> "BoundaryMesh":
         """Return the mesh of the body (x - shift) * factor, with the same elements and parts.

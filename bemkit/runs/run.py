@@ -99,7 +99,7 @@ def _gains_by_cascade(scene: Scene) -> bool:
     """Whether coarser meshes find nearly all of the contact for next to nothing: of periodic half-planes they do."""
     surface = scene.shape.outline().surface
     is_periodic = surface is not None and surface.is_periodic
-    return is_periodic and len(scene.load_factors) == 1 and scene.mesh.n_elements >= 2 * _COARSEST
+    return is_periodic and scene.n_steps == 1 and scene.mesh.n_elements >= 2 * _COARSEST
 
 
 def _run_assembly(

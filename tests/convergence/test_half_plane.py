@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,6 +139,35 @@ def test_stick_under_a_punch_and_under_a_cylinder_is_as_spence_says() -> None:
     end, stick = zones(pressed("x**2 / 2", 1.1 * a, ALONG, law=FRICTION, load_factors=steps, mesh=mesh))
     # 40 steps leave 1 per cent, 160 a quarter of it
     assert stick / end == pytest.approx(punch, rel=1.5e-2)
+
+
+def test_two_equal_bodies_sheared_after_pressing_as_cattaneo_and_mindlin_say() -> None:
+    """One half-plane of the composite modulus and of the Poisson ratio 1/2 stands for two of one material."""
+    composite = 0.5 * MODULUS
+    a = np.sqrt(4.0 / (np.pi * composite))
+    shear = 0.5 * 0.3  # half of what friction can carry
+    scene = bk.Scene(
+        title="two cylinders",
+        shape=bk.HalfPlaneBody(-1.05 * a, 1.05 * a),
+        material=bk.Material(0.75 * composite, 0.5),
+        law=FRICTION,
+        parts=(bk.Part("zone", bk.Contact(bk.Gap(bk.Expression("x**2 / 2")))),),
+        far=bk.FarField(force_y=1.0, force_x=0.0, turn=0.0),
+        mesh=bk.MeshOptions(elements=700),
+    )
+    sheared = replace(scene, far=bk.FarField(force_y=1.0, force_x=shear, turn=0.0))
+    pressed_state, solution = bk.run_history([scene, sheared])
+    assert solution.is_converged
+    # pressing alone causes no friction between equal bodies
+    assert np.abs(pressed_state.contact.sigma_t).max() < 1e-9
+    stick = a * np.sqrt(1.0 - shear / 0.3)
+    places = [place.x for place in solution.transitions if "stick" in (place.from_status, place.to_status)]
+    assert sorted(places) == pytest.approx([-stick, stick], rel=WITHIN)
+    x = solution.contact.x
+    outer, inner = (np.sqrt(np.maximum(1.0 - (x / size) ** 2, 0.0)) for size in (a, stick))
+    exact = 0.3 * 2.0 / (np.pi * a) * (outer - stick / a * inner)
+    weight = solution.contact.weight
+    assert weight @ np.abs(np.abs(solution.contact.sigma_t) - exact) < WITHIN * shear
 
 
 def test_a_block_of_sixty_half_widths_agrees() -> None:

@@ -24,10 +24,11 @@ def strip(places: np.ndarray, angle: float = 0.0) -> BoundaryMesh:
     return BoundaryMesh(nodes, elements, is_exterior=True, surface=Surface())
 
 
-def test_mean_logarithms_agree_with_sixty_digits() -> None:
-    means = mean_logarithms(PLACES)
+@pytest.mark.parametrize("given", [PLACES, np.linspace(0.0, 1.0, 31)], ids=["graded", "equal"])
+def test_mean_logarithms_agree_with_sixty_digits(given: np.ndarray) -> None:
+    means = mean_logarithms(given)
     with workdps(60):
-        places = [mpf(float(place)) for place in PLACES]
+        places = [mpf(float(place)) for place in given]
         for i in range(len(means)):
             for j in range(len(means)):
                 (a, b), (c, d) = places[i : i + 2], places[j : j + 2]

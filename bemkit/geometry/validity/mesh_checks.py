@@ -52,6 +52,7 @@ def check_chains(
             f"BoundaryMesh: node {node} at {format_point(nodes[node])} starts {n_starting[node]} and ends "
             f"{n_ending[node]} elements: each node must start one and end one, so that the boundary is closed"
             + ("" if symmetry is None else f", or lie on the symmetry line ({symmetry})")
+            + (", but for the first and the last one of a half-plane" if is_strip else "")
         )
     chord = norms(nodes[elements[:, 1]] - nodes[elements[:, 0]])
     for element in np.flatnonzero(chord <= resolution(nodes[elements[:, 0]], nodes[elements[:, 1]])):
