@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 import tracemalloc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from importlib import import_module
 from pathlib import Path
@@ -17,13 +17,12 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from bemkit.cli.result_outputs import result_outputs, result_target
 from bemkit.errors import BemkitError, NoResultError, concerning, one_line, printable
-from bemkit.results.outputs import JSON_START, STDOUT, Outputs, PipeClosedError, TextFile, guarded_streams, print_data
+from bemkit.results.outputs import STDOUT, PipeClosedError, guarded_streams, print_data
 from bemkit.version import __version__
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from bemkit.plan import Plan
     from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
@@ -171,8 +170,8 @@ def run(
         from bemkit.atomic_files import reserved
         from bemkit.scene.toml import load_scene, with_overrides
 
-        outputs = _outputs(json_file, csv_file, folder, what=what)
-        click.get_current_context().with_resource(reserved(outputs.check(_result_target(output, inside))))
+        outputs = result_outputs(json_file, csv_file, folder, what=what)
+        click.get_current_context().with_resource(reserved(outputs.check(result_target(output, inside))))
         chosen = with_overrides(
             load_scene(scene),
             elements=elements,
@@ -239,8 +238,8 @@ def show(
 
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
-    outputs = _outputs(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
-    outputs.check(_result_target(output, inside))
+    outputs = result_outputs(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
+    outputs.check(result_target(output, inside))
     with _progress(not folder or outputs.uses_stdout):
         solution = read_result(result)
         if output is not None:
@@ -314,48 +313,6 @@ def _planned(scene: Scene | Assembly) -> Plan:
     check_elements(scene)
     proposal = find_symmetry(scene) if scene.symmetry is None else None
     return make_plan(scene, scene.build_mesh(), proposal=proposal)
-
-
-def _outputs(
-    json_file: str | None,
-    csv_file: str | None,
-    folder: str | None,
-    table: str = "contact",
-    what: tuple[str, ...] | None = None,
-) -> Outputs[Solution | AssemblySolution]:
-    """Return where the command line sends a solution, besides a result file."""
-    if what is not None and folder is None:
-        raise click.UsageError("--what names figures: add --plot DIR")
-    if json_file is csv_file is folder is None:
-        return Outputs()
-    from bemkit.results.tables import CSV_STARTS, to_csv, to_json
-
-    def as_json(solution: Solution | AssemblySolution) -> str:
-        return to_json(solution) + "\n"
-
-    def as_csv(solution: Solution | AssemblySolution) -> str:
-        return to_csv(solution, table)
-
-    def pictures(solution: Solution | AssemblySolution) -> Mapping[str, Figure]:
-        from bemkit.pictures.catalogue import figures
-
-        return figures(solution, what)
-
-    texts = (
-        TextFile(json_file, "JSON file", JSON_START, as_json),
-        TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
-    )
-    return Outputs(texts, folder, pictures, "deformation")
-
-
-def _result_target(output: str | None, inside: int) -> list[Path]:
-    if output is None:
-        if inside:
-            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
-        return []
-    from bemkit.results.export import format_of
-
-    return [format_of(output, inside).check(Path(output))]
 
 
 def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
