@@ -15,7 +15,10 @@ import bemkit
 PACKAGE = Path(bemkit.__file__).parent
 FOLDER = Path(__file__).parent / "api"
 CONTRIBUTING = Path(__file__).parents[1] / "CONTRIBUTING.md"
-EXTENDED = ("geometry", "operators", "contact", "solvers", "scene", "results", "studies", "testing", "reference")
+EXTENDED = (
+    *("geometry", "operators", "contact", "solvers", "scene", "results", "pictures", "report"),
+    *("studies", "testing", "reference"),
+)
 
 
 def main() -> None:

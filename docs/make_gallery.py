@@ -15,11 +15,10 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
-from bemkit.results.assembly_figures import all_assembly_figures
-from bemkit.results.figures import all_figures
 from matplotlib.figure import Figure
 
 import bemkit as bk
+from bemkit.pictures.catalogue import default_pictures, figures
 from bemkit.scene.toml import shipped_files
 
 FOLDER = Path(__file__).parent / "gallery"
@@ -89,16 +88,14 @@ def run_scene(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
     text += f".. code-block:: sh\n\n   {command}\n\n" + code("toml", source.read_text("utf-8"))
     if scene.reference:
         text += f"Source: {' '.join(scene.reference.split())}\n"
-    if isinstance(solution, bk.AssemblySolution):
-        return scene.title, text, chosen(all_assembly_figures(solution))
-    return scene.title, text, chosen(all_figures(solution))
+    return scene.title, text, chosen(solution)
 
 
-def chosen(figures: Mapping[str, Figure]) -> Mapping[str, Figure]:
-    """Return the first picture and the first one of tractions, or the second where there is none."""
-    first, *others = figures
-    second = next((name for name in others if "traction" in name), others[0])
-    return {name: figures[name] for name in (first, second)}
+def chosen(solution: bk.Solution | bk.AssemblySolution) -> Mapping[str, Figure]:
+    """Return the first picture that suits a result and the first one of tractions, or else the second."""
+    first, *others = (picture.name for picture in default_pictures(solution))
+    drawn = figures(solution, [first, next((name for name in others if "traction" in name), others[0])])
+    return {name: drawn[name] for name in list(drawn)[:2]}
 
 
 def run_program(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:

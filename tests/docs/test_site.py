@@ -41,6 +41,8 @@ def test_every_module_that_researchers_extend_is_documented(make_api: ModuleType
         "solvers",
         "scene",
         "results",
+        "pictures",
+        "report",
         "studies",
         "testing",
         "reference",

@@ -14,7 +14,7 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
-from bemkit.results.history_figures import draw_friction_loop, draw_status_over_time, draw_work, history_figures
+from bemkit.pictures import draw_friction_loop, draw_status_over_time, draw_work, figures
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 UNITS = bk.UnitNames(length="mm", stress="MPa")
@@ -31,9 +31,9 @@ def loading(solution: bk.Solution) -> LoadHistory:
     return solution.loading
 
 
-def test_the_loop_begins_at_rest_and_passes_through_all_steps(loading: LoadHistory) -> None:
+def test_the_loop_begins_at_rest_and_passes_through_all_steps(solution: bk.Solution, loading: LoadHistory) -> None:
     axes = Figure().add_subplot()
-    assert draw_friction_loop(axes, loading, units=UNITS) is axes
+    assert draw_friction_loop(solution, axes, units=UNITS) is axes
     line = axes.lines[0]
     expected = [0.0, *(step.force_tangential for step in loading.steps)]
     np.testing.assert_array_equal(line.get_ydata(), expected)
@@ -41,8 +41,8 @@ def test_the_loop_begins_at_rest_and_passes_through_all_steps(loading: LoadHisto
     assert axes.get_ylabel().startswith("friction force on the body [")
 
 
-def test_work_is_drawn_as_it_adds_up(loading: LoadHistory) -> None:
-    axes = draw_work(Figure().add_subplot(), loading)
+def test_work_is_drawn_as_it_adds_up(solution: bk.Solution, loading: LoadHistory) -> None:
+    axes = draw_work(solution, Figure().add_subplot())
     external, taken, energy = (np.asarray(line.get_ydata()) for line in axes.lines)
     total = loading.total()
     assert external[-1] == pytest.approx(total.external_work, rel=1e-14)
@@ -51,15 +51,21 @@ def test_work_is_drawn_as_it_adds_up(loading: LoadHistory) -> None:
     assert np.all(np.diff(taken) >= 0.0)
 
 
-def test_status_is_drawn_for_every_node_and_step(loading: LoadHistory) -> None:
-    axes = draw_status_over_time(Figure().add_subplot(), loading, "floor")
+def test_status_is_drawn_for_every_node_and_step(solution: bk.Solution, loading: LoadHistory) -> None:
+    axes = draw_status_over_time(solution, "floor", Figure().add_subplot())
     (cells,) = axes.collections
-    numbers = np.asarray(cells.get_array()).reshape(loading.steps[0].contact.n_contact, -1)
+    numbers = np.asarray(cells.get_array()).reshape(len(loading.steps), -1)
     words = ["separated", "slip", "stick"]
     for k, step in enumerate(loading.steps):
-        assert [words[int(value)] for value in numbers[:, k]] == step.contact.status_words()
+        assert [words[int(value)] for value in numbers[k]] == step.contact.status_words()
 
 
 def test_all_pictures_have_names(solution: bk.Solution) -> None:
-    assert list(history_figures(solution)) == ["friction-loop", "work", "status-over-time"]
-    assert history_figures(bk.run(replace(LOOP, steps=()))) == {}
+    assert list(figures(solution))[-3:] == ["friction-loop", "work", "status-over-time"]
+
+
+def test_results_without_a_history_have_no_pictures_of_it() -> None:
+    still = bk.run(replace(LOOP, steps=()))
+    for draw in (draw_friction_loop, draw_work, lambda each: draw_status_over_time(each, "floor")):
+        with pytest.raises(bk.InputError, match="has no load history: give load factors or steps to the scene"):
+            draw(still)

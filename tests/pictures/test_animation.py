@@ -1,4 +1,4 @@
-"""Load histories in pictures: the status over the steps, and what moves."""
+"""Load histories as moving pictures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from PIL import Image
 
 import bemkit as bk
 from bemkit.atomic_files import OutputFileError
-from bemkit.pictures import draw_friction_loop, draw_status_over_time, draw_work, figures, save_animation
+from bemkit.pictures import save_animation
 from bemkit.scene.toml import with_overrides
 
 FACTORS = (0.3, 0.6, 1.0)
@@ -24,32 +24,7 @@ def steps() -> tuple[bk.Solution, ...]:
     return bk.run_history([dataclasses.replace(scene, load_factors=FACTORS)])
 
 
-def test_each_step_is_a_row_of_statuses(steps: tuple[bk.Solution, ...]) -> None:
-    axes = draw_status_over_time(steps[-1], "foundation")
-    (mesh,) = axes.collections
-    rows = np.asarray(mesh.get_array()).reshape(len(FACTORS), -1)
-    order = ["separated", "slip", "stick"]
-    for row, step in zip(rows, steps, strict=True):
-        assert [order[number] for number in row] == step.contact.status_words()
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == order
-
-
-def test_loops_and_work_are_those_of_the_steps(steps: tuple[bk.Solution, ...]) -> None:
-    loop, work = draw_friction_loop(steps[-1]), draw_work(steps[-1])
-    assert loop.lines[0].get_ydata().tolist() == pytest.approx([0.0, *(step.force_tangential for step in steps)])
-    external, taken, energy = (line.get_ydata() for line in work.lines)
-    assert energy.tolist() == pytest.approx([0.0, *(step.energy for step in steps)])
-    # what is put in is stored or taken, but for the round-off of both, and the gaps that close
-    assert external[-1] == pytest.approx(energy[-1] + taken[-1], rel=0.01)
-    drawn = figures(steps[-1])
-    assert [*drawn][-3:] == ["friction-loop", "work", "status-over-time"]
-
-
-def test_results_without_a_history_have_no_pictures_of_it() -> None:
-    solution = bk.run(with_overrides(bk.load_scene("paper-1"), elements=24))
-    for draw in (draw_friction_loop, draw_work, lambda each: draw_status_over_time(each, "foundation")):
-        with pytest.raises(bk.InputError, match="has no load history: give load factors or steps to the scene"):
-            draw(solution)
+def test_no_step_is_refused() -> None:
     with pytest.raises(bk.InputError, match="steps is empty"):
         save_animation("a.gif", [])
 
