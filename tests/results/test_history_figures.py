@@ -12,9 +12,8 @@ from bemkit.results.load_history import LoadHistory
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.figure import Figure
-
 from bemkit.results.history_figures import draw_friction_loop, draw_status_over_time, draw_work, history_figures
+from matplotlib.figure import Figure
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 UNITS = bk.UnitNames(length="mm", stress="MPa")
