@@ -22,6 +22,8 @@ _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "sli
 FIRST: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linewidth": 1.6})
 SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "--", "linewidth": 1.6})
 LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
+_MOST_LINES = 40
+"""Places of change that lines mark; of a rough surface the strip of its status tells more than a forest of them."""
 _NAMED = 0.12
 """Share of the length of a contact from which on a zone has room for its name."""
 
@@ -49,9 +51,9 @@ def contact_axes(
     label = with_unit(f"arc length $s$ along '{part}'", "length", units)
     strip.set_xlabel(label, parse_math="$" not in part)
     _draw_status(strip, solution, part)
-    for transition in solution.transitions:
-        if transition.part == part:
-            axes.axvline(transition.s, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
+    places = [transition.s for transition in solution.transitions if transition.part == part]
+    for place in places if len(places) <= _MOST_LINES else ():
+        axes.axvline(place, color=GREY, linestyle="-", linewidth=0.8, zorder=0)
     return axes, units
 
 
