@@ -12,18 +12,20 @@ import tomllib
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 
-from bemkit.results.assembly_figures import all_assembly_figures
-from bemkit.results.figures import all_figures
 from matplotlib.figure import Figure
 
 import bemkit as bk
+from bemkit.pictures.catalogue import default_pictures, figures
 from bemkit.scene.toml import shipped_files
 
 FOLDER = Path(__file__).parent / "gallery"
 DOTS_PER_INCH = 90
+SECOND = ("friction-loop", "traction", "contacts", "boundary-traction")
+"""Pictures besides the deformation, the first that there is."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,9 @@ def main() -> None:
 
 def write(entry: Entry) -> str:
     """Run an entry, draw its pictures, write its page, and return its title."""
-    title, text, figures = run_program(entry) if entry.name.endswith(".py") else run_scene(entry)
+    title, text, drawn = run_program(entry) if entry.name.endswith(".py") else run_scene(entry)
     pictures = []
-    for name, figure in figures.items():
+    for name, figure in drawn.items():
         pictures.append(f"{entry.page}-{name}.png")
         figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
     (FOLDER / pictures[0]).rename(FOLDER / f"{entry.page}.png")
@@ -92,16 +94,14 @@ def run_scene(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
     text += f".. code-block:: sh\n\n   {command}\n\n" + code("toml", source.read_text("utf-8"))
     if scene.reference:
         text += f"Source: {' '.join(scene.reference.split())}\n"
-    if isinstance(solution, bk.AssemblySolution):
-        return scene.title, text, chosen(all_assembly_figures(solution))
-    return scene.title, text, chosen(all_figures(solution))
+    return scene.title, text, chosen(solution)
 
 
-def chosen(figures: Mapping[str, Figure]) -> Mapping[str, Figure]:
-    """Return the first picture and the first one of tractions, or the second where there is none."""
-    first, *others = figures
-    second = next((name for name in others if "traction" in name), others[0])
-    return {name: figures[name] for name in (first, second)}
+def chosen(solution: bk.Solution | bk.AssemblySolution) -> dict[str, Figure]:
+    """Draw the deformation and what tells most besides."""
+    suiting = [picture.name for picture in default_pictures(solution)]
+    second = next(name for name in SECOND if name in suiting)
+    return dict(islice(figures(solution, ["deformation", second]).items(), 2))
 
 
 def run_program(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
