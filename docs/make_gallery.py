@@ -12,6 +12,7 @@ import tomllib
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from bemkit.scene.toml import shipped_files
 
 FOLDER = Path(__file__).parent / "gallery"
 DOTS_PER_INCH = 90
+SECOND = ("friction-loop", "traction", "contacts", "boundary-traction")
+"""Pictures besides the deformation, the first that there is."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +68,9 @@ def main() -> None:
 
 def write(entry: Entry) -> str:
     """Run an entry, draw its pictures, write its page, and return its title."""
-    title, text, figures = run_program(entry) if entry.name.endswith(".py") else run_scene(entry)
+    title, text, drawn = run_program(entry) if entry.name.endswith(".py") else run_scene(entry)
     pictures = []
-    for name, figure in figures.items():
+    for name, figure in drawn.items():
         pictures.append(f"{entry.page}-{name}.png")
         figure.savefig(FOLDER / pictures[-1], dpi=DOTS_PER_INCH, bbox_inches="tight")
     (FOLDER / pictures[0]).rename(FOLDER / f"{entry.page}.png")
@@ -94,11 +97,11 @@ def run_scene(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
     return scene.title, text, chosen(solution)
 
 
-def chosen(solution: bk.Solution | bk.AssemblySolution) -> Mapping[str, Figure]:
-    """Return the first picture that suits a result and the first one of tractions, or else the second."""
-    first, *others = (picture.name for picture in default_pictures(solution))
-    drawn = figures(solution, [first, next((name for name in others if "traction" in name), others[0])])
-    return {name: drawn[name] for name in list(drawn)[:2]}
+def chosen(solution: bk.Solution | bk.AssemblySolution) -> dict[str, Figure]:
+    """Draw the deformation and what tells most besides."""
+    suiting = [picture.name for picture in default_pictures(solution)]
+    second = next(name for name in SECOND if name in suiting)
+    return dict(islice(figures(solution, ["deformation", second]).items(), 2))
 
 
 def run_program(entry: Entry) -> tuple[str, str, Mapping[str, Figure]]:
