@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import importlib
 from dataclasses import replace
 
 import pytest
@@ -16,7 +16,7 @@ from bemkit.plan import plan as plan_module
 from bemkit.runs.nested import run_cascade
 from tests.scenes import paper
 
-run = sys.modules["bemkit.runs.run"]
+run = importlib.import_module("bemkit.runs.run")
 ASKED = bk.Hierarchical(1e-10)
 
 

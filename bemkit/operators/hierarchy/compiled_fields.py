@@ -8,7 +8,9 @@ import numba
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, IntArray
+from bemkit.operators.hierarchy.series import FAR, SERIES
 
+_FAR_SQUARED = FAR**2
 _options = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
@@ -77,15 +79,13 @@ def double_layer_fields(
             ax, ay = x[i].real - start[j].real, x[i].imag - start[j].imag
             bx, by = x[i].real - end[j].real, x[i].imag - end[j].imag
             of_start, of_end = ax * ax + ay * ay, bx * bx + by * by
-            log_ratio = 0.5 * math.log(of_start / of_end)
             if is_own[i, j]:
                 # zeta is zero: the angle is a principal value, and zeta^2 - 1 is -1
-                result[0, i, j] = complex(0.0, of_ratio * log_ratio)
+                result[0, i, j] = complex(0.0, 0.5 * of_ratio * math.log(of_start / of_end))
                 result[1, i, j] = 0.0
                 result[2, i, j] = complex(0.0, -2.0 * of_ratio)
                 result[3, i, j] = 0.0
                 continue
-            angle = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
             if of_start < of_end:
                 eta = (ay * tangent_x - ax * tangent_y) / half
             else:
@@ -97,12 +97,23 @@ def double_layer_fields(
             product = plus * minus
             scale = 2.0 * half * half / (of_start * of_end)
             quotient = complex(scale * product.real, -scale * product.imag)
-            log = complex(log_ratio, -angle)
-            moment = zeta * log - 2.0
-            result[0, i, j] = complex(of_angle * angle, of_ratio * log_ratio)
+            squared = zeta.real * zeta.real + zeta.imag * zeta.imag
+            if squared > _FAR_SQUARED:
+                inverse = complex(zeta.real / squared, -zeta.imag / squared)
+                square = inverse * inverse
+                series = complex(0.0, 0.0)
+                for factor in SERIES:
+                    series = (series + factor) * square
+                log, moment = 2.0 * inverse * (1.0 + series), 2.0 * series
+                of_moment = 2.0 * inverse * (square / (1.0 - square) - series)
+            else:
+                angle = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+                log = complex(0.5 * math.log(of_start / of_end), -angle)
+                moment, of_moment = zeta * log - 2.0, zeta * quotient - log
+            result[0, i, j] = complex(-of_angle * log.imag, of_ratio * log.real)
             result[1, i, j] = turn * eta * quotient.conjugate()
             result[2, i, j] = complex(-of_angle * moment.imag, of_ratio * moment.real)
-            result[3, i, j] = turn * eta * (zeta * quotient - log).conjugate()
+            result[3, i, j] = turn * eta * of_moment.conjugate()
     return result
 
 

@@ -9,6 +9,9 @@ eta, lambda = log(|x - a| / |x - b|), theta the angle from x - a to x - b and L 
 with J = log|zeta^2 - 1| - 2 + xi lambda + eta theta and G = 2 / (zeta^2 - 1). For a density s times the local
 coordinate, zeta L - 2 takes the place of L, and -L + 2 zeta / (zeta^2 - 1) that of G. These are the integrals of
 `bemkit.operators.collocation`, which is made for all pairs of a mesh; here it is any points and any elements.
+
+Far from the element differences of logarithms would lose their digits, which tight skeletons mistake for structure:
+there L = 2 sum zeta^-(2k+1) / (2k+1), and the others follow from the same sum.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray
 from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.series import FAR, SERIES
 from bemkit.operators.material import Material
 
 
@@ -97,12 +101,21 @@ def double_layer_fields(
     quotient = 2.0 / np.where(is_own, -1.0, place.product)  # on the element eta is zero
     log = place.log_ratio - 1j * place.angle
     moment = zeta * log - 2.0
+    of_moment = zeta * quotient - log
+    far = np.nonzero(np.square(zeta.real) + np.square(zeta.imag) > FAR**2)
+    inverse = 1.0 / zeta[far]
+    square = inverse * inverse
+    series = np.zeros_like(square)
+    for factor in SERIES:
+        series = (series + factor) * square
+    log[far], moment[far] = 2.0 * inverse * (1.0 + series), 2.0 * series
+    of_moment[far] = 2.0 * inverse * (square / (1.0 - square) - series)
     result = np.empty((4, *place.eta.shape), complex)
-    result[0].real, result[0].imag = rates[0] * place.angle, rates[1] * place.log_ratio
+    result[0].real, result[0].imag = -rates[0] * log.imag, rates[1] * log.real
     result[2].real, result[2].imag = -rates[0] * moment.imag, rates[1] * moment.real
     turned = (-constants.double * place.tangent**2) * place.eta
     result[1] = turned * quotient.conj()
-    result[3] = turned * (zeta * quotient - log).conj()
+    result[3] = turned * of_moment.conj()
     return result
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import types
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -26,6 +27,14 @@ def backend(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     else:
         monkeypatch.setattr(compiled, "functions", lambda: None)
     return str(request.param)
+
+
+@pytest.fixture
+def unloaded() -> Iterator[None]:
+    """Let numba be looked for again, and once more when everything is as it was."""
+    compiled._loaded.cache_clear()
+    yield
+    compiled._loaded.cache_clear()
 
 
 def straight(shape: Rectangle | PlateWithHole, n_elements: int) -> BoundaryMesh:
@@ -107,14 +116,14 @@ def test_points_of_no_element_see_no_jump() -> None:
     np.testing.assert_allclose(outside.sum(), 0.0, atol=1e-14)
 
 
+@pytest.mark.usefixtures("unloaded")
 def test_without_numba_the_plan_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled, "is_installed", lambda: False)
-    compiled._loaded.cache_clear()
     assert compiled.functions() is None
     assert "pip install 'bemkit[fast]'" in compiled.why()
-    compiled._loaded.cache_clear()
 
 
+@pytest.mark.usefixtures("unloaded")
 @pytest.mark.parametrize(("fault", "words"), [(RuntimeError("no\nLLVM"), "no LLVM"), (np.nan, "wrong numbers")])
 def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
     monkeypatch: pytest.MonkeyPatch, fault: float | Exception, words: str
@@ -130,10 +139,36 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
     monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
     monkeypatch.setattr(compiled, "is_installed", lambda: True)
-    compiled._loaded.cache_clear()
     assert compiled.functions() is None
     assert words in compiled.why()
     assert "\n" not in compiled.why()
-    compiled._loaded.cache_clear()
     x, start, is_own = np.array([1j]), np.array([0j]), np.zeros((1, 1), bool)
     assert np.isfinite(single_layer_fields(Constants(1.0, 1.0, 0.3, 1.0), x, start, start + 1.0, is_own)).all()
+
+
+@pytest.mark.usefixtures("backend")
+def test_far_away_fields_keep_their_digits() -> None:
+    constants, length = Constants.of(MATERIAL, 1.0), 1e-5
+    x = 3.0 * np.exp(1j * np.linspace(0.1, 6.0, 7)) + 0.2
+    start, end = np.array([0.2 + 0.1j]), np.array([0.2 + 0.1j + length * np.exp(0.7j)])
+    is_own = np.zeros((7, 1), bool)
+    double = double_layer_fields(constants, x, start, end, is_own)
+    # ten Gauss points are exact to round-off at 6e5 half lengths
+    t, weights = np.polynomial.legendre.leggauss(10)
+    tangent, nu = np.exp(0.7j), MATERIAL.effective_poisson_ratio
+    flow, moment_flow, turned, moment_turned = np.zeros((4, 7), complex)
+    for place, weight in zip(t, weights, strict=True):
+        rho = x - start[0] - 0.5 * length * (1.0 + place) * tangent
+        rate = -1j * tangent * 0.5 * length * weight / rho
+        quotient = rho / rho.conj() * rate.real
+        flow, moment_flow = flow + rate, moment_flow + place * rate
+        turned, moment_turned = turned + quotient, moment_turned + place * quotient
+    expected = [
+        constants.double * (2.0 * (1.0 - nu) * flow.real + 1j * (1.0 - 2.0 * nu) * flow.imag),
+        constants.double * turned,
+    ]
+    np.testing.assert_allclose(double[:2, :, 0], expected, rtol=1e-10)
+    # of the moments the sum cancels: they are length / distance of the others, which is known to fewer digits
+    rest = [constants.double * (2.0 * (1.0 - nu) * moment_flow.real + 1j * (1.0 - 2.0 * nu) * moment_flow.imag)]
+    np.testing.assert_allclose(double[2:3, :, 0], rest, atol=1e-15 * np.abs(expected[0]).max())
+    assert np.abs(double[2]).max() < 1e-5 * np.abs(double[0]).max()
