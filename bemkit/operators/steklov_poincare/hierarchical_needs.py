@@ -37,7 +37,7 @@ _CONTACT_STEPS, _SHARE_OF_STEP = 8.0, 0.1
 """Contact steps of a load step, and what each takes of the compressed equations, by their factorisation."""
 _EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 30e3, 10e3, 6e6
 """For each element at the tolerance 1e-10."""
-_BYTES, _BYTES_OF_CONTACT = 22e3, 16e3
+_BYTES, _BYTES_OF_CONTACT = 20e3, 13e3
 """Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
 _DIGITS = 10.0
 LARGEST_BLOCK = 1000
