@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.errors import printable
 
-_MISSING = "not installed: the kernels run in numpy; pip install 'bemkit[fast]' makes them about four times as fast"
+_MISSING = "not installed: the kernels run in numpy; pip install 'bemkit[fast]' compiles them"
 
 
 def is_installed() -> bool:
