@@ -74,6 +74,7 @@ if TYPE_CHECKING:
     from bemkit.operators.boundary import single_layer as single_layer
     from bemkit.operators.linear.solvers import Automatic as Automatic
     from bemkit.operators.linear.solvers import DenseCholesky as DenseCholesky
+    from bemkit.operators.linear.solvers import Hierarchical as Hierarchical
     from bemkit.operators.linear.solvers import Krylov as Krylov
     from bemkit.operators.material import Material as Material
     from bemkit.operators.material import Plane as Plane
@@ -170,7 +171,7 @@ _HOME = {
     "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
     "geometry.symmetry": ("Symmetry",),
     "operators.boundary": ("adjoint_double_layer", "assemble", "double_layer", "hypersingular", "mass", "single_layer"),
-    "operators.linear.solvers": ("Automatic", "DenseCholesky", "Krylov"),
+    "operators.linear.solvers": ("Automatic", "DenseCholesky", "Hierarchical", "Krylov"),
     "operators.material": ("Material", "Plane"),
     "operators.somigliana.fields": ("InteriorFields",),
     "operators.somigliana.stress": ("principal_stresses", "von_mises"),

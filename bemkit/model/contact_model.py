@@ -8,11 +8,13 @@ it is. A scene without contact is a contact problem without nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
+from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
@@ -32,10 +34,13 @@ from bemkit.operators.half_plane.periodic import PeriodicElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
+
+ContactBody: TypeAlias = CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +52,7 @@ class Model:
     prepared : Prepared
     elastic : SteklovPoincare
         Dimensionless.
-    body : CondensedBody, PeriodicBody or UntouchedBody
+    body : CondensedBody, HierarchicalBody, PeriodicBody or UntouchedBody
     problem : ContactProblem
         Where supports hold contact nodes along the tangent its law is frictionless; see
         `bemkit.model.solved_contact.with_held_friction`.
@@ -55,7 +60,7 @@ class Model:
 
     prepared: Prepared
     elastic: SteklovPoincare
-    body: CondensedBody | PeriodicBody | UntouchedBody
+    body: ContactBody
     problem: ContactProblem
 
     @property
@@ -245,7 +250,12 @@ def build_model(prepared: Prepared) -> Model:
         If the supports do not hold the body even with all contact nodes sticking.
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
-    elastic = discretisation.elastic_map(mesh, prepared.material, prepared.linear_solver.solver)
+    chosen = prepared.linear_solver
+    elastic = (
+        discretisation.elastic_map(mesh, prepared.material, chosen.solver)
+        if chosen.hierarchical is None
+        else discretisation.hierarchical_map(mesh, prepared.material, chosen.hierarchical)
+    )
     if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity):
         elastic = elastic.driven_by(prepared.drive)
     if prepared.inside is not None:
@@ -254,22 +264,24 @@ def build_model(prepared: Prepared) -> Model:
     return Model(prepared, elastic, body, _problem(prepared, body))
 
 
-def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> CondensedBody | PeriodicBody | UntouchedBody:
-    """Return a body as contact sees it: condensed onto its contact nodes, if there are any."""
+def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
+    """Return a body as contact sees it: condensed onto its contact nodes or compressed, if there are any."""
     if isinstance(elastic, PeriodicElasticity):
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
+        if isinstance(elastic, HierarchicalCollocation):
+            return hierarchical_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
         return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     check_held(prepared)
     condensed = elastic.condense(prepared.conditions, prepared.force)
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)
 
 
-def _problem(prepared: Prepared, body: CondensedBody | PeriodicBody | UntouchedBody) -> ContactProblem:
+def _problem(prepared: Prepared, body: ContactBody) -> ContactProblem:
     return ContactProblem(body, prepared.contact.gap / prepared.units.displacement, _law(prepared, body))
 
 
-def _law(prepared: Prepared, body: CondensedBody | PeriodicBody | UntouchedBody) -> FrictionLaw:
+def _law(prepared: Prepared, body: ContactBody) -> FrictionLaw:
     contact = prepared.contact
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return law.scaled(prepared.units.stress)

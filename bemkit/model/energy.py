@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_model import Model
@@ -39,8 +40,13 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
     if isinstance(model.body, PeriodicBody):  # positive wave by wave
         return result
     displacement, force = model.map_fields(*model.body.recover(result.state))
-    is_symmetric = model.scene.discretisation.is_symmetric
-    doubt = doubt_of(model.body.condensed, model.elastic, model.prepared.space, is_symmetric, (displacement, force))
+    space = model.prepared.space
+    if isinstance(model.body, HierarchicalBody):  # whose stiffness is nowhere: the work of the solution alone tells
+        sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
+        doubt = _negative_work(displacement, force, space, sensitivity)
+    else:
+        is_symmetric = model.scene.discretisation.is_symmetric
+        doubt = doubt_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
     return named_negative(result, doubt) if doubt else result
 
 
@@ -71,6 +77,11 @@ def doubt_of(
     # a symmetric map is negative in no direction but for round-off, which the work of the solution tells
     if not is_symmetric and is_indefinite(condensed.stiffness, sensitivity):
         return "the stiffness that the contact boundary sees is negative in some direction"
+    return _negative_work(displacement, force, space, sensitivity)
+
+
+def _negative_work(displacement: FloatArray, force: FloatArray, space: BoundarySpace, sensitivity: FloatArray) -> str:
+    """Say how negative the work of all forces is; empty if it is not."""
     motions = traction_free_modes(space.mesh, dof_points(space))
     share = negative_share(displacement, force, motions, sensitivity)
     return f"it is {-share:.1e} times the work of all forces, each taken by its size" if share else ""

@@ -25,15 +25,31 @@ from bemkit.model.particular import particular_solution, stress_of
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    ChosenLinearSolver,
+    DenseCholesky,
+    Krylov,
+    LinearSolverChoice,
+)
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, Support, integrate_traction
+from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
+from bemkit.operators.steklov_poincare.needs import BodyCase
+from bemkit.operators.steklov_poincare.nodal_conditions import (
+    GivenData,
+    NodalConditions,
+    Support,
+    free_modes,
+    integrate_traction,
+)
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
 from bemkit.scene.symmetry import check_symmetry
 
+_LEAST_TURN = 1e-9
+"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
 _FARTHEST = 1e7
 """Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
 
@@ -260,12 +276,22 @@ class Prepared:
         """The linear solver that a symmetric map follows, and why it is taken."""
         scene, requested = self.scene, self.scene.linear_solver
         if not scene.discretisation.is_symmetric:
-            direct = DenseCholesky() if isinstance(requested, Automatic) else requested
-            return ChosenLinearSolver(direct, "the map has a linear solver of its own")
+            return self._collocation_solver(requested)
         if isinstance(requested, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
             requested = DenseCholesky()  # iteration would be too inexact
         n_retained = int(np.count_nonzero(self.conditions.is_retained))
         return choose_linear_solver(requested, self.space.n_dofs, n_retained, physical_memory())
+
+    def _collocation_solver(self, requested: LinearSolverChoice) -> ChosenLinearSolver:
+        direct = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
+        case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), direct)
+        hindrance = self.scene.discretisation.why_dense(self.mesh)
+        if self.inside is not None:
+            hindrance = "forces act inside the body"
+        turning = np.ptp(free_modes(self.space, self.conditions), axis=1).max(initial=0.0)
+        if not self.scene.discretisation.keeps_rotations and turning > _LEAST_TURN:
+            hindrance = "no support holds its rotation, and only dense equations tell what constant elements make of it"
+        return choose_collocation_solver(requested, case, hindrance, physical_memory())
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.

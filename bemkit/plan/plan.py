@@ -19,6 +19,7 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
+from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 from bemkit.operators.stopwatch import announce
 from bemkit.scene.load_history import load_steps
@@ -34,7 +35,7 @@ _SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP, _LEAST_SECONDS = 2e-8, 1e-10, 0.1
 """Of a common computer: for a closed-form integral, for a flop of a factorisation, and for a scene of any size."""
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
-_FEW = 2_000
+_FEW = 4_000
 """Elements of the mesh from whose plan larger ones are told."""
 _DEGREES = ("constant", "linear", "quadratic")
 
@@ -214,6 +215,8 @@ class Plan(ShownInNotebooks):
         In the order in which they are used.
     warnings : tuple of str
         What will be doubtful about the result, one sentence each.
+    is_compressed : bool
+        Whether the equations are compressed over a tree, so that memory grows like the number of elements.
     """
 
     linear_solver: LinearSolver
@@ -223,6 +226,12 @@ class Plan(ShownInNotebooks):
     seconds: float
     items: tuple[PlanItem, ...]
     warnings: tuple[str, ...] = ()
+    is_compressed: bool = False
+
+    @property
+    def largest_matrix(self) -> int:
+        """Order of the largest matrix that is factored, roughly."""
+        return min(LARGEST_BLOCK, self.sizes.n_displacements) if self.is_compressed else self.sizes.n_displacements
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as JSON can hold it."""
@@ -269,6 +278,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
         seconds=_seconds(sizes, needs, len(steps)),
         items=plan_items(first.scene, sizes, needs.items, len(steps), proposal),
         warnings=needs.warnings,
+        is_compressed=first.linear_solver.hierarchical is not None,
     )
 
 
@@ -303,14 +313,14 @@ def check_memory(plan: Plan) -> None:
     TooLargeError
         Naming the memory needed, the memory there is, and the number of elements that fits.
     """
-    _check(plan.sizes.n_elements, plan.memory)
+    _check(plan.sizes.n_elements, plan.memory, plan.is_compressed)
 
 
 def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
-    Memory grows with the square of that number: the plan for a small mesh tells what a large one takes. A periodic
-    half-plane has no matrices.
+    Memory grows with the square of that number, or in proportion to it where the equations are compressed: the plan for
+    a small mesh tells what a large one takes. A periodic half-plane has no matrices.
 
     Raises
     ------
@@ -324,13 +334,14 @@ def check_elements(scene: Scene) -> None:
     small = replace(scene, mesh=replace(scene.mesh, elements=_FEW))
     plan = make_plan(small, small.build_mesh())
     growth = n_elements / _FEW
-    _check(int(growth * plan.sizes.n_elements), int(growth**2 * plan.memory))
+    memory = int(growth ** (1 if plan.is_compressed else 2) * plan.memory)
+    _check(int(growth * plan.sizes.n_elements), memory, plan.is_compressed)
 
 
-def _check(n_elements: int, memory: int) -> None:
+def _check(n_elements: int, memory: int, is_compressed: bool) -> None:
     available = physical_memory()
     if memory > available:
-        n_fitting = int((available / memory) ** 0.5 * n_elements)
+        n_fitting = int((available / memory) ** (1.0 if is_compressed else 0.5) * n_elements)
         raise TooLargeError(
             f"{n_elements} elements need about {memory / 1e9:.3g} GB, this computer has {available / 1e9:.3g} GB: "
             f"use at most {n_fitting} elements"

@@ -82,7 +82,7 @@ def solved_history(
         raise InputError("scenes is empty: give at least one scene")
     history: History[Solution] = History.of(scenes[-1], steps, done, finished)
     prepared, plan, clock = prepared_and_planned(steps, mesh)
-    with blas_threads_for(plan.sizes.n_displacements):
+    with blas_threads_for(plan.largest_matrix):
         if start is not None and not steps[0].contact_parts:
             raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
         model, clock = built(prepared[0], clock)

@@ -19,7 +19,7 @@ class CascadeError(InputError):
 
 
 def run_cascade(
-    scene: Scene, *, coarsest: int = 40, callback: Callable[[StepRecord], None] | None = None
+    scene: Scene, *, coarsest: int = 40, ratio: int = 2, callback: Callable[[StepRecord], None] | None = None
 ) -> tuple[Solution, ...]:
     """Solve a scene on meshes of growing size, ending with its own.
 
@@ -32,6 +32,8 @@ def run_cascade(
         With a single load factor.
     coarsest : int
         The number of elements is halved as long as it stays at least this large.
+    ratio : int
+        By what the number of elements is divided instead of two.
     callback : callable, optional
         Receives a record of every step on every mesh.
 
@@ -45,10 +47,12 @@ def run_cascade(
     CascadeError
         If the scene has a load history, whose memory belongs to one mesh, or no contact.
     ValueError
-        If `coarsest` is too small for any mesh, or for the reasons of `bemkit.run`.
+        If `coarsest` is too small for any mesh, if `ratio` is less than two, or for the reasons of `bemkit.run`.
     """
     if coarsest < 3:
         raise InputError(f"coarsest = {coarsest}: give at least 3 elements")
+    if ratio < 2:
+        raise InputError(f"ratio = {ratio}: give a whole number from 2 on")
     if not scene.contact_parts:
         raise CascadeError("no part is in contact: one mesh is enough, where there is nothing to iterate")
     if scene.n_steps > 1:
@@ -57,8 +61,8 @@ def run_cascade(
         return run_adaptive(scene, callback=callback)
     check_elements(scene)
     counts = [scene.mesh.n_elements]
-    while counts[-1] // 2 >= coarsest:
-        counts.append(counts[-1] // 2)
+    while counts[-1] // ratio >= coarsest:
+        counts.append(counts[-1] // ratio)
     solutions: list[Solution] = []
     for count in reversed(counts):
         level = scene if count == counts[0] else replace(scene, mesh=replace(scene.mesh, elements=count))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, overload
 
 from bemkit.contact.solvability import find_unsolvable_load
@@ -13,6 +13,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
 
 
-_COARSEST = 1024
-"""Elements of a periodic half-plane that are solved for from cold."""
+_COARSEST, _LARGE = 1024, 5000
+"""Elements that are solved for from cold, and elements of a body on compressed equations that begins on them."""
 
 
 class LoadHistoryError(InputError):
@@ -62,8 +63,8 @@ def run(
         many as its accuracy needs.
     start : Solution, optional
         Of a single body: where to start, on any mesh; see `bemkit.runs.nested.run_cascade`. By default every node
-        sticks. Where a scene has several solutions the start chooses among them. Refused without contact, where there
-        is only one.
+        sticks; of large scenes on compressed equations a solution on a coarser mesh is the start. Where a scene has
+        several solutions the start chooses among them. Refused without contact, where there is only one.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
 
@@ -88,18 +89,28 @@ def run(
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
         return run_adaptive(scene, callback=callback)[-1]
-    if mesh is None and start is None and _gains_by_cascade(scene):
+    if mesh is None and start is None and (ratio := _gain_by_cascade(scene)):
         from bemkit.runs.nested import run_cascade
 
-        return run_cascade(scene, coarsest=_COARSEST, callback=callback)[-1]
+        return run_cascade(scene, coarsest=_COARSEST, ratio=ratio, callback=callback)[-1]
     return run_on_mesh(scene, mesh, start, callback)
 
 
-def _gains_by_cascade(scene: Scene) -> bool:
-    """Whether coarser meshes find nearly all of the contact for next to nothing: of periodic half-planes they do."""
-    surface = scene.shape.outline().surface
-    is_periodic = surface is not None and surface.is_periodic
-    return is_periodic and scene.n_steps == 1 and scene.mesh.n_elements >= 2 * _COARSEST
+def _gain_by_cascade(scene: Scene) -> int:
+    """Return by what to divide the elements of coarser meshes that find nearly all of the contact, zero for none.
+
+    That pays where a contact step costs about as much as all the rest: of periodic half-planes, which have no matrices,
+    and of large bodies on compressed equations.
+    """
+    n_elements, surface = scene.mesh.n_elements, scene.shape.outline().surface
+    if scene.n_steps > 1 or not scene.contact_parts:
+        return 0
+    if surface is not None and surface.is_periodic:
+        return 2 if n_elements >= 2 * _COARSEST else 0
+    if n_elements < _LARGE or surface is not None:
+        return 0
+    smaller = replace(scene, mesh=replace(scene.mesh, elements=_LARGE))
+    return 4 if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
 
 
 def _run_assembly(
@@ -151,7 +162,7 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
     (prepared,), plan, clock = prepared_and_planned(load_steps(scene), mesh)
-    with blas_threads_for(plan.sizes.n_displacements):
+    with blas_threads_for(plan.largest_matrix):
         model, clock = built(prepared, clock)
         load = find_unsolvable_load(model.problem)
         if load is not None:

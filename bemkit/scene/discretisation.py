@@ -19,9 +19,11 @@ from bemkit.geometry.spaces import (
     check_degree,
 )
 from bemkit.operators.half_plane import half_plane_map, half_plane_needs
-from bemkit.operators.linear.solvers import LinearSolver
+from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 
 _LONGEST = 0.75
@@ -99,6 +101,14 @@ class Discretisation(Protocol):
         linear_solver : LinearSolver
             To be followed if `is_symmetric`.
         """
+
+    def why_dense(self, mesh: BoundaryMesh) -> str:
+        """Say why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` makes them."""
+        return f"{self.method} has no such equations"
+
+    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
+        """Return the map with its equations compressed over a tree, the usual one unless `why_dense` is empty."""
+        return self.elastic_map(mesh, material, DenseCholesky())
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Foresee what the map takes; nothing is foreseen unless this is written."""
@@ -278,9 +288,18 @@ class ConstantCollocation(Discretisation):
         """Return the collocation map, which has a linear solver of its own."""
         return CollocationElasticity(mesh, material, slopes=self.slopes)
 
+    def why_dense(self, mesh: BoundaryMesh) -> str:
+        """Name thinness: only a dense stiffness tells whether elements that are too long make the energy negative."""
+        return "elements are too long for the thickness of the body" if _thinness_warnings(mesh) else ""
+
+    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
+        """Return the compressed map of a body of straight elements without symmetry."""
+        return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
+
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what collocation takes, and warn of bodies that are thin for their elements."""
-        needs = collocation_needs(case, takes_slopes=self.slopes)
+        find = collocation_needs if case.linear_solver.hierarchical is None else hierarchical_needs
+        needs = find(case, takes_slopes=self.slopes)
         return replace(needs, warnings=_thinness_warnings(case.mesh))
 
 
@@ -288,7 +307,7 @@ def _thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
     """Warn in one sentence if elements of collocation are too long for the thickness of the body."""
     if mesh.is_exterior:
         return ()
-    longest = mesh.lengths / thicknesses(mesh)
+    longest = mesh.lengths / thicknesses(mesh, mesh.lengths / _LONGEST)
     is_thin = longest > _LONGEST
     if mesh.lengths[is_thin].sum() <= _SHARE * mesh.lengths.sum():
         return ()
@@ -299,19 +318,23 @@ def _thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
     )
 
 
-def thicknesses(mesh: BoundaryMesh) -> FloatArray:
+def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> FloatArray:
     """Return the distance (n_elements,) [m] across the body to the nearest element that faces the other way.
 
     Elements face each other if their normals are opposite to within 60 degrees and the line between their middles is
-    within 45 degrees of the normal; infinite where no element does.
+    within 45 degrees of the normal; infinite where no element within `reach` [m] does.
     """
-    whole = mesh.whole
-    result = np.empty(mesh.n_elements)
+    from scipy.spatial import KDTree
+
+    whole, result = mesh.whole, np.full(mesh.n_elements, np.inf)
+    tree, farthest = KDTree(whole.centres), np.minimum(reach, 4.0 * whole.diameter) + np.zeros(mesh.n_elements)
     for begin in range(0, mesh.n_elements, _ROWS):
-        own = slice(begin, min(begin + _ROWS, mesh.n_elements))
-        arms = whole.centres - whole.centres[own, None]
-        across = -np.einsum("tpc,tc->tp", arms, whole.normals[own])
-        distance = np.hypot(arms[..., 0], arms[..., 1])
-        faces = (whole.normals[own] @ whole.normals.T < _FACING) & (across > np.sqrt(0.5) * distance)
-        result[own] = np.where(faces, distance, np.inf).min(axis=1)
+        rows = np.arange(begin, min(begin + _ROWS, mesh.n_elements))
+        near = tree.query_ball_point(mesh.centres[rows], farthest[rows])
+        own, other = np.repeat(rows, [len(each) for each in near]), np.concatenate(near).astype(np.intp)
+        arm = whole.centres[other] - whole.centres[own]
+        across, distance = -np.sum(arm * whole.normals[own], axis=1), np.hypot(arm[:, 0], arm[:, 1])
+        facing = np.sum(whole.normals[own] * whole.normals[other], axis=1)
+        faces = (facing < _FACING) & (across > np.sqrt(0.5) * distance)
+        np.minimum.at(result, own[faces], distance[faces])
     return result

@@ -224,6 +224,7 @@ LINEAR_SOLVERS = Registry(
         "automatic": "bemkit.operators.linear.solvers:Automatic",
         "direct": "bemkit.operators.linear.solvers:DenseCholesky",
         "krylov": "bemkit.operators.linear.solvers:Krylov",
+        "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
     },
 )
 

@@ -11,7 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bemkit.operators.linear.solvers import Automatic, ChosenLinearSolver, DenseCholesky, Krylov, LinearSolverChoice
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    ChosenLinearSolver,
+    DenseCholesky,
+    Hierarchical,
+    Krylov,
+    LinearSolverChoice,
+)
 
 _BYTES = 8
 _STEPS = 20.0
@@ -85,6 +92,9 @@ def choose_linear_solver(
     ChosenLinearSolver
         A linear solver that was asked for, or the faster one of those that fit.
     """
+    if isinstance(requested, Hierarchical):
+        automatic = choose_linear_solver(Automatic(), n_dofs, n_retained, memory)
+        return ChosenLinearSolver(automatic.solver, f"not compressed over a tree, but {automatic.reason}")
     if not isinstance(requested, Automatic):
         return ChosenLinearSolver(requested, "asked for")
     direct, krylov = direct_cost(n_dofs, n_retained), krylov_cost(n_dofs, n_retained)

@@ -226,7 +226,32 @@ class Automatic:
     """Factorisation or iteration, whichever takes less time and fits into memory; see `choose_linear_solver`."""
 
 
-LinearSolverChoice: TypeAlias = Automatic | LinearSolver
+@dataclass(frozen=True)
+class Hierarchical:
+    """Boundary equations compressed over a tree and factored there: time and memory grow like the number of elements.
+
+    For constant collocation on straight elements without symmetry; elsewhere what `Automatic` takes is taken, and the
+    plan says why.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the compression; tractions and displacements err by a few times that.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not between 1e-13 and 1e-4.
+    """
+
+    tolerance: float = 1e-11
+
+    def __post_init__(self) -> None:
+        if not 1e-13 <= self.tolerance <= 1e-4:
+            raise InputError(f"tolerance is {self.tolerance}: give a number from 1e-13 to 1e-4 such as 1e-11")
+
+
+LinearSolverChoice: TypeAlias = Automatic | Hierarchical | LinearSolver
 
 
 @dataclass(frozen=True)
@@ -238,7 +263,10 @@ class ChosenLinearSolver:
     solver : LinearSolver
     reason : str
         Part of a sentence, for the plan.
+    hierarchical : Hierarchical, optional
+        Given if the equations are compressed over a tree, and not solved by `solver`.
     """
 
     solver: LinearSolver
     reason: str
+    hierarchical: Hierarchical | None = None

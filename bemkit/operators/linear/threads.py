@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
+Chunk = TypeVar("Chunk")
 
 LARGE = 2500
 """Order of a matrix above which several threads factor it faster than one."""
@@ -139,14 +140,15 @@ def _blas_libraries() -> ThreadpoolController:
     return ThreadpoolController().select(user_api="blas")
 
 
-def for_each_chunk(work: Callable[[slice], Result], chunks: Iterable[slice], *, n_integrals: int) -> list[Result]:
+def for_each_chunk(work: Callable[[Chunk], Result], chunks: Iterable[Chunk], *, n_integrals: int) -> list[Result]:
     """Call a function on every chunk of rows, from several threads if there are many integrals.
 
     Parameters
     ----------
     work : callable
-        Takes a slice of rows; array operations release the interpreter, so threads help although this is Python.
-    chunks : iterable of slice
+        Takes a chunk; array operations release the interpreter, so threads help although this is Python.
+    chunks : iterable
+        Slices of rows, or the numbers of clusters of rows.
     n_integrals : int
         Of one kind in all chunks together: element pairs times products of the polynomials on both elements.
 

@@ -270,7 +270,7 @@ def _collocation_items(
         PlanItem(
             "linear solver of the body",
             True,
-            f"LU, because the equations of collocation are not symmetric; order {order}",
+            f"LU, because the equations of collocation are not symmetric; order {order}; {case.linear_solver.reason}",
         ),
         PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
         PlanItem("pressure that keeps the volume", False, volume),

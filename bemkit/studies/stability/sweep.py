@@ -8,6 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
@@ -153,6 +154,8 @@ def condition_number(scene: Scene, case: Case) -> float:
         body = build_model(prepare(scene, mesh)).body
         if isinstance(body, PeriodicBody):
             raise InputError("a periodic half-plane has no stiffness matrix: sweep a block, or a half-plane")
+        if isinstance(body, HierarchicalBody):  # which forms no stiffness
+            return math.nan
         stiffness = body.condensed.stiffness
         diagonal = np.abs(np.diagonal(stiffness))
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))

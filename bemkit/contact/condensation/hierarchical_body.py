@@ -1,0 +1,268 @@
+"""An elastic body of many elements as the contact drivers see it: compressed, never condensed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.body import ContactState, LinearBody, SingularResponse
+from bemkit.contact.condensation.nodes import ContactNodes, free_motions
+from bemkit.contact.condensation.reduction import NoContactNodesError
+from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.errors import InputError
+from bemkit.operators.counts import OperationCounts
+from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
+from bemkit.operators.hierarchy.system import NodeConditions, UndeterminedError
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.rigid_modes import admissible_modes, without_motion
+from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, LoadedSystem
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+
+_ERROR = 10.0
+"""Largest error of tractions and displacements by the tolerance of the compression; two to four on bodies from a strip
+of 100 : 1 to a plate with a hole."""
+_SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 500_000, 100, 8
+"""Points where a residual is evaluated: so many that their pairs with all elements take about as long as a response."""
+_KEPT = 3
+"""Responses whose conditions are remembered, so that fields of the whole boundary follow without another one."""
+_MOST_SHIFTS = 4
+"""Rounds in which the rigid motion of a body is found; each knows it to the tolerance of the compression better."""
+_MANY = 4000
+"""Contact nodes from which on a response for each of them is too much."""
+
+
+@dataclass(frozen=True, eq=False)
+class HierarchicalBody(LinearBody):
+    """A body whose boundary equations are compressed over a tree; see `bemkit.operators.hierarchy`.
+
+    Parameters
+    ----------
+    loaded : LoadedSystem
+        The equations under the given supports and forces.
+    nodes : ContactNodes
+        Elements that may touch, along whose frames those of the equations stand.
+    force : (n_elements, 2) array [N/m]
+        Given nodal forces, in x and y.
+
+    Notes
+    -----
+    A response factors the leaves of the tree whose conditions differ from those of the last one, and what lies above
+    them. No tangent is eliminated: frictionless nodes have the condition ``sigma_t = 0`` like any other.
+    """
+
+    loaded: LoadedSystem
+    nodes: ContactNodes
+    force: FloatArray
+    _responses: list[tuple[ContactState, NodeConditions]] = field(default_factory=list, init=False)
+    _fields: list[_Fields] = field(default_factory=list, init=False)
+    _travelled: list[LoadedSystem] = field(default_factory=list, init=False)
+
+    @property
+    def weights(self) -> FloatArray:  # type: ignore[override]  # read-only here
+        """(n_contact,) array [m]: the lengths of the elements."""
+        return self.nodes.weights
+
+    @property
+    def accuracy(self) -> float:  # type: ignore[override]
+        """Ten times the tolerance of the compression."""
+        return _ERROR * self.loaded.map.options.tolerance
+
+    @property
+    def is_costly(self) -> bool:  # type: ignore[override]
+        """Whether there are thousands of nodes."""
+        return self.n_contact > _MANY
+
+    @property
+    def stiffness_scale(self) -> float:
+        """E' by the median length of a node [Pa/m]."""
+        return self.loaded.map.material.plane_modulus / float(np.median(self.weights))
+
+    @property
+    def conditions(self) -> NodalConditions:
+        """Those of the elements."""
+        return self.loaded.conditions
+
+    @property
+    def is_held(self) -> BoolArray:
+        """(n_contact,) bool array: none; the planner leaves nodes that a support holds to the dense body."""
+        return np.zeros(self.n_contact, bool)
+
+    @property
+    def work(self) -> OperationCounts:
+        """The order of the contact system; whole matrices there are none."""
+        n_retained = int(np.count_nonzero(self.conditions.is_retained))
+        return self.loaded.work + OperationCounts(contact_unknowns=n_retained)
+
+    def respond(self, conditions: LinearConditions) -> ContactState:
+        """Return the response; leaves whose conditions are those of the last one are not factored again.
+
+        Notes
+        -----
+        Prescribed displacements, zero tractions and slip tractions are met exactly, as by `DenseBody`.
+        """
+        if len(conditions.free_motions(self.rigid_motions())):
+            raise SingularResponse("the contact conditions leave a rigid motion free")
+        at_nodes = NodeConditions(conditions.on_traction, conditions.on_displacement, conditions.value)
+        state = self._solved(at_nodes)
+        self._responses.append((state, at_nodes))
+        del self._responses[:-_KEPT]
+        return state
+
+    def rigid_motions(self) -> FloatArray:
+        """Return the motions that no support resists, (n_motions, n_contact, 2)."""
+        return self._motions
+
+    def rigid_load(self) -> FloatArray:
+        """Return the work of the given forces on these motions."""
+        load: FloatArray = np.einsum("ncm,nc->m", self.loaded.motions, self.force)
+        return load
+
+    def under(
+        self, displacement: FloatArray, force: FloatArray, inside: ForcesInside | None = None
+    ) -> HierarchicalBody:
+        """Return the same body under other displacements, in the frames of the elements, and forces in x and y.
+
+        Raises
+        ------
+        InputError
+            If forces act inside the body, which the compressed equations do not know.
+        """
+        if inside is not None:
+            raise InputError("forces act inside the body: choose the linear solver 'direct' for it")
+        return replace(self, loaded=self.loaded.under(displacement, force), force=force)
+
+    def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
+        """Return displacement (n_elements, 2) and total force (n_elements, 2) of the boundary, in x and y.
+
+        That is under the conditions which have led to the state or, if it is no late response, with its displacements
+        held.
+        """
+        fields = self._fields_of(state)
+        return fields.displacement, fields.force
+
+    def imbalance(self, state: ContactState) -> Imbalance:
+        """Return how far the state is from a solution of the boundary equations, and all forces from equilibrium.
+
+        `force` is the largest of three: the resultant of all forces; the residual of the equations at points all over
+        the boundary, all integrals in closed form instead of compressed, by the largest displacement beside a rigid
+        motion; and what contact tractions differ from those of the whole boundary, by the largest force.
+        """
+        fields = self._fields_of(state)
+        loaded, mesh = fields.loaded, self.loaded.map.mesh
+        if not (np.isfinite(fields.displacement).all() and np.isfinite(fields.force).all()):
+            return Imbalance(np.nan, np.nan)
+        strained = float(np.abs(without_motion(mesh, mesh.centres, fields.strained)).max())
+        at_nodes = np.einsum("nkc,nc->nk", self.nodes.frame, fields.force[self.nodes.nodes])
+        missing = float(np.abs(self.weights[:, None] * state.traction - at_nodes).max())
+        largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
+        terms = loaded.map.material.plane_modulus * float(np.abs(fields.displacement).max())
+        if not self.force.any() and largest <= self.accuracy * terms:
+            return Imbalance(missing / terms, 0.0) if terms else Imbalance(0.0, 0.0)  # it has only been moved
+        result = resultant_imbalance(mesh.centres, fields.force, admissible_modes(mesh), 0.0)
+        noise = NOISE_FACTOR * float(np.finfo(float).eps * np.abs(fields.strained).max())
+        if strained > noise:
+            traction = fields.force / mesh.lengths[:, None]
+            left = loaded.system.residual(self._sampled, traction, fields.strained)
+            result = result.joined(Imbalance(float(np.abs(left).max()) / strained, 0.0, noise / strained))
+        return result.joined(Imbalance(missing / largest, 0.0)) if largest else result
+
+    def _fields_of(self, state: ContactState) -> _Fields:
+        """Return the fields on the whole boundary that belong to a state."""
+        for fields in self._fields:
+            if fields.state is state:
+                return fields
+        conditions = next((each for known, each in self._responses if known is state), None)
+        if conditions is None:
+            held = stick(state.u_n, state.u_t)
+            conditions = NodeConditions(held.on_traction, held.on_displacement, held.value)
+        self._solved(conditions)
+        loaded = self._moving
+        strained, force = loaded.everywhere()
+        fields = _Fields(state, loaded, strained, strained + loaded.motion, force)
+        self._fields[:] = [fields]
+        return fields
+
+    @cached_property
+    def _sampled(self) -> IntArray:
+        """Elements where residuals are evaluated: half of them in contact, without any pattern."""
+        n = self.loaded.map.mesh.n_elements
+        n_points = min(n, int(np.clip(_SAMPLED_PAIRS // n, _FEWEST_SAMPLED, _MOST_SAMPLED)))
+        spread = np.modf(np.arange(1, n_points + 1) * 0.6180339887498949)[0]
+        in_contact = self.nodes.nodes[(spread[::2] * self.n_contact).astype(int)]
+        return np.unique(np.concatenate([in_contact, (spread[1::2] * n).astype(int)]))
+
+    @cached_property
+    def _motions(self) -> FloatArray:
+        return free_motions(self.conditions, self.nodes, self.loaded.map.displacement_space)
+
+    @property
+    def _moving(self) -> LoadedSystem:
+        """The equations without the rigid motion of the last response."""
+        return self._travelled[-1] if self._travelled else self.loaded
+
+    def _solved(self, conditions: NodeConditions) -> ContactState:
+        """Return the response; where the contact nodes move rigidly by far more than they strain, solve without that.
+
+        A rigid motion causes no tractions, in the compressed equations none but for their tolerance.
+        """
+        nodes, frame = self.nodes.nodes, self.nodes.frame
+        for _ in range(_MOST_SHIFTS):
+            loaded = self._moving
+            motion = np.einsum("nkc,nc->nk", frame, loaded.motion[nodes])
+            try:
+                value = conditions.value - np.einsum("nrk,nk->nr", conditions.on_displacement, motion)
+                state = loaded.system.state(loaded.known, nodes, replace(conditions, value=value))
+            except (SingularMatrixError, UndeterminedError) as error:
+                raise SingularResponse(str(error)) from error
+            strained = np.einsum("nkc,nk->nc", frame, state[:, 2:])
+            travel = loaded.travel_of(nodes, strained)
+            if travel is None:
+                break
+            self._travelled[:] = [loaded.moved(travel)]
+        displacement = state[:, 2:] + motion
+        for own in (0, 1):  # what is prescribed is met exactly
+            factor, other = conditions.on_displacement[:, own, own], conditions.on_displacement[:, own, 1 - own]
+            gives = (factor != 0.0) & (other == 0.0) & ~conditions.on_traction[:, own].any(axis=1)
+            displacement[gives, own] = conditions.value[gives, own] / factor[gives]
+        return ContactState(displacement, state[:, :2].copy())
+
+
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    """Fields (n_elements, 2) in x and y on the whole boundary, with a rigid motion and without."""
+
+    state: ContactState
+    loaded: LoadedSystem
+    strained: FloatArray
+    displacement: FloatArray
+    force: FloatArray
+
+
+def hierarchical_body(
+    elastic: HierarchicalCollocation, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
+) -> HierarchicalBody:
+    """Return a compressed body as contact sees it.
+
+    Parameters
+    ----------
+    elastic : HierarchicalCollocation
+    conditions : NodalConditions
+    contact : ContactNodes
+        Both as `contact_conditions` has found them; no support holds any of the nodes.
+    force : (n_elements, 2) array [N/m]
+        Given nodal forces, zero at contact nodes.
+
+    Raises
+    ------
+    NoContactNodesError
+        If supports leave no node of the contact boundary free to move towards the obstacle.
+    """
+    if not contact.nodes.size:
+        raise NoContactNodesError(
+            "supports fix every node of the contact boundary: use more elements, or restrict the supports"
+        )
+    return HierarchicalBody(elastic.loaded(conditions, force), contact, force)

@@ -1,0 +1,1 @@
+"""A boundary operator compressed over a tree of clusters, and the direct solver that this gives."""

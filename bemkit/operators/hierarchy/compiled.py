@@ -1,0 +1,54 @@
+"""The closed forms of `element_fields` compiled by numba, if the extra ``fast`` is installed and works.
+
+The compiled functions stand in `compiled_fields`, which only this module imports. Compiling takes some seconds, once
+for an installation: numba keeps the result on disk.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+
+from bemkit.errors import printable
+
+_MISSING = "not installed: the kernels run in numpy; pip install 'bemkit[fast]' compiles them"
+
+
+def is_installed() -> bool:
+    """Whether numba is installed; that it works shows when `functions` loads it."""
+    return importlib.util.find_spec("numba") is not None
+
+
+def why() -> str:
+    """Say in one line whether the compiled kernels are used, and if not, why."""
+    return _loaded()[1]
+
+
+def functions() -> ModuleType | None:
+    """Return the module of the compiled functions, None if numpy has to do."""
+    return _loaded()[0]
+
+
+@cache
+def _loaded() -> tuple[ModuleType | None, str]:
+    if not is_installed():
+        return None, _MISSING
+    try:
+        from bemkit.operators.hierarchy import compiled_fields
+
+        point, element = np.array([0.5 + 1.0j]), np.array([0.0j])
+        values = compiled_fields.single_layer_fields(
+            1.0, 0.3, 1.0, point, element, element + 1.0, np.zeros((1, 1), np.bool_)
+        )
+        if not np.isfinite(values).all():
+            return None, "numba computes wrong numbers here: the kernels run in numpy"
+    except Exception as error:  # whatever a broken installation raises
+        return None, f"numba does not work here ({_short(error)}): the kernels run in numpy"
+    return compiled_fields, "numba is installed"
+
+
+def _short(error: Exception) -> str:
+    return printable(f"{type(error).__name__}: {error}")[:120]

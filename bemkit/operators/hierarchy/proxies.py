@@ -1,0 +1,87 @@
+"""What a cluster of elements sees of the others: those near it one by one, all others as one circle around it.
+
+Outside of a circle of twice the radius of a cluster every displacement that its elements cause follows from that on the
+circle, and every displacement that comes from outside of it is, within, that of forces on the circle. So the near field
+and the points of a proxy circle say all that the elements of a cluster do to the rest of the boundary, and the other
+way round [MartinssonRokhlin2005].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.hierarchy.tree import ClusterTree
+
+PROXY_RATIO = 2.0
+"""Radius of the proxy circle by that of the cluster: what varies m times along the circle decays like 2^-m inside."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discs:
+    """Discs around the clusters of one level, with all elements on which their unknowns act.
+
+    Parameters
+    ----------
+    centre : (n_clusters,) complex array [m]
+    radius : (n_clusters,) array [m]
+    """
+
+    centre: ComplexArray
+    radius: FloatArray
+
+    @classmethod
+    def of(cls, columns: BoundaryColumns, tree: ClusterTree, level: int) -> Discs:
+        """Return the discs of a level of a tree."""
+        begins = tree.bounds[: -1 : 2**level]
+        counts = np.diff(np.append(begins, columns.n_elements))
+        ends = np.stack([columns.start, columns.end])
+        low, high = (
+            of.reduceat(bound.real, begins) + 1j * of.reduceat(bound.imag, begins)
+            for of, bound in ((np.minimum, _box(np.minimum, ends)), (np.maximum, _box(np.maximum, ends)))
+        )
+        centre = 0.5 * (low + high)
+        farthest = np.abs(ends[:, columns.reach] - np.repeat(centre, counts)).max(axis=(0, 1))
+        return cls(centre, np.maximum.reduceat(farthest, begins))
+
+    def near(self, cluster: int) -> IntArray:
+        """Return the other clusters that reach into the proxy circle of one."""
+        distance = np.abs(self.centre - self.centre[cluster])
+        distance[cluster] = np.inf
+        found: IntArray = np.flatnonzero(distance < self.radius + PROXY_RATIO * self.radius[cluster])
+        return found
+
+    def points(self, cluster: int, n_points: int) -> ComplexArray:
+        """Return points on the proxy circle of a cluster."""
+        turns = np.exp(2j * np.pi * np.arange(n_points) / n_points)
+        points: ComplexArray = self.centre[cluster] + PROXY_RATIO * self.radius[cluster] * turns
+        return points
+
+
+def n_proxies(tolerance: float) -> int:
+    """Return how many points of a proxy circle make the field on it known to a tolerance."""
+    return int(2.2 * np.log(1.0 / tolerance) / np.log(PROXY_RATIO)) + 8
+
+
+def extents(columns: BoundaryColumns) -> FloatArray:
+    """Return how far from the middle of each element its unknowns act [m]."""
+    ends = np.stack([columns.start, columns.end])
+    far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre).max(axis=(0, 1))
+    return far
+
+
+def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, log_length: float) -> ComplexArray:
+    """Return displacements (n_sources, 2, n_points) that unit forces along x and y cause, by 8 pi mu (1 - nu)."""
+    arm = x - sources[:, None]
+    squared = np.square(arm.real) + np.square(arm.imag)
+    log = (-0.5 * (3.0 - 4.0 * poisson_ratio)) * np.log(squared / log_length**2)
+    result = np.stack([log + arm.real * arm / squared, 1j * log + arm.imag * arm / squared], axis=1)
+    return result
+
+
+def _box(of: np.ufunc, ends: ComplexArray) -> ComplexArray:
+    bound: ComplexArray = of.reduce(ends.real) + 1j * of.reduce(ends.imag)
+    return bound

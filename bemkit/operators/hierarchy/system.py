@@ -1,0 +1,195 @@
+"""The boundary equations of collocation under supports, loads and conditions of contact, compressed and factored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.element_laws import solve_conditions
+from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import traction_free_modes
+
+LEAF_SIZE = 48
+"""Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeConditions:
+    """Two linear conditions ``A_t t + A_u u = c`` at some elements, in the frames of these.
+
+    Parameters
+    ----------
+    on_traction, on_displacement : (n, 2, 2) arrays
+        Axes element, condition, component.
+    value : (n, 2) array
+    """
+
+    on_traction: FloatArray
+    on_displacement: FloatArray
+    value: FloatArray
+
+    @classmethod
+    def given(cls, is_displacement: BoolArray, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
+        """Return conditions that prescribe one of the two along each direction; all arrays are (n, 2)."""
+        unit = np.eye(2)
+        return cls(
+            np.where(is_displacement, 0.0, 1.0)[:, :, None] * unit,
+            np.where(is_displacement, 1.0, 0.0)[:, :, None] * unit,
+            np.where(is_displacement, displacement, traction),
+        )
+
+
+class UndeterminedError(ArithmeticError):
+    """Two conditions at an element that are only one."""
+
+
+class HierarchicalSystem:
+    """(1/2 + T) u = U t over a tree, with two conditions on each element.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+        Of straight elements, without symmetry.
+    material : Material
+    frame : (n_elements, 2, 2) array
+        Rows are the directions of the conditions of each element.
+    may_be_traction, may_be_displacement : (n_elements,) bool arrays
+        Elements whose traction, and whose displacement, may ever differ from zero.
+    slopes : bool
+        Whether the double layer takes slopes.
+    tolerance : float
+        Of the compression; tractions and displacements err by a few times that.
+
+    Notes
+    -----
+    The equations, the balances of the tractions and the reciprocities are those of
+    `bemkit.operators.steklov_poincare.mixed_system.MixedSystem`.
+    """
+
+    def __init__(
+        self,
+        mesh: BoundaryMesh,
+        material: Material,
+        frame: FloatArray,
+        *,
+        may_be_traction: BoolArray,
+        may_be_displacement: BoolArray,
+        slopes: bool,
+        tolerance: float,
+    ) -> None:
+        self._tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
+        self._order, n = self._tree.order, mesh.n_elements
+        self._place = np.empty_like(self._order)
+        self._place[self._order] = np.arange(n)
+        self._columns = BoundaryColumns.of(mesh, material, self._order, takes_slopes=slopes)
+        may_differ = np.repeat(np.stack([may_be_traction, may_be_displacement], axis=1), 2, axis=1)
+        self.compression = Compression.of(self._columns, self._tree, may_differ[self._order], tolerance)
+        border = _border(mesh, material, self._order, slopes)
+        self.factor = HierarchicalFactor(self.compression, border)
+        self._frame = frame
+        self._unit = mesh.diameter / n / material.plane_modulus  # displacement by traction of a single element
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements."""
+        return self._order.size
+
+    def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
+        """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.
+
+        Parameters
+        ----------
+        known : ElementLaws
+            Of all other elements, by `laws`.
+        elements : (n,) array
+        conditions : NodeConditions
+            Of these elements.
+
+        Raises
+        ------
+        UndeterminedError
+            If conditions of an element are not independent.
+        SingularMatrixError
+            If the conditions do not determine the response.
+        """
+        factors, given = known.factors, known.given
+        places = self._place[elements]
+        local = self.local_laws(conditions)
+        if elements.size:
+            turned = self.turned(elements, local)
+            factors, given = factors.copy(), given.copy()
+            factors[places], given[places] = turned.factors, turned.given
+        self.factor.update(ElementLaws(factors, given))
+        leaves = self._tree.leaves_of(places)
+        unknowns = np.empty((self.n_elements, 2))
+        unknowns[self._places_in(leaves)] = self.factor.unknowns(leaves)
+        state: FloatArray = (local.factors @ unknowns[places, :, None])[:, :, 0] + local.given
+        return state
+
+    def everywhere(self) -> tuple[FloatArray, FloatArray]:
+        """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
+        laws = self.factor.laws
+        assert laws is not None  # `state` comes first
+        unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
+        state = np.empty((self.n_elements, 4))
+        state[self._order] = (laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given
+        return state[:, :2], state[:, 2:]
+
+    def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return what is left (n, 2) of the equations of some elements, all integrals in closed form.
+
+        Parameters
+        ----------
+        elements : (n,) array
+        traction, displacement : (n_elements, 2) arrays
+            As `everywhere` has returned them.
+        """
+        places, border = self._place[elements], self.factor.border
+        left = self._columns.applied(places, traction[self._order], displacement[self._order])
+        errors = border.errors.reshape(self.n_elements, 2, -1)[places] @ self.factor.errors()
+        return left + errors
+
+    def laws(self, conditions: NodeConditions) -> ElementLaws:
+        """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
+        return self.turned(np.arange(self.n_elements), self.local_laws(conditions)).take(self._order)
+
+    def local_laws(self, conditions: NodeConditions) -> ElementLaws:
+        """Return what conditions make of tractions and displacements, in the frames of their elements."""
+        factors, given, is_determined = solve_conditions(
+            conditions.on_traction, conditions.on_displacement, conditions.value, self._unit
+        )
+        if not is_determined.all():
+            raise UndeterminedError("the two conditions at a contact node are not independent")
+        return ElementLaws(factors, given)
+
+    def turned(self, elements: IntArray, laws: ElementLaws) -> ElementLaws:
+        """Return laws in the frames of elements in x and y."""
+        turn = np.zeros((elements.size, 4, 4))
+        turn[:, :2, :2] = turn[:, 2:, 2:] = self._frame[elements].transpose(0, 2, 1)
+        return ElementLaws(turn @ laws.factors, (turn @ laws.given[:, :, None])[:, :, 0])
+
+    def _places_in(self, leaves: IntArray) -> IntArray:
+        return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])
+
+
+def _border(mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool) -> Border:
+    """Return the errors and balances that the equations of collocation have besides, by place."""
+    n = mesh.n_elements
+    motions = traction_free_modes(mesh, mesh.centres)
+    reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
+    compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
+    on_traction = np.concatenate([motions.T * (compliance * np.repeat(mesh.lengths, 2)), reciprocity.on_traction])
+    on_displacement = np.concatenate([np.zeros(motions.T.shape), reciprocity.on_displacement])
+    errors = np.column_stack([motions, reciprocity.fields])
+    n_border = errors.shape[1]
+    balances = np.concatenate([on_traction.reshape(n_border, n, 2), -on_displacement.reshape(n_border, n, 2)], axis=2)
+    by_place = errors.reshape(n, 2, n_border)[order].reshape(2 * n, n_border)
+    return Border(by_place, balances[:, order].reshape(n_border, 4 * n))

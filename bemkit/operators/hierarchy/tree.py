@@ -1,0 +1,66 @@
+"""A binary tree of clusters of elements by bisection of coordinates.
+
+Each cluster is halved across the longer side of the box around its midpoints, so that what is close in the plane is
+close in the tree: the two long sides of a thin body, which are far from each other along the boundary, too.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class ClusterTree:
+    """Clusters of consecutive places; cluster i of a level has the clusters 2 i and 2 i + 1 of the next one.
+
+    Parameters
+    ----------
+    order : (n,) array
+        The point at each place.
+    bounds : (n_leaves + 1,) array
+        Leaf i holds the places bounds[i] ... bounds[i + 1] - 1.
+    n_levels : int
+        Levels below the root; there are 2**n_levels leaves.
+    """
+
+    order: IntArray
+    bounds: IntArray
+    n_levels: int
+
+    @classmethod
+    def of(cls, points: FloatArray, leaf_size: int) -> ClusterTree:
+        """Divide points (n, 2) into clusters of about `leaf_size`, at least into two."""
+        n_levels = max(1, round(np.log2(max(len(points) / leaf_size, 1.0))))
+        order, bounds = np.arange(len(points)), np.array([0, len(points)])
+        for _ in range(n_levels):
+            middles = (bounds[:-1] + bounds[1:]) // 2
+            for begin, middle, end in zip(bounds[:-1], middles, bounds[1:], strict=True):
+                members = order[begin:end]
+                own = points[members]
+                coordinate = own[:, int(np.argmax(np.ptp(own, axis=0)))]
+                order[begin:end] = members[np.argpartition(coordinate, middle - begin)]
+            bounds = np.sort(np.concatenate([bounds, middles]))
+        # neighbours stay neighbours in memory
+        for begin, end in itertools.pairwise(bounds):
+            order[begin:end].sort()
+        return cls(order, bounds, n_levels)
+
+    @property
+    def n_leaves(self) -> int:
+        """Number of leaves."""
+        return self.bounds.size - 1
+
+    def places(self, level: int, cluster: int) -> slice:
+        """Return the places of a cluster; level 0 holds the leaves, each further one half as many clusters."""
+        width = 2**level
+        return slice(int(self.bounds[cluster * width]), int(self.bounds[(cluster + 1) * width]))
+
+    def leaves_of(self, places: IntArray) -> IntArray:
+        """Return the leaves, ascending, that hold some places."""
+        found: IntArray = np.unique(np.searchsorted(self.bounds, places, side="right") - 1)
+        return found

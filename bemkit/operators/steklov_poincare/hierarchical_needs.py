@@ -1,0 +1,128 @@
+"""Whether the equations of collocation are compressed over a tree, and what that takes, foreseen from sizes alone.
+
+Times and memory are those of a square with 1e3 to 1e4 elements (`tests/benchmarks/large.py` measures what is estimated
+here); they hardly depend on the shape.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.operators.hierarchy import compiled
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    ChosenLinearSolver,
+    DenseCholesky,
+    Hierarchical,
+    LinearSolver,
+    LinearSolverChoice,
+)
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem, collocation_needs
+
+_DIRECT: LinearSolver = DenseCholesky()
+_FEWEST_ELEMENTS = 200
+"""Of a tree that is worth its name."""
+_MOST_LOOPS = 40
+"""Each loop has an equation of its own that passes through the whole tree."""
+_LARGEST_POISSON_RATIO = 0.49
+"""Beyond, the pressure within a cluster of the tree is hardly told by its displacements."""
+_SHARE = 0.5
+"""Predicted share of the time of the dense equations below which they are compressed."""
+_EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
+"""Seconds of a closed-form integral, of a flop on small blocks, and of one in the factorisation of a large matrix."""
+_CONTACT_STEPS, _SHARE_OF_STEP = 8.0, 0.1
+"""Contact steps of a load step, and what each takes of the compressed equations, by their factorisation."""
+_EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 30e3, 10e3, 6e6
+"""For each element at the tolerance 1e-10."""
+_BYTES, _BYTES_OF_CONTACT = 20e3, 13e3
+"""Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
+_DIGITS = 10.0
+LARGEST_BLOCK = 1000
+"""Order that the largest dense block of a tree hardly exceeds."""
+
+
+def why_dense(case: BodyCase) -> str:
+    """Say why the equations of a body cannot be compressed; empty if they can."""
+    mesh, conditions = case.mesh, case.conditions
+    if mesh.symmetry is not None:
+        return "the body is symmetric"
+    if case.n_curved:
+        return f"{case.n_curved} elements are curved"
+    if mesh.n_elements < _FEWEST_ELEMENTS:
+        return f"{mesh.n_elements} elements are few"
+    if len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary has {len(mesh.loops)} closed curves"
+    if case.material.effective_poisson_ratio > _LARGEST_POISSON_RATIO:
+        return "the material is nearly incompressible"
+    if np.any(conditions.is_retained.any(axis=1) & conditions.is_fixed.any(axis=1)):
+        return "supports hold contact nodes"
+    return ""
+
+
+def choose_collocation_solver(
+    requested: LinearSolverChoice, case: BodyCase, hindrance: str, memory: float
+) -> ChosenLinearSolver:
+    """Choose between the dense and the compressed equations of collocation.
+
+    Parameters
+    ----------
+    requested : LinearSolver, Hierarchical or Automatic
+    case : BodyCase
+        Its linear solver counts for nothing.
+    hindrance : str
+        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
+    memory : float [bytes]
+        Of the computer.
+
+    Returns
+    -------
+    ChosenLinearSolver
+        The compressed equations if they are asked for, or promise to be at least twice as fast, or nothing else fits.
+    """
+    hindrance = hindrance or why_dense(case)
+    options = requested if isinstance(requested, Hierarchical) else Hierarchical()
+    if not isinstance(requested, Automatic | Hierarchical):
+        return ChosenLinearSolver(requested, "asked for")
+    if hindrance:
+        return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
+    if isinstance(requested, Hierarchical):
+        return ChosenLinearSolver(_DIRECT, "asked for", options)
+    dense, compressed = collocation_needs(case, takes_slopes=True), _needs(case, options)
+    of_dense = _FLOP_OF_LARGE * (dense.flops + _CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
+    share = (_EVALUATION * compressed.evaluations + _FLOP * compressed.flops) / (
+        _EVALUATION * dense.evaluations + of_dense
+    )
+    if share < _SHARE:
+        return ChosenLinearSolver(_DIRECT, f"about {share:.2g} of the time of dense equations", options)
+    if compressed.memory < memory < dense.memory:
+        reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, this computer has {memory / 1e9:.3g} GB"
+        return ChosenLinearSolver(_DIRECT, reason, options)
+    return ChosenLinearSolver(_DIRECT, f"compressed over a tree they would take {share:.2g} times as long")
+
+
+def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
+    """Return what the compressed equations take; nothing of them is counted, because ranks are not foreseen."""
+    options = case.linear_solver.hierarchical or Hierarchical()
+    slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
+    reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
+    items = (
+        PlanItem("boundary equations", True, f"single and double layer, {reason}"),
+        PlanItem("slopes between constant elements", takes_slopes, slopes),
+        PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
+        PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
+        PlanItem("compiled kernels (numba)", compiled.functions() is not None, compiled.why()),
+        PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
+    )
+    return replace(_needs(case, options), items=items)
+
+
+def _needs(case: BodyCase, options: Hierarchical) -> BodyNeeds:
+    n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
+    n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
+    memory = int(digits * (_BYTES * n + _BYTES_OF_CONTACT * n_both))
+    evaluations = digits * n * (_EVALUATIONS_COMPILED if compiled.is_installed() else _EVALUATIONS)
+    flops = digits * _FLOPS * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
+    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=True)

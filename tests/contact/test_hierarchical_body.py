@@ -1,0 +1,175 @@
+"""Bodies whose equations are compressed: the answers, statuses and certificates of dense ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import bemkit as bk
+from bemkit.contact.body import ContactState, SingularResponse
+from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
+from bemkit.contact.condensation.reduction import NoContactNodesError
+from bemkit.contact.conditions import separated, stick
+from bemkit.errors import InputError
+from bemkit.model.contact_model import Model, build_model
+from bemkit.model.prepared import prepare
+from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
+from bemkit.testing import check_body
+from tests.scenes import paper, wavy
+
+TOLERANCE = 1e-11
+
+
+def in_both_ways(scene: bk.Scene, n_elements: int, *, slopes: bool = True) -> tuple[bk.Scene, bk.Scene]:
+    """Return a scene on compressed and on dense equations of collocation."""
+    mesh = replace(scene.mesh, elements=n_elements, accuracy=None)
+    scene = replace(scene, discretisation=bk.ConstantCollocation(slopes=slopes), mesh=mesh)
+    return replace(scene, linear_solver=Hierarchical(TOLERANCE)), replace(scene, linear_solver=DenseCholesky())
+
+
+def model_of(scene: bk.Scene) -> Model:
+    model = build_model(prepare(scene, scene.build_mesh()))
+    assert isinstance(model.body, HierarchicalBody)
+    return model
+
+
+def loose_block(travel: float = 0.0) -> bk.Scene:
+    """A block on a floor that lies `travel` below it; friction alone holds it sideways."""
+    return bk.Scene(
+        title="loose block",
+        shape=bk.Rectangle(2.0, 1.0),
+        material=bk.Material(100.0, 0.3),
+        law=bk.Coulomb(0.4),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -travel), (0.0, 1.0))), sides=("bottom",)),
+            bk.Part("press", bk.Traction(x=0.1, y=-1.0), sides=("top",)),
+        ),
+    )
+
+
+def tilted() -> bk.Scene:
+    """A quadrilateral on a plane at 20 degrees; a roller along its upper side, which stands in any direction."""
+    turn = np.exp(1j * np.radians(20.0))
+    corners = tuple((z.real, z.imag) for z in turn * np.array([0.0, 2.0, 2.2 + 1.5j, 0.3 + 1.2j]))
+    return bk.Scene(
+        title="tilted block",
+        shape=bk.Polygon(corners),
+        material=bk.Material(1.0, 0.45, bk.Plane.STRAIN),
+        law=bk.CohesiveCoulomb(0.6, cohesion=1e-3),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, 0.0), (-turn.imag, turn.real))), sides=("side-1",)),
+            bk.Part("roller", bk.Roller(), sides=("side-3",)),
+            bk.Part("push", bk.Pressure(0.01), sides=("side-2",)),
+            bk.Part("drag", bk.PrescribedDisplacement(x=0.004, y=-0.002), sides=("side-4",)),
+        ),
+    )
+
+
+SCENES = {
+    "paper-1": paper(1),
+    "paper-2": paper(2),
+    "wavy obstacle": wavy(),
+    "loose block": loose_block(),
+    "travelling block": loose_block(5.0),
+    "tilted block": tilted(),
+    "tresca": replace(paper(1), law=bk.Tresca(0.2)),
+    "strip": replace(loose_block(), shape=bk.Rectangle(20.0, 1.0), solver=bk.AugmentedLagrangian()),
+    "load history": replace(paper(1), load_factors=(0.5, 1.0, 0.7)),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_statuses_and_tractions_are_those_of_dense_equations(name: str) -> None:
+    compressed, dense = (bk.run(each) for each in in_both_ways(SCENES[name], 240))
+    assert compressed.plan.is_compressed
+    assert not dense.plan.is_compressed
+    assert compressed.status is dense.status is bk.Status.CONVERGED
+    assert compressed.linear_solves == dense.linear_solves
+    np.testing.assert_array_equal(compressed.contact.status, dense.contact.status)
+    stress = np.abs(dense.boundary.traction).max()
+    for component in ("sigma_n", "sigma_t"):
+        one, two = (getattr(each.contact, component) for each in (compressed, dense))
+        np.testing.assert_allclose(one, two, atol=1e-8 * stress)
+    size = np.abs(dense.boundary.displacement).max()
+    np.testing.assert_allclose(compressed.boundary.displacement, dense.boundary.displacement, atol=1e-9 * size)
+    assert compressed.energy == pytest.approx(dense.energy, rel=1e-9)
+
+
+def test_the_paper_s_method_without_slopes_is_the_same() -> None:
+    compressed, dense = (bk.run(each) for each in in_both_ways(paper(1), 240, slopes=False))
+    np.testing.assert_array_equal(compressed.contact.status, dense.contact.status)
+    assert compressed.force_tangential == pytest.approx(dense.force_tangential, rel=1e-9)
+
+
+def test_without_contact_all_of_the_body_is_solved_for() -> None:
+    scene = bk.load_scene("bending")
+    compressed, dense = (bk.run(each) for each in in_both_ways(scene, 240))
+    assert compressed.plan.is_compressed
+    size = np.abs(dense.boundary.displacement).max()
+    np.testing.assert_allclose(compressed.boundary.displacement, dense.boundary.displacement, atol=1e-9 * size)
+    steps = [bk.run(replace(each, load_factors=(1.0, 0.5))) for each in in_both_ways(scene, 240)]
+    assert steps[0].energy == pytest.approx(steps[1].energy, rel=1e-9)
+
+
+def test_the_body_keeps_the_promises_of_a_body() -> None:
+    for scene in (paper(1), loose_block()):
+        model, loaded = (
+            model_of(in_both_ways(replace(scene, load_factors=(factor,)), 240)[0]) for factor in (1.0, 0.4)
+        )
+        check_body(model.body, reloaded=loaded.body)
+
+
+def test_a_response_factors_what_has_changed_alone() -> None:
+    model = model_of(in_both_ways(paper(1), 600)[0])
+    body, problem = model.body, model.problem
+    assert isinstance(body, HierarchicalBody)
+    factor, held = body.loaded.system.factor, stick(problem.gap, problem.slip_origin)
+    body.respond(held)
+    first = factor.n_factored
+    one = np.zeros((problem.n_contact, 2), bool)
+    one[0] = True
+    body.respond(held.replaced(one, separated(problem.n_contact)))
+    assert factor.n_factored == 1 < first == factor.compression.tree.n_leaves
+
+
+def test_the_certificate_finds_states_that_are_no_responses() -> None:
+    model = model_of(in_both_ways(paper(1), 240)[0])
+    state = model.problem.sticking_state
+    assert model.body.imbalance(state).is_below(1e-9)
+    same = ContactState(state.displacement.copy(), state.traction.copy())
+    assert model.body.imbalance(same).worst < 1e-8
+    more = ContactState(state.displacement, state.traction + 1e-3 * np.abs(state.traction).max())
+    assert not model.body.imbalance(more).is_below(1e-6)
+    bump = 1e-3 * np.sin(np.arange(len(state.u_n)))[:, None]
+    bent = ContactState(state.displacement + bump, state.traction)
+    assert not model.body.imbalance(bent).is_below(1e-6)
+
+
+def test_a_coarse_tolerance_is_stated_and_seen_in_the_certificate() -> None:
+    scene, _ = in_both_ways(paper(1), 240)
+    body = model_of(replace(scene, linear_solver=Hierarchical(1e-6))).body
+    assert body.accuracy == pytest.approx(1e-5)
+    problem = model_of(replace(scene, linear_solver=Hierarchical(1e-6))).problem
+    found = problem.body.imbalance(problem.sticking_state).worst
+    assert 1e-10 < found < 1e-5
+
+
+def test_a_free_body_is_singular_and_forces_inside_are_refused() -> None:
+    model = model_of(in_both_ways(paper(1), 240)[0])
+    with pytest.raises(SingularResponse, match="leave a rigid motion free"):
+        model.problem.respond(separated(model.problem.n_contact))
+    heavy = replace(paper(1), body_forces=(bk.Gravity(1.0),), discretisation=bk.ConstantCollocation())
+    inside = prepare(heavy, heavy.build_mesh()).inside
+    body, prepared = model.body, model.prepared
+    with pytest.raises(InputError, match="choose the linear solver 'direct'"):
+        body.under(prepared.conditions.displacement, prepared.force, inside)
+
+
+def test_a_contact_boundary_that_supports_fix_is_named() -> None:
+    model = model_of(in_both_ways(paper(1), 240)[0])
+    body = model.body
+    assert isinstance(body, HierarchicalBody)
+    with pytest.raises(NoContactNodesError, match="fix every node"):
+        hierarchical_body(body.loaded.map, body.conditions, body.nodes.take(np.zeros(0, np.intp)), body.force)

@@ -1,0 +1,76 @@
+"""Skeletons of clusters: far blocks of the equations from a few entries, whatever the kinds of unknowns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, extents, n_proxies
+from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.material import Material
+
+L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
+
+
+def compressed(mesh: BoundaryMesh, tolerance: float, *, slopes: bool = True) -> Compression:
+    tree = ClusterTree.of(mesh.centres, 24)
+    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=slopes)
+    return Compression.of(columns, tree, np.ones((mesh.n_elements, 4), bool), tolerance)
+
+
+@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-11])
+@pytest.mark.parametrize("shape", [Rectangle(1.0, 1.0), Rectangle(20.0, 0.1), L_SHAPE], ids=["square", "strip", "L"])
+def test_blocks_between_leaves_follow_from_their_skeletons(
+    shape: Rectangle | Polygon, tolerance: float, slopes: bool
+) -> None:
+    compression = compressed(discretise(shape.outline(), n_elements=240).unit, tolerance, slopes=slopes)
+    columns, tree, leaves = compression.columns, compression.tree, compression.skeletons[0]
+    for one in (0, 3, tree.n_leaves - 1):
+        for two in (1, 2, tree.n_leaves - 2):
+            if one == two:
+                continue
+            rows = np.arange(2 * tree.places(0, one).start, 2 * tree.places(0, one).stop)
+            block = columns.entries(rows, compression.unknowns[two])
+            few = columns.entries(leaves[one].rows, leaves[two].columns)
+            error = np.abs(leaves[one].row_map @ few @ leaves[two].column_map.T - block).max()
+            # ten times: interpolation multiplies what pivoted QR leaves out, which is measured in mean squares
+            assert error <= 10.0 * tolerance * np.abs(block).max() + 1e-14
+
+
+def test_skeletons_stay_small_on_thin_bodies() -> None:
+    for height in (1.0, 1e-3):
+        compression = compressed(discretise(Rectangle(10.0, height).outline(), n_elements=1200).unit, 1e-8)
+        # both sides of the strip are one cluster; along the boundary they would be two that couple everywhere
+        assert compression.largest_rank < 200
+
+
+def test_memory_grows_like_the_number_of_elements() -> None:
+    small, large = (
+        compressed(discretise(Rectangle(1.0, 1.0).outline(), n_elements=n).unit, 1e-6).n_bytes for n in (300, 1200)
+    )
+    assert 3.0 < large / small < 5.0
+
+
+def test_discs_hold_their_clusters_and_proxies_lie_around_them() -> None:
+    mesh = discretise(L_SHAPE.outline(), n_elements=200).unit
+    tree = ClusterTree.of(mesh.centres, 16)
+    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
+    for level in range(tree.n_levels):
+        discs = Discs.of(columns, tree, level)
+        for cluster in range(discs.radius.size):
+            places = tree.places(level, cluster)
+            acting = columns.reach[:, places].ravel()
+            far = max(np.abs(ends[acting] - discs.centre[cluster]).max() for ends in (columns.start, columns.end))
+            assert far == pytest.approx(discs.radius[cluster])
+            around = np.abs(discs.points(cluster, 8) - discs.centre[cluster])
+            np.testing.assert_allclose(around, PROXY_RATIO * discs.radius[cluster])
+            assert cluster not in discs.near(cluster)
+            others = np.setdiff1d(np.arange(discs.radius.size), [cluster, *discs.near(cluster)])
+            apart = np.abs(discs.centre[others] - discs.centre[cluster]) - discs.radius[others]
+            assert np.all(apart >= PROXY_RATIO * discs.radius[cluster] * (1.0 - 1e-14))
+    assert np.all(extents(columns) > columns.lengths)
+    assert n_proxies(1e-12) > n_proxies(1e-6)

@@ -1,0 +1,174 @@
+"""Closed forms of element fields: the matrices of collocation, quadrature, and the same numbers from both back ends."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
+from bemkit.operators.collocation.assembly import collocation_matrices
+from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
+from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
+from bemkit.operators.material import Material
+
+MATERIAL = Material(2.0, 0.3)
+
+
+@pytest.fixture(params=["numpy", "numba"])
+def backend(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "numba":
+        pytest.importorskip("numba")
+        assert compiled.functions() is not None
+    else:
+        monkeypatch.setattr(compiled, "functions", lambda: None)
+    return str(request.param)
+
+
+@pytest.fixture
+def unloaded() -> Iterator[None]:
+    """Let numba be looked for again, and once more when everything is as it was."""
+    compiled._loaded.cache_clear()
+    yield
+    compiled._loaded.cache_clear()
+
+
+def straight(shape: Rectangle | PlateWithHole, n_elements: int) -> BoundaryMesh:
+    mesh = discretise(shape.outline(), n_elements=n_elements).unit
+    return BoundaryMesh(mesh.nodes, mesh.elements)
+
+
+@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+@pytest.mark.parametrize("shape", [Rectangle(1.0, 2.0), PlateWithHole(2.0, 1.5, 0.4)], ids=["rectangle", "hole"])
+@pytest.mark.usefixtures("backend")
+def test_columns_are_those_of_collocation(shape: Rectangle | PlateWithHole, slopes: bool) -> None:
+    mesh = straight(shape, 60)
+    n, order = mesh.n_elements, np.random.default_rng(0).permutation(mesh.n_elements)
+    single, double = collocation_matrices(mesh, MATERIAL, takes_slopes=slopes)
+    dofs = (2 * order[:, None] + np.arange(2)).ravel()
+    columns = BoundaryColumns.of(mesh, MATERIAL, order, takes_slopes=slopes)
+    entries = columns.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 2, 2)
+    whole = np.ix_(dofs, dofs)
+    # closed forms on either side: only round-off of entries of size one differs
+    np.testing.assert_allclose(entries[:, :, 0].reshape(2 * n, -1), -single[whole], atol=1e-15)
+    np.testing.assert_allclose(entries[:, :, 1].reshape(2 * n, -1), (double + 0.5 * np.eye(2 * n))[whole], atol=2e-15)
+    traction, displacement = np.random.default_rng(1).normal(size=(2, n, 2))
+    both = np.concatenate([traction, displacement], axis=1).ravel()
+    product = (entries.reshape(2 * n, -1) @ both).reshape(n, 2)
+    places = np.array([0, 3, n - 1])
+    np.testing.assert_allclose(columns.applied(places, traction, displacement), product[places], atol=1e-13)
+
+
+@pytest.mark.usefixtures("backend")
+def test_fields_anywhere_are_integrals_of_the_kernel() -> None:
+    constants = Constants.of(MATERIAL, 0.7)
+    x = np.array([0.3 + 0.4j, -2.0 + 0.1j, 5.0 - 3.0j])
+    start, end = np.array([0.2 - 0.1j, 1.0 + 0.5j]), np.array([0.6 + 0.2j, 0.5 + 0.1j])
+    is_own = np.zeros((3, 2), bool)
+    single = single_layer_fields(constants, x, start, end, is_own)
+    double = double_layer_fields(constants, x, start, end, is_own)
+    t, weights = np.polynomial.legendre.leggauss(60)
+    span = end - start
+    y = 0.5 * (start + end) + 0.5 * np.multiply.outer(t, span)
+    rho = x[:, None] - y[:, None, :]
+    measure = 0.5 * np.abs(span) * weights[:, None, None]
+    nu, normal = MATERIAL.effective_poisson_ratio, -1j * span / np.abs(span)
+    kappa = 3.0 - 4.0 * nu
+    # Kelvin: u = A (-kappa log|rho| p + (rho / conj(rho)) conj(p) / 2 + p / 2)
+    on_p = constants.single * np.sum(measure * (0.5 - kappa * np.log(np.abs(rho) / 0.7)), axis=0)
+    on_conjugate = constants.single * np.sum(measure * 0.5 * rho / rho.conj(), axis=0)
+    np.testing.assert_allclose(single, [on_p, on_conjugate], rtol=1e-13, atol=1e-15)
+    # T v = B int ([(2 - 2 nu) Re + i (1 - 2 nu) Im](n / rho) v + (rho / conj(rho)) Re(n / rho) conj(v)) ds
+    flow = normal / rho
+    of_density = constants.double * (2.0 * (1.0 - nu) * flow.real + 1j * (1.0 - 2.0 * nu) * flow.imag)
+    of_conjugate = constants.double * rho / rho.conj() * flow.real
+    local = t[:, None, None]
+    expected = [np.sum(measure * each, axis=0) for each in (of_density, of_conjugate)]
+    expected += [np.sum(measure * local * each, axis=0) for each in (of_density, of_conjugate)]
+    np.testing.assert_allclose(double, expected, atol=1e-14)
+
+
+@pytest.mark.usefixtures("backend")
+def test_points_on_the_line_of_an_element_and_close_to_it_keep_their_digits() -> None:
+    constants, element = Constants.of(MATERIAL, 1.0), (np.array([0.0j]), np.array([1.0 + 0.0j]))
+    close = np.array([0.5 + 1e-14j, 1.0 + 1e-12 + 0j, 3.0 + 0j])
+    double = double_layer_fields(constants, close, *element, np.zeros((3, 1), bool))
+    # just inside of its left side half of the plane is seen, 2 (1 - nu) pi B = 1 / 2; along its line nothing is
+    np.testing.assert_allclose(double[0].real, [[-0.5], [0.0], [0.0]], atol=1e-13)
+    assert np.isfinite(double).all()
+    own = double_layer_fields(constants, np.array([0.5 + 0j]), *element, np.ones((1, 1), bool))
+    np.testing.assert_allclose(own[:2], 0.0, atol=1e-16)
+
+
+def test_points_of_no_element_see_no_jump() -> None:
+    columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 20), MATERIAL, np.arange(20), takes_slopes=False)
+    of_displacements = 4 * np.arange(20) + 2
+    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)
+    # a unit translation of the boundary: T 1 is -1 inside of the body, -1/2 + 1/2 on its boundary, 0 outside
+    np.testing.assert_allclose(inside.sum(), -1.0, atol=1e-14)
+    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)
+    np.testing.assert_allclose(on.sum(), 0.0, atol=1e-14)
+    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)
+    np.testing.assert_allclose(outside.sum(), 0.0, atol=1e-14)
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_without_numba_the_plan_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "is_installed", lambda: False)
+    assert compiled.functions() is None
+    assert "pip install 'bemkit[fast]'" in compiled.why()
+
+
+@pytest.mark.usefixtures("unloaded")
+@pytest.mark.parametrize(("fault", "words"), [(RuntimeError("no\nLLVM"), "no LLVM"), (np.nan, "wrong numbers")])
+def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, fault: float | Exception, words: str
+) -> None:
+    def broken(*arguments: object) -> np.ndarray:
+        if isinstance(fault, Exception):
+            raise fault
+        return np.array([fault])
+
+    module = types.ModuleType("compiled_fields")
+    module.single_layer_fields = broken  # type: ignore[attr-defined]
+    name = "bemkit.operators.hierarchy.compiled_fields"
+    monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
+    monkeypatch.setattr(compiled, "is_installed", lambda: True)
+    assert compiled.functions() is None
+    assert words in compiled.why()
+    assert "\n" not in compiled.why()
+    x, start, is_own = np.array([1j]), np.array([0j]), np.zeros((1, 1), bool)
+    assert np.isfinite(single_layer_fields(Constants(1.0, 1.0, 0.3, 1.0), x, start, start + 1.0, is_own)).all()
+
+
+@pytest.mark.usefixtures("backend")
+def test_far_away_fields_keep_their_digits() -> None:
+    constants, length = Constants.of(MATERIAL, 1.0), 1e-5
+    x = 3.0 * np.exp(1j * np.linspace(0.1, 6.0, 7)) + 0.2
+    start, end = np.array([0.2 + 0.1j]), np.array([0.2 + 0.1j + length * np.exp(0.7j)])
+    is_own = np.zeros((7, 1), bool)
+    double = double_layer_fields(constants, x, start, end, is_own)
+    # ten Gauss points are exact to round-off at 6e5 half lengths
+    t, weights = np.polynomial.legendre.leggauss(10)
+    tangent, nu = np.exp(0.7j), MATERIAL.effective_poisson_ratio
+    flow, moment_flow, turned, moment_turned = np.zeros((4, 7), complex)
+    for place, weight in zip(t, weights, strict=True):
+        rho = x - start[0] - 0.5 * length * (1.0 + place) * tangent
+        rate = -1j * tangent * 0.5 * length * weight / rho
+        quotient = rho / rho.conj() * rate.real
+        flow, moment_flow = flow + rate, moment_flow + place * rate
+        turned, moment_turned = turned + quotient, moment_turned + place * quotient
+    expected = [
+        constants.double * (2.0 * (1.0 - nu) * flow.real + 1j * (1.0 - 2.0 * nu) * flow.imag),
+        constants.double * turned,
+    ]
+    np.testing.assert_allclose(double[:2, :, 0], expected, rtol=1e-10)
+    # of the moments the sum cancels: they are length / distance of the others, which is known to fewer digits
+    rest = [constants.double * (2.0 * (1.0 - nu) * moment_flow.real + 1j * (1.0 - 2.0 * nu) * moment_flow.imag)]
+    np.testing.assert_allclose(double[2:3, :, 0], rest, atol=1e-15 * np.abs(expected[0]).max())
+    assert np.abs(double[2]).max() < 1e-5 * np.abs(double[0]).max()

@@ -1,0 +1,135 @@
+"""Compressed equations under any conditions: the answers of dense ones, however the conditions change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
+from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.linear.dense import SingularMatrixError
+from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+
+MATERIAL = Material(2.0, 0.3)
+OCTAGON = Polygon(tuple((np.cos(a), np.sin(a)) for a in np.pi * (0.25 * np.arange(8) + 0.1)))
+SHAPES = {
+    "rectangle": Rectangle(1.0, 2.0),
+    "strip": Rectangle(10.0, 0.3),
+    "hole": PlateWithHole(2.0, 1.5, 0.4),
+    "exterior": ExteriorOf(OCTAGON),
+}
+
+
+def mesh_of(name: str, n_elements: int) -> BoundaryMesh:
+    mesh = discretise(SHAPES[name].outline(), n_elements=n_elements).unit
+    return BoundaryMesh(mesh.nodes, mesh.elements, is_exterior=mesh.is_exterior)  # chords of the hole
+
+
+def conditions_of(mesh: BoundaryMesh, seed: int) -> tuple[NodalConditions, FloatArray, FloatArray]:
+    """Runs of elements held, free and retained in turned frames; given forces; retained displacements."""
+    rng, n = np.random.default_rng(seed), mesh.n_elements
+    angle = np.repeat(rng.uniform(0.0, 6.0, n // 15 + 1), 15)[:n]
+    axis = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    frame = np.stack([axis, np.stack([-axis[:, 1], axis[:, 0]], axis=1)], axis=1)
+    kind = np.repeat(rng.integers(0, 3, (n // 15 + 1, 2)), 15, axis=0)[:n]
+    is_fixed, is_retained = kind == 1, kind == 2
+    conditions = NodalConditions(frame, is_fixed, np.where(is_fixed, np.sin(3.0 * mesh.centres), 0.0), is_retained)
+    local = np.where(conditions.is_free, np.cos(2.0 * mesh.centres), 0.0) * mesh.lengths[:, None]
+    kept = np.sin(0.1 * np.arange(np.count_nonzero(is_retained)))
+    return conditions, np.einsum("nkc,nk->nc", frame, local), kept
+
+
+def system_of(mesh: BoundaryMesh, frame: FloatArray, slopes: bool, tolerance: float) -> HierarchicalSystem:
+    everywhere = np.ones(mesh.n_elements, bool)
+    return HierarchicalSystem(
+        mesh,
+        MATERIAL,
+        frame,
+        may_be_traction=everywhere,
+        may_be_displacement=everywhere,
+        slopes=slopes,
+        tolerance=tolerance,
+    )
+
+
+def laws_of(
+    system: HierarchicalSystem, mesh: BoundaryMesh, conditions: NodalConditions, force: FloatArray, kept: FloatArray
+) -> ElementLaws:
+    displacement = conditions.displacement.copy()
+    displacement[conditions.is_retained] = kept
+    traction = np.einsum("nkc,nc->nk", conditions.frame, force) / mesh.lengths[:, None]
+    return system.laws(NodeConditions.given(~conditions.is_free, traction, displacement))
+
+
+NOWHERE = np.zeros(0, np.intp)
+NOTHING = NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
+
+
+@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
+    mesh = mesh_of(name, 220)
+    conditions, force, kept = conditions_of(mesh, 3)
+    dense = MixedSystem(mesh, MATERIAL, conditions, "body", force, slopes=slopes).condensed()
+    displacement, all_force = dense.recover(kept)
+    for tolerance in (1e-6, 1e-11):
+        system = system_of(mesh, conditions.frame, slopes, tolerance)
+        system.state(laws_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
+        traction, found = system.everywhere()
+        expected = all_force / mesh.lengths[:, None]
+        # two to four times the tolerance are found on all shapes
+        assert np.abs(found - displacement).max() <= 20.0 * tolerance * np.abs(displacement).max()
+        assert np.abs(traction - expected).max() <= 20.0 * tolerance * np.abs(expected).max()
+        # and the residual says so
+        left = system.residual(np.arange(0, mesh.n_elements, 7), traction, found)
+        assert np.abs(left).max() <= 20.0 * tolerance * np.abs(found).max()
+
+
+def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
+    mesh = mesh_of("rectangle", 220)
+    conditions, force, kept = conditions_of(mesh, 4)
+    system = system_of(mesh, conditions.frame, True, 1e-9)
+    open_elements = np.flatnonzero(conditions.is_retained.any(axis=1))
+    rng = np.random.default_rng(0)
+    laws = laws_of(system, mesh, conditions, force, kept)
+    n_leaves = system.factor.compression.tree.n_leaves
+    for changed in (open_elements, open_elements[:3], open_elements[:0]):
+        some = np.isin(np.arange(mesh.n_elements), changed)[open_elements]
+        stiff = np.where(some[:, None], rng.uniform(1.0, 2.0, (open_elements.size, 2)), 1.5)
+        held = NodeConditions(
+            np.broadcast_to(np.eye(2), (open_elements.size, 2, 2)),
+            stiff[:, :, None] * np.eye(2),
+            np.ones((open_elements.size, 2)),
+        )
+        state = system.state(laws, open_elements, held)
+        fresh = system_of(mesh, conditions.frame, True, 1e-9)
+        np.testing.assert_allclose(state, fresh.state(laws, open_elements, held), rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(state[:, :2] + stiff * state[:, 2:], 1.0, rtol=1e-12)
+        assert fresh.factor.n_factored == n_leaves
+    assert 0 < system.factor.n_factored < n_leaves
+    system.state(laws, open_elements, held)
+    assert system.factor.n_factored == 0
+
+
+def test_a_body_that_nothing_holds_and_conditions_that_are_one_are_named() -> None:
+    mesh = mesh_of("rectangle", 220)
+    n = mesh.n_elements
+    frame = np.broadcast_to(np.eye(2), (n, 2, 2))
+    system = system_of(mesh, frame, True, 1e-11)
+    nothing_held = system.laws(NodeConditions.given(np.zeros((n, 2), bool), np.zeros((n, 2)), np.zeros((n, 2))))
+    with pytest.raises(SingularMatrixError, match="check that supports and contacts hold the body"):
+        system.state(nothing_held, NOWHERE, NOTHING)
+    twice = np.array([[[1.0, 0.0], [2.0, 0.0]]])
+    with pytest.raises(UndeterminedError, match="not independent"):
+        system.state(nothing_held, np.array([0]), NodeConditions(0.0 * twice, twice, np.zeros((1, 2))))
+    # and it goes on from there
+    held = system.laws(NodeConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), mesh.centres))
+    system.state(held, NOWHERE, NOTHING)
+    traction, _ = system.everywhere()
+    # a uniform dilatation has the pressure 2 (mu + lambda) = 2 mu / (1 - 2 nu) on all sides
+    pressure = 2.0 * MATERIAL.shear_modulus / (1.0 - 2.0 * MATERIAL.poisson_ratio)
+    np.testing.assert_allclose(traction, pressure * mesh.normals, atol=1e-7 * pressure)

@@ -1,0 +1,39 @@
+"""The tree of clusters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bemkit.geometry import Rectangle, discretise
+from bemkit.operators.hierarchy.tree import ClusterTree
+
+
+@given(n=st.integers(4, 300), leaf_size=st.integers(2, 60), seed=st.integers(0, 9))
+@settings(max_examples=40, deadline=None)
+def test_leaves_hold_every_point_once_and_nearly_as_many_each(n: int, leaf_size: int, seed: int) -> None:
+    tree = ClusterTree.of(np.random.default_rng(seed).normal(size=(n, 2)), leaf_size)
+    np.testing.assert_array_equal(np.sort(tree.order), np.arange(n))
+    assert tree.n_leaves == 2**tree.n_levels >= 2
+    sizes = np.diff(tree.bounds)
+    assert sizes.max() - sizes.min() <= 1 or sizes.max() <= 1.5 * leaf_size
+    assert sizes.sum() == n
+    places = np.arange(n)
+    for leaf in range(tree.n_leaves):
+        np.testing.assert_array_equal(tree.leaves_of(places[tree.places(0, leaf)]), [leaf] if sizes[leaf] else [])
+    for level in range(1, tree.n_levels + 1):
+        for cluster in range(2 ** (tree.n_levels - level)):
+            one, two = (tree.places(level - 1, 2 * cluster + k) for k in (0, 1))
+            assert tree.places(level, cluster) == slice(one.start, two.stop)
+            assert one.stop == two.start
+
+
+def test_both_long_sides_of_a_strip_share_a_leaf() -> None:
+    strip = discretise(Rectangle(100.0, 0.1).outline(), n_elements=400)
+    tree = ClusterTree.of(strip.centres, 32)
+    for leaf in range(tree.n_leaves):
+        y = strip.centres[tree.order[tree.places(0, leaf)]][:, 1]
+        assert y.min() == pytest.approx(0.0)
+        assert y.max() == pytest.approx(0.1)

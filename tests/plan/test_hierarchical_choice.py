@@ -1,0 +1,135 @@
+"""When the equations of collocation are compressed over a tree, and what the plan says of it."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+
+import pytest
+
+import bemkit as bk
+from bemkit.model.prepared import prepare
+from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
+from bemkit.plan import check_elements
+from bemkit.plan import plan as plan_module
+from bemkit.runs.nested import run_cascade
+from tests.scenes import paper
+
+run = importlib.import_module("bemkit.runs.run")
+ASKED = bk.Hierarchical(1e-10)
+
+
+def scene_of(n_elements: int, **changes: object) -> bk.Scene:
+    scene = paper(1, bk.ConstantCollocation(), replace(paper(1).mesh, elements=n_elements))
+    return replace(scene, **changes)  # type: ignore[arg-type]
+
+
+def chosen(scene: bk.Scene) -> ChosenLinearSolver:
+    return prepare(scene, scene.build_mesh()).linear_solver
+
+
+def test_large_bodies_are_compressed_and_small_ones_are_not() -> None:
+    small, large = chosen(scene_of(320)), chosen(scene_of(4000))
+    assert small.hierarchical is None
+    assert "would take" in small.reason
+    assert large.hierarchical == bk.Hierarchical()
+    assert "of the time of dense equations" in large.reason
+    assert chosen(scene_of(4000, linear_solver=DenseCholesky())) == ChosenLinearSolver(DenseCholesky(), "asked for")
+    assert chosen(scene_of(320, linear_solver=ASKED)).hierarchical == ASKED
+
+
+CURVED = replace(bk.load_scene("disc-between-plates"), discretisation=bk.ConstantCollocation())
+UNHELD = tuple(part for part in paper(1).parts if part.name != "wall")
+HINDRANCES = {
+    "elements are curved": replace(CURVED, mesh=bk.MeshOptions(elements=240)),
+    "the body is symmetric": scene_of(
+        240,
+        symmetry=bk.Symmetry(x=0.5),
+        parts=(
+            bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",)),
+            bk.Part("load", bk.Pressure(1.0), sides=("top",)),
+        ),
+    ),
+    "100 elements are few": scene_of(100),
+    "nearly incompressible": scene_of(240, material=bk.Material(1.0, 0.495)),
+    "forces act inside the body": scene_of(240, body_forces=(bk.Gravity(1.0),)),
+    "too long for the thickness": scene_of(240, shape=bk.Rectangle(1.0, 0.003), parts=UNHELD[:1]),
+    "no support holds its rotation": scene_of(240, discretisation=bk.ConstantCollocation(slopes=False), parts=UNHELD),
+}
+
+
+@pytest.mark.parametrize("words", HINDRANCES)
+def test_what_cannot_be_compressed_is_dense_and_the_plan_says_why(words: str) -> None:
+    scene = replace(HINDRANCES[words], linear_solver=ASKED)
+    choice = chosen(scene)
+    assert choice.hierarchical is None
+    assert choice.reason.startswith("the equations are not compressed, because")
+    assert words in choice.reason
+    plan = bk.make_plan(scene, scene.build_mesh())
+    assert not plan.is_compressed
+    assert any(words in item.reason for item in plan.items if item.name == "linear solver of the body")
+
+
+def test_galerkin_asked_to_compress_takes_what_automatic_takes() -> None:
+    choice = choose_linear_solver(ASKED, 640, 160)
+    assert choice.solver == choose_linear_solver(bk.Automatic(), 640, 160).solver
+    assert "not compressed over a tree" in choice.reason
+    scene = scene_of(40, discretisation=bk.QuadraticGalerkin(), linear_solver=ASKED)
+    assert bk.run(scene).is_converged
+    with pytest.raises(ValueError, match="a map does not choose"):
+        bk.GalerkinMap(scene.build_mesh(), scene.material, linear_solver=ASKED)
+
+
+def test_only_what_does_not_fit_otherwise_is_compressed_for_want_of_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(1000)
+    assert chosen(scene).hierarchical is None
+    monkeypatch.setattr("bemkit.model.prepared.physical_memory", lambda: 5e7)
+    assert chosen(scene).hierarchical is not None
+    assert "dense ones need about" in chosen(scene).reason
+
+
+def test_the_plan_says_what_is_compressed_and_which_kernels_run() -> None:
+    plan = bk.make_plan(scene_of(4000), scene_of(4000).build_mesh())
+    reasons = {item.name: item.reason for item in plan.items}
+    assert plan.is_compressed
+    assert "compressed over a tree to 1e-11" in reasons["boundary equations"]
+    assert "no matrix of the whole body" in reasons["linear solver of the body"]
+    assert "numba" in reasons["compiled kernels (numba)"] or "numpy" in reasons["compiled kernels (numba)"]
+    assert plan.work.factorisations == ()
+    assert plan.largest_matrix < plan.sizes.n_displacements
+
+
+def test_memory_of_compressed_equations_grows_like_the_elements(monkeypatch: pytest.MonkeyPatch) -> None:
+    small, large = (bk.make_plan(scene_of(n), scene_of(n).build_mesh()).memory for n in (4000, 8000))
+    assert large == pytest.approx(2 * small, rel=1e-2)
+    monkeypatch.setattr(plan_module, "physical_memory", lambda: 100.0 * small)
+    check_elements(scene_of(300_000))
+    with pytest.raises(bk.errors.InputError, match="use at most"):
+        check_elements(scene_of(1_000_000))
+
+
+@pytest.mark.parametrize("tolerance", [1e-14, 1.0])
+def test_tolerances_out_of_range_are_refused(tolerance: float) -> None:
+    with pytest.raises(ValueError, match="give a number from 1e-13 to 1e-4"):
+        bk.Hierarchical(tolerance)
+
+
+def test_large_compressed_scenes_begin_on_coarser_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert run._gain_by_cascade(scene_of(6000)) == 4
+    assert not run._gain_by_cascade(scene_of(4000))
+    assert not run._gain_by_cascade(scene_of(6000, linear_solver=DenseCholesky()))
+    assert not run._gain_by_cascade(scene_of(6000, load_factors=(0.5, 1.0)))
+    monkeypatch.setattr(run, "_LARGE", 1000)
+    monkeypatch.setattr(run, "_COARSEST", 250)
+    scene = scene_of(1000, linear_solver=bk.Hierarchical())
+    records = []
+    solution = bk.run(scene, callback=records.append)
+    assert solution.mesh.n_elements == 1000
+    assert solution.is_converged
+    assert solution.outer_steps <= 3 < len(records) - solution.outer_steps
+
+
+def test_a_ratio_of_meshes_below_two_is_refused() -> None:
+    with pytest.raises(ValueError, match="ratio = 1: give a whole number from 2 on"):
+        run_cascade(scene_of(400), ratio=1)
