@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.engine import compute_with_progress
 from bemkit.studies.stability.random_scenes import random_case
-from bemkit.studies.stability.trials import Outcome, Trial, judge, trial_tasks, try_case
+from bemkit.studies.stability.trials import Outcome, Trial, energy_fault, judge, trial_tasks, try_case
 from tests.scenes import FLOOR, block
 
 REMEDY = re.compile(
@@ -118,6 +118,19 @@ def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
         outcome, reason, text = judge([*steps[:-1], dataclasses.replace(steps[-1], loading=wrong)])
         assert (outcome, reason) == (Outcome.WRONG, "energy of the load history")
         assert message in text
+
+
+def test_round_off_of_a_body_that_only_moves_is_no_missing_work() -> None:
+    loop = bk.load_scene("friction-loop")
+    (step, *_) = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
+    assert step.loading is not None
+    last = step.loading.steps[-1]
+    size = step.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2
+    for share, is_fault in ((1e-15, False), (1e-11, True)):  # either side of ROUND_OFF
+        work = dataclasses.replace(last.work, external_work=share * size, dissipation=0.0, increment_work=0.0)
+        idle = dataclasses.replace(last, work=work, elastic_energy=0.0)
+        moved = dataclasses.replace(step, loading=dataclasses.replace(step.loading, steps=(idle,)))
+        assert ("missing" in energy_fault(moved)) is is_fault
 
 
 def test_fields_of_another_body_are_wrong_unless_the_solution_says_that_it_is_coarse() -> None:
