@@ -52,21 +52,21 @@ def hertz() -> Case:
 
 def flat_punch() -> Case:
     """Return a level punch without friction."""
-    return _under_punch("flat punch", FlatPunch(1.0, 1.0, 1.0), PRESSED, Frictionless(), (1e-2, 1e-3, 3e-4))
+    return _under_punch("flat punch", FlatPunch(1.0, 1.0, 1.0), PRESSED, Frictionless(), (1.2e-2, 2e-3, 8e-4))
 
 
 def tilted_punch() -> Case:
     """Return a punch so tilted that one side lifts off."""
     exact, turned = FlatPunch(1.0, 1.0, 1.0, 0.9), replace(PRESSED, turn=0.9)
-    case = _under_punch("tilted punch that lifts off", exact, turned, Frictionless(), (2e-2, 4e-3, 3e-3))
-    start = Quantity("start of contact", lambda solution: _ends(solution)[0], (2e-4, 4e-5, 1e-5), exact.contact_start)
+    case = _under_punch("tilted punch that lifts off", exact, turned, Frictionless(), (2e-2, 4e-3, 4e-3))
+    start = Quantity("start of contact", lambda solution: _ends(solution)[0], (2e-3, 5e-4, 1e-5), exact.contact_start)
     return replace(case, source="Muskhelishvili1953", quantities=(*case.quantities, start))
 
 
 def sliding_punch() -> Case:
     """Return a level punch that slides to the left on the half-plane."""
     exact, moved = SlidingPunch(1.0, 1.0, -FRICTION, STEEL), replace(PRESSED, x=10.0)
-    return _under_punch("sliding punch", exact, moved, Coulomb(FRICTION), (1e-2, 1.5e-3, 3e-4))
+    return _under_punch("sliding punch", exact, moved, Coulomb(FRICTION), (1e-2, 2e-3, 1.6e-3))
 
 
 def bonded_punch() -> Case:
@@ -85,7 +85,7 @@ def bonded_punch() -> Case:
 
         return largest
 
-    bounds = (1e-2, 1e-3, 9e-4)
+    bounds = (1.2e-2, 2.5e-3, 9e-4)
     return Case(
         title="bonded punch",
         source="Johnson1985",
@@ -122,7 +122,7 @@ def spence_punch() -> Case:
         "static or incremental law, pressed only",
         scene,
         ratio,
-        (6e-4, 5e-5, 3e-6),
+        (1.2e-3, 1.5e-4, 4.5e-5),
     )
 
 

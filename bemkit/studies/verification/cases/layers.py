@@ -63,7 +63,7 @@ def receding_pair() -> Case:
             Quantity(
                 "half-width",
                 lambda solution: 0.5 * solution.contacts[0].contact_length,
-                (6e-2, 5e-3, 2e-3),
+                (6e-2, 1e-2, 2e-3),
                 exact.half_width,
             ),
             Quantity("pressure, L2", pressure, (6e-2, 2.5e-2, 1.2e-2), order=0.9),
