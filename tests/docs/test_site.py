@@ -85,6 +85,8 @@ def test_every_page_has_its_place_in_the_navigation() -> None:
     index = (DOCS / "index.md").read_text("utf-8")
     for page in DOCS.glob("*.md"):
         assert page.stem == "index" or re.search(rf"^{page.stem}$", index, re.MULTILINE), page.name
+    for name in re.findall(r"^([\w/-]+)$", index, re.MULTILINE):
+        assert (DOCS / f"{name}.md").exists() or name.startswith(("api/", "gallery/")), name
 
 
 @pytest.fixture
