@@ -36,6 +36,7 @@ exclude_patterns = ["html", "_build"]
 default_role = "py:obj"
 suppress_warnings = ["ref.python"]  # names such as n_contact in types, which several classes have
 autodoc_typehints = "none"  # docstrings say types with shapes and units
+autodoc_mock_imports = ["numba"]  # an extra: without it the kernels run in numpy
 autodoc_preserve_defaults = True
 autosummary_generate = False
 napoleon_google_docstring = False

@@ -16,23 +16,23 @@ from bemkit.errors import BemkitError, NoResultError, one_line, printable
 from bemkit.results.outputs import PipeClosedError, guarded_streams
 from bemkit.version import __version__
 
-_MODULES = {
-    "cite": "cite",
-    "critical-friction": "critical_friction",
-    "outline": "outline",
-    "plan": "plan",
-    "plot": "plot",
-    "report": "report",
-    "run": "run",
-    "scenes": "scenes",
-    "schema": "schema",
-    "show": "show",
-    "stability": "study",
-    "study": "study",
-    "sweep": "sweep",
-    "verify": "verify",
+_COMMANDS = {
+    "cite": ("cite", "Name the works behind a scene or a result."),
+    "critical-friction": ("critical_friction", "Find the friction at which sliding states lose uniqueness."),
+    "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
+    "plan": ("plan", "Say what a scene needs and what it leaves out, without solving it."),
+    "plot": ("plot", "Draw a result or a scene."),
+    "report": ("report", "Write a page on a result or a scene."),
+    "run": ("run", "Solve a scene."),
+    "scenes": ("scenes", "List the scenes that come with bemkit."),
+    "schema": ("schema", "Print the JSON schema of scene files, for editors."),
+    "show": ("show", "Show a result file."),
+    "stability": ("study", "Drive a scene to its extremes, or solve random ones, and judge the answers."),
+    "study": ("study", "Measure error against run time; make the tables of the paper."),
+    "sweep": ("sweep", "Solve a scene under several values of its numbers."),
+    "verify": ("verify", "Compare with closed forms and other known answers."),
 }
-"""The module of each command, which is loaded when it is asked for."""
+"""The module of each command, which is loaded when it is asked for, and what the list of commands says of it."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -80,15 +80,20 @@ class _Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of all commands."""
-        return list(_MODULES)
+        return list(_COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return the command of a name."""
-        if cmd_name not in _MODULES:
+        if cmd_name not in _COMMANDS:
             return None
-        module = import_module(f"bemkit.cli.{_MODULES[cmd_name]}")
+        module = import_module(f"bemkit.cli.{_COMMANDS[cmd_name][0]}")
         command: click.Command = getattr(module, cmd_name.replace("-", "_"))
         return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in _COMMANDS.items()])
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

@@ -15,13 +15,14 @@ import time
 import types
 from pathlib import Path
 
+import click
 import pytest
 
 import bemkit.__main__
 import bemkit.results.outcome_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
-from bemkit.cli.main import main
+from bemkit.cli.main import commands, main
 from bemkit.results.result_file import read_result
 from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -380,6 +381,23 @@ assert all(find_spec(name) for name in wanted if name.startswith("bemkit."))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "[]"
+
+
+def test_the_list_of_commands_loads_none_of_them() -> None:
+    code = """
+import sys
+from bemkit.cli.main import main
+try:
+    main(["--help"])
+except SystemExit as end:
+    assert end.code == 0
+print(sorted({"numpy", "cattrs", "bemkit.cli.run"} & set(sys.modules)), file=sys.stderr)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    for command in commands.list_commands(click.Context(commands)):
+        assert re.search(rf"^  {command} +[A-Z]", done.stdout, re.MULTILINE)
+        assert commands.get_command(click.Context(commands), command) is not None
 
 
 def test_the_convergence_table_has_a_line_per_step() -> None:
