@@ -6,9 +6,6 @@ from abc import abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-import numpy as np
-
-from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import (
     LARGEST_DEGREE,
@@ -25,14 +22,7 @@ from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinEla
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
-
-_LONGEST = 0.75
-"""Length of elements, in thicknesses, at which the energy of a pinched ring is 2 per cent off; it grows with the third
-power of the length."""
-_SHARE = 0.25
-"""Of the boundary: more than what is thin in the tip of a wedge or between a hole and a side."""
-_FACING = -0.5
-_ROWS = 256
+from bemkit.scene.thinness import thinness_warnings
 
 
 class Discretisation(Protocol):
@@ -290,7 +280,7 @@ class ConstantCollocation(Discretisation):
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
         """Name thinness: only a dense stiffness tells whether elements that are too long make the energy negative."""
-        return "elements are too long for the thickness of the body" if _thinness_warnings(mesh) else ""
+        return "elements are too long for the thickness of the body" if thinness_warnings(mesh) else ""
 
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
         """Return the compressed map of a body of straight elements without symmetry."""
@@ -300,41 +290,4 @@ class ConstantCollocation(Discretisation):
         """Return what collocation takes, and warn of bodies that are thin for their elements."""
         find = collocation_needs if case.linear_solver.hierarchical is None else hierarchical_needs
         needs = find(case, takes_slopes=self.slopes)
-        return replace(needs, warnings=_thinness_warnings(case.mesh))
-
-
-def _thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
-    """Warn in one sentence if elements of collocation are too long for the thickness of the body."""
-    if mesh.is_exterior:
-        return ()
-    longest = mesh.lengths / thicknesses(mesh, mesh.lengths / _LONGEST)
-    is_thin = longest > _LONGEST
-    if mesh.lengths[is_thin].sum() <= _SHARE * mesh.lengths.sum():
-        return ()
-    factor = float(np.median(longest[is_thin])) / _LONGEST
-    return (
-        f"collocation: on {int(np.count_nonzero(is_thin))} of {mesh.n_elements} elements the body is thinner than the "
-        f"elements are long, and bends too stiffly: take {factor:.1f} times as many elements, or quadratic Galerkin",
-    )
-
-
-def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> FloatArray:
-    """Return the distance (n_elements,) [m] across the body to the nearest element that faces the other way.
-
-    Elements face each other if their normals are opposite to within 60 degrees and the line between their middles is
-    within 45 degrees of the normal; infinite where no element within `reach` [m] does.
-    """
-    from scipy.spatial import KDTree
-
-    whole, result = mesh.whole, np.full(mesh.n_elements, np.inf)
-    tree, farthest = KDTree(whole.centres), np.minimum(reach, 4.0 * whole.diameter) + np.zeros(mesh.n_elements)
-    for begin in range(0, mesh.n_elements, _ROWS):
-        rows = np.arange(begin, min(begin + _ROWS, mesh.n_elements))
-        near = tree.query_ball_point(mesh.centres[rows], farthest[rows])
-        own, other = np.repeat(rows, [len(each) for each in near]), np.concatenate(near).astype(np.intp)
-        arm = whole.centres[other] - whole.centres[own]
-        across, distance = -np.sum(arm * whole.normals[own], axis=1), np.hypot(arm[:, 0], arm[:, 1])
-        facing = np.sum(whole.normals[own] * whole.normals[other], axis=1)
-        faces = (facing < _FACING) & (across > np.sqrt(0.5) * distance)
-        np.minimum.at(result, own[faces], distance[faces])
-    return result
+        return replace(needs, warnings=thinness_warnings(case.mesh))
