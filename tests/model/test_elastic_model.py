@@ -172,7 +172,7 @@ def test_figures_show_the_tractions_on_the_boundary(bent: Solution, tmp_path: Pa
     axes = draw_boundary_traction(bent, units=bk.UnitNames("mm", "MPa"))
     (strip,) = axes.child_axes
     drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
-    largest = np.abs(bent.boundary.traction).max()
+    largest = np.abs(bent.boundary.traction_dofs).max()
     assert drawn["normal $t_n$"].max() == pytest.approx(largest, rel=1e-12)
     assert np.abs(drawn["tangential $t_t$"]).max() < 1e-9 * largest
     assert {text.get_text() for text in strip.texts} == {"wall", "bending"}

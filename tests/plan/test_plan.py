@@ -215,10 +215,10 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
 
     monkeypatch.setattr(bk.Scene, "build_mesh", watched)
     with pytest.raises(SystemExit, match="2"):
-        main([command, "paper-1", "--elements", "1000000"])
+        main([command, "paper-1", "--elements", "1000000", "--discretisation", "linear"])
     message = r"1000000 elements need about \S+ GB, this computer has \S+ GB: use at most \d+ elements"
     assert re.search(message, capsys.readouterr().err)
-    assert max(filter(None, built)) <= 2000
+    assert max(filter(None, built)) <= 5000  # small ones, by which the large one is judged
 
 
 def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:

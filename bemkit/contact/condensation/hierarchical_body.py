@@ -15,7 +15,7 @@ from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.errors import InputError
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
-from bemkit.operators.hierarchy.system import NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -216,7 +216,7 @@ class HierarchicalBody(LinearBody):
             try:
                 value = conditions.value - np.einsum("nrk,nk->nr", conditions.on_displacement, motion)
                 state = loaded.system.state(loaded.known, nodes, replace(conditions, value=value))
-            except (SingularMatrixError, UndeterminedError) as error:
+            except SingularMatrixError as error:
                 raise SingularResponse(str(error)) from error
             strained = np.einsum("nkc,nk->nc", frame, state[:, 2:])
             travel = loaded.travel_of(nodes, strained)

@@ -14,6 +14,7 @@ from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import solve_conditions
 from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
 from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
@@ -47,7 +48,7 @@ class NodeConditions:
         )
 
 
-class UndeterminedError(ArithmeticError):
+class UndeterminedError(SingularMatrixError):
     """Two conditions at an element that are only one."""
 
 

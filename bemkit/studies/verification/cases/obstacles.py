@@ -8,6 +8,7 @@ import numpy as np
 
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap
+from bemkit.errors import InputError
 from bemkit.geometry.shapes import Ring
 from bemkit.operators.material import Material
 from bemkit.reference import LameRing, find_reference
@@ -33,8 +34,8 @@ def _shipped(
     if resolutions is RISING:
         scene = with_overrides(scene, accuracy=RISING[0], degree="hp")
     reference = find_reference(scene)
-    if reference is None:  # it stands in `bemkit.reference.shipped`
-        raise KeyError(name)
+    if reference is None:
+        raise InputError(f"scene {name!r} has no reference: give it one in bemkit.reference.shipped")
     return Case(scene.title, source, validity, at_resolution(scene), resolutions, field_errors(reference, **bounds))
 
 
