@@ -122,7 +122,7 @@ def test_the_body_keeps_the_promises_of_a_body() -> None:
 
 
 def test_a_response_factors_what_has_changed_alone() -> None:
-    model = model_of(in_both_ways(paper(1), 600)[0])
+    model = model_of(in_both_ways(paper(1), 300)[0])
     body, problem = model.body, model.problem
     assert isinstance(body, HierarchicalBody)
     factor, held = body.loaded.system.factor, stick(problem.gap, problem.slip_origin)

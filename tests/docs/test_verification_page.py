@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import pytest
+
+from bemkit.studies.verification.case import Case
 from bemkit.studies.verification.cases import CASES
 from tests.docs.pages import read, section, table
 
 PAGE = section(read("verification.md"), "All rows")
 
 
-def test_all_rows_are_listed_with_their_sources() -> None:
+@pytest.fixture(scope="module")
+def cases() -> Mapping[str, Case]:
+    return {name: make() for name, make in CASES.items()}
+
+
+def test_all_rows_are_listed_with_their_sources(cases: Mapping[str, Case]) -> None:
     listed = [(row[0], row[1], row[2]) for row in table(PAGE)]
-    rows = [
-        (name, quantity.name, case.source)
-        for name, case in ((name, make()) for name, make in CASES.items())
-        for quantity in case.quantities
-    ]
+    rows = [(name, quantity.name, case.source) for name, case in cases.items() for quantity in case.quantities]
     assert listed == rows
 
 
-def test_all_rows_were_met_within_the_bounds_of_today() -> None:
-    cases = {name: make() for name, make in CASES.items()}
+def test_all_rows_were_met_within_the_bounds_of_today(cases: Mapping[str, Case]) -> None:
     bounds = {(name, each.name): each.bounds for name, case in cases.items() for each in case.quantities}
     for name, quantity, _, _, errors, _, bound, met in table(PAGE):
         assert met == "yes"
@@ -27,7 +32,7 @@ def test_all_rows_were_met_within_the_bounds_of_today() -> None:
         assert float(bound) == bounds[name, quantity][-1]
 
 
-def test_what_each_case_holds_for_is_said() -> None:
+def test_what_each_case_holds_for_is_said(cases: Mapping[str, Case]) -> None:
     said = table(PAGE.partition("| case | problem |")[1] + PAGE.partition("| case | problem |")[2])
     assert [row[0] for row in said] == list(CASES)
-    assert [row[2] for row in said] == [make().validity for make in CASES.values()]
+    assert [row[2] for row in said] == [case.validity for case in cases.values()]

@@ -205,11 +205,11 @@ def crude_stick_ratio(friction: float, n: int, *, is_parabola: bool) -> float:
 
 @pytest.mark.parametrize("friction", [0.2, 0.3])
 def test_stick_ratios_are_those_of_crude_elements(friction: float) -> None:
-    # the crude answer is known to an element or two, of which there are 400 in a quarter of a circle
-    flat = crude_stick_ratio(friction, 400, is_parabola=False)
-    assert spence_stick_ratio(friction, STEEL) == pytest.approx(flat, abs=6e-3)
-    parabola = crude_stick_ratio(friction, 400, is_parabola=True)
-    assert static_cylinder_stick_ratio(friction, STEEL) == pytest.approx(parabola, abs=6e-3)
+    # the crude answer is known to an element or two, of which there are 200 in a quarter of a circle
+    flat = crude_stick_ratio(friction, 200, is_parabola=False)
+    assert spence_stick_ratio(friction, STEEL) == pytest.approx(flat, abs=1.2e-2)
+    parabola = crude_stick_ratio(friction, 200, is_parabola=True)
+    assert static_cylinder_stick_ratio(friction, STEEL) == pytest.approx(parabola, abs=1.2e-2)
 
 
 def test_stick_ratios_of_known_cases() -> None:
