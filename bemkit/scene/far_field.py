@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import check_pair
 from bemkit.errors import InputError
 from bemkit.geometry.outline import Outline
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
-
-_COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
+from bemkit.scene.plane_motion import PlaneMotion
 
 
 @dataclass(frozen=True, kw_only=True)
-class FarField:
+class FarField(PlaneMotion):
     """Motion or load of a half-plane far away from its surface.
 
     Of each motion and its load one is given, and the other follows; what is given of neither does not move. A rigid
@@ -55,37 +50,7 @@ class FarField:
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", tuple(self.centre))
         check_pair("centre", self.centre)
-        for motion, load in _COMPONENTS:
-            for key in (motion, load):
-                value = getattr(self, key)
-                if value is not None and not math.isfinite(value):
-                    raise InputError(f"{key} is {value}: give a finite number")
-            if getattr(self, motion) is not None and getattr(self, load) is not None:
-                raise InputError(
-                    f"{motion} is {getattr(self, motion)} and {load} is {getattr(self, load)}: give one of them, the "
-                    "other follows"
-                )
-
-    @property
-    def is_driven(self) -> BoolArray:
-        """(3,) bool array: the motions x, y, turn that a load drives, and that are unknown."""
-        return np.array([getattr(self, load) is not None for _, load in _COMPONENTS])
-
-    @property
-    def motion(self) -> FloatArray:
-        """(3,) array [m, m, rad]: the given motions, zero where a load is given."""
-        return np.array([getattr(self, motion) or 0.0 for motion, _ in _COMPONENTS])
-
-    @property
-    def load(self) -> FloatArray:
-        """(3,) array [N/m, N/m, N m/m]: the given loads, zero where a motion is given."""
-        return np.array([getattr(self, load) or 0.0 for _, load in _COMPONENTS])
-
-    def scaled(self, factor: float) -> FarField:
-        """Return the given motions and loads multiplied by a number."""
-        names = [entry.name for entry in fields(self) if entry.name != "centre"]
-        given = {name: getattr(self, name) for name in names}
-        return replace(self, **{name: factor * value for name, value in given.items() if value is not None})
+        self.check_motion()
 
 
 def check_half_plane(

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import Obstacle, check_pair
 from bemkit.errors import InputError
-
-COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
-"""The three motions of a plane rigid body, each with the load that does work on it."""
+from bemkit.scene.plane_motion import PlaneMotion
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigidBody:
+class RigidBody(PlaneMotion):
     """A rigid obstacle that moves.
 
     Of each motion and its load one is given, and the other follows; what is given of neither does not move.
@@ -58,36 +55,7 @@ class RigidBody:
             raise InputError(f"the rigid body name {self.name!r} does not do: give printable text without a dot")
         object.__setattr__(self, "centre", tuple(self.centre))
         check_pair(f"rigid body {self.name!r}: centre", self.centre)
-        for motion, load in COMPONENTS:
-            for key in (motion, load):
-                value = getattr(self, key)
-                if value is not None and not math.isfinite(value):
-                    raise InputError(f"rigid body {self.name!r}: {key} is {value}: give a finite number")
-            if getattr(self, motion) is not None and getattr(self, load) is not None:
-                raise InputError(
-                    f"rigid body {self.name!r}: {motion} is {getattr(self, motion)} and {load} is "
-                    f"{getattr(self, load)}: give one of them, the other follows"
-                )
-
-    @property
-    def is_driven(self) -> BoolArray:
-        """(3,) bool array: the motions x, y, turn that a load drives, and that are unknown."""
-        return np.array([getattr(self, load) is not None for _, load in COMPONENTS])
-
-    @property
-    def motion(self) -> FloatArray:
-        """(3,) array [m, m, rad]: the given motions, zero where a load is given."""
-        return np.array([getattr(self, motion) or 0.0 for motion, _ in COMPONENTS])
-
-    @property
-    def load(self) -> FloatArray:
-        """(3,) array [N/m, N/m, N m/m]: the given loads, zero where a motion is given."""
-        return np.array([getattr(self, load) or 0.0 for _, load in COMPONENTS])
-
-    def scaled(self, factor: float) -> RigidBody:
-        """Return the body with its given motions and loads multiplied by a number."""
-        given = {key: getattr(self, key) for pair in COMPONENTS for key in pair}
-        return replace(self, **{key: factor * value for key, value in given.items() if value is not None})
+        self.check_motion(f"rigid body {self.name!r}: ")
 
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return (n, 2, 3): how the motions x, y, turn displace points (n, 2) [m] of the body."""
