@@ -142,7 +142,8 @@ class Model:
         On a half-plane also the forces that balance all others from far away, on its motion there.
         """
         displacement, force = self.body.recover(state)
-        acting = supporting_forces(self.prepared.conditions, self.prepared.force, force)
+        of_contact = self.nodes.forces(state.traction, len(force))
+        acting = supporting_forces(self.prepared.conditions, self.prepared.force, force - of_contact)
         if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
             motion = displacement - self.elastic.strain_displacement(force)
             acting = np.concatenate([acting, -force.ravel()])

@@ -36,8 +36,7 @@ class StepWork:
     Notes
     -----
     All by the trapezoidal rule on each increment, with which, for a body with a symmetric stiffness, ``external_work =
-    change of elastic energy + dissipation + increment_work`` but for round-off; where a support that moves holds a node
-    of a contact part obliquely to its obstacle, but for the work of contact there.
+    change of elastic energy + dissipation + increment_work`` but for round-off.
     """
 
     external_work: float = 0.0

@@ -70,6 +70,12 @@ class ContactNodes:
         """(n_contact,) bool: both rows of nodes that stand in two."""
         return np.isin(self.nodes, self.nodes[self.is_second])
 
+    def forces(self, traction: FloatArray, n_nodes: int) -> FloatArray:
+        """Return the forces (n_nodes, 2) [N/m] of tractions (n_contact, 2) [Pa] in (n, t) components, in x and y."""
+        forces = np.zeros((n_nodes, 2))
+        np.add.at(forces, self.nodes, self.weights[:, None] * np.einsum("nk,nkc->nc", traction, self.frame))
+        return forces
+
     def take(self, rows: IntArray | BoolArray) -> ContactNodes:
         """Return some of the nodes."""
         return ContactNodes(*(column[rows] for column in vars(self).values()))

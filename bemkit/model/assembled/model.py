@@ -114,15 +114,25 @@ class AssembledModel:
         """
         prepared, forces, displacements = self.prepared, [np.zeros(0)], [np.zeros(0)]
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        bodies = zip(prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True)
-        for conditions, given, condensed, own in bodies:
+        bodies = zip(
+            self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True
+        )
+        for of_contact, conditions, given, condensed, own in bodies:
             displacement, force = condensed.recover(own)
-            forces.append(supporting_forces(conditions, given, force) * prepared.force_unit)
+            forces.append(supporting_forces(conditions, given, force - of_contact) * prepared.force_unit)
             displacements.append(displacement.ravel() * prepared.units.displacement)
         rigid = self.rigid_bodies(state)
         forces += [reaction for _, reaction in rigid]
         displacements += [motion for motion, _ in rigid]
         return np.concatenate(forces), np.concatenate(displacements)
+
+    def _contact_forces(self, state: ContactState) -> list[FloatArray]:
+        """Return the nodal forces (n_nodes, 2) of contact on each body, in its own axes, dimensionless."""
+        bodies = self.prepared.bodies
+        in_place = _coupling(self.prepared).T @ (self.body.weights[:, None] * state.traction).ravel()
+        ends = np.cumsum([body.space.n_dofs for body in bodies])[:-1]
+        each = np.split(in_place, ends)
+        return [body.turn.turned_back(own.reshape(-1, 2)) for body, own in zip(bodies, each, strict=True)]
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.

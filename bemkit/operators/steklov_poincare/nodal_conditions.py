@@ -138,7 +138,8 @@ def supporting_forces(conditions: NodalConditions, given: FloatArray, total: Flo
     ----------
     conditions : NodalConditions
     given, total : (n_nodes, 2) arrays [N/m]
-        The given forces, and all that act on the boundary of the body.
+        The given forces, and all that act on the boundary of the body but those of contact: a support may hold a node
+        obliquely to what it touches.
     """
     local, own = (np.einsum("nkc,nc->nk", conditions.frame, each) for each in (total, given))
     acting = np.where(conditions.is_fixed, local, own)
