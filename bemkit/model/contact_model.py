@@ -8,17 +8,15 @@ it is. A scene without contact is a contact problem without nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
@@ -29,18 +27,21 @@ from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
-from bemkit.operators.half_plane.periodic import PeriodicElasticity
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 
-ContactBody: TypeAlias = CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody
+if TYPE_CHECKING:
+    from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
+    from bemkit.contact.periodic_body import PeriodicBody
+
+ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +110,9 @@ class Model:
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
-        is_driven_alike = True
-        if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity) and prepared.drive != elastic.drive:
-            elastic, is_driven_alike = elastic.driven_by(prepared.drive), False
+        is_driven_alike = prepared.drive == self.prepared.drive
+        if not is_driven_alike:
+            elastic = _driven_by(elastic, prepared.drive)
         if is_driven_alike and stays.has_same_directions(self.contact) and not is_new_friction.any():
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
             # a node that has lost its friction stays what it is in the condensed body
@@ -128,10 +129,10 @@ class Model:
         displacement = blended(one.conditions.displacement, two.conditions.displacement, share)
         force = blended(one.force, two.force, share)
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity) and one.drive != two.drive:
+        if one.drive != two.drive:
             drive, conditions = one.drive.blended(two.drive, share), replace(two.conditions, displacement=displacement)
             prepared = replace(two, drive=drive, conditions=conditions, force=force)
-            body = contact_body(self.elastic.driven_by(drive), prepared)
+            body = contact_body(_driven_by(self.elastic, drive), prepared)
         else:
             body = self.body.under(displacement, force, inside)
         return replace(self.problem, body=body, gap=blended(before.problem.gap, self.problem.gap, share))
@@ -144,7 +145,7 @@ class Model:
         displacement, force = self.body.recover(state)
         of_contact = self.nodes.forces(state.traction, len(force))
         acting = supporting_forces(self.prepared.conditions, self.prepared.force, force - of_contact)
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+        if isinstance(self.elastic, SurfaceElasticity):
             motion = displacement - self.elastic.strain_displacement(force)
             acting = np.concatenate([acting, -force.ravel()])
             displacement = np.concatenate([displacement, motion])
@@ -203,7 +204,7 @@ class Model:
 
     def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+        if isinstance(self.elastic, SurfaceElasticity):
             return self.elastic.strain_displacement(force), force
         inside = self.prepared.inside
         return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
@@ -257,8 +258,7 @@ def build_model(prepared: Prepared) -> Model:
         if chosen.hierarchical is None
         else discretisation.hierarchical_map(mesh, prepared.material, chosen.hierarchical)
     )
-    if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity):
-        elastic = elastic.driven_by(prepared.drive)
+    elastic = _driven_by(elastic, prepared.drive)
     if prepared.inside is not None:
         elastic = HeavyElasticity(elastic, prepared.inside)
     body = contact_body(elastic, prepared)
@@ -267,15 +267,28 @@ def build_model(prepared: Prepared) -> Model:
 
 def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
     """Return a body as contact sees it: condensed onto its contact nodes or compressed, if there are any."""
-    if isinstance(elastic, PeriodicElasticity):
+    if prepared.mesh.surface is not None and prepared.mesh.surface.is_periodic:
+        from bemkit.contact.periodic_body import PeriodicBody
+        from bemkit.operators.half_plane.periodic import PeriodicElasticity
+
+        assert isinstance(elastic, PeriodicElasticity)
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
-        if isinstance(elastic, HierarchicalCollocation):
+        if prepared.linear_solver.hierarchical is not None:
+            from bemkit.contact.condensation.hierarchical_body import hierarchical_body
+            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
+            assert isinstance(elastic, HierarchicalCollocation)
             return hierarchical_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
         return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     check_held(prepared)
     condensed = elastic.condense(prepared.conditions, prepared.force)
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)
+
+
+def _driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
+    """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
+    return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
 
 
 def _problem(prepared: Prepared, body: ContactBody) -> ContactProblem:

@@ -15,12 +15,9 @@ from bemkit.geometry.spaces import (
     break_nodes,
     check_degree,
 )
-from bemkit.operators.half_plane import half_plane_map, half_plane_needs
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
-from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 from bemkit.scene.thinness import thinness_warnings
 
@@ -124,6 +121,8 @@ class SymmetricGalerkin(Discretisation, Protocol):
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
         if mesh.surface is not None:
+            from bemkit.operators.half_plane.maps import half_plane_map
+
             return half_plane_map(mesh, material)
         displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
         return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
@@ -131,6 +130,8 @@ class SymmetricGalerkin(Discretisation, Protocol):
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what the Galerkin map takes."""
         if case.mesh.surface is not None:
+            from bemkit.operators.half_plane.maps import half_plane_needs
+
             return half_plane_needs(case)
         degree = self.displacement_space(case.mesh).degree
         return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
@@ -284,10 +285,16 @@ class ConstantCollocation(Discretisation):
 
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
         """Return the compressed map of a body of straight elements without symmetry."""
+        from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
         return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what collocation takes, and warn of bodies that are thin for their elements."""
-        find = collocation_needs if case.linear_solver.hierarchical is None else hierarchical_needs
-        needs = find(case, takes_slopes=self.slopes)
+        if case.linear_solver.hierarchical is None:
+            needs = collocation_needs(case, takes_slopes=self.slopes)
+        else:
+            from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
+
+            needs = hierarchical_needs(case, takes_slopes=self.slopes)
         return replace(needs, warnings=thinness_warnings(case.mesh))

@@ -107,11 +107,11 @@ def test_displacement_and_force_tell_the_same_story() -> None:
     assert by_motion.force_normal == pytest.approx(0.05, rel=1e-3)
 
 
-def test_fields_inside_and_condition_numbers_are_refused() -> None:
+def test_fields_inside_are_refused_and_no_stiffness_has_no_condition_number() -> None:
     with pytest.raises(bk.InputError, match="half-plane, of which only the surface is known"):
         bk.interior_fields(bk.run(PUNCH))
-    with pytest.raises(bk.InputError, match="no stiffness matrix"):
-        condition_number(ROUGH, Case(0.0, ROUGH))
+    assert np.isnan(condition_number(ROUGH, Case(0.0, ROUGH)))
+    assert condition_number(PUNCH, Case(0.0, PUNCH)) > 1.0
 
 
 @pytest.mark.parametrize(

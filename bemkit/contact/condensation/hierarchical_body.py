@@ -61,6 +61,9 @@ class HierarchicalBody(LinearBody):
     _fields: list[_Fields] = field(default_factory=list, init=False)
     _travelled: list[LoadedSystem] = field(default_factory=list, init=False)
 
+    condensed = None
+    """No stiffness is formed."""
+
     @property
     def weights(self) -> FloatArray:  # type: ignore[override]  # read-only here
         """(n_contact,) array [m]: the lengths of the elements."""

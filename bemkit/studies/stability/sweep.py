@@ -8,8 +8,6 @@ from functools import cache, partial
 
 import numpy as np
 
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
-from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
@@ -42,8 +40,10 @@ def sweep(
     Raises
     ------
     StabilityError
-        If the scene itself has no converged solution, or no contact.
+        If the scene itself has no converged solution, or no contact, or its body is a half-plane.
     """
+    if scene.far is not None:
+        raise StabilityError("the body is a half-plane, which this suite cannot judge yet: give a block around it")
     if not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     baseline = attempt(lambda: run(scene))
@@ -148,13 +148,11 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
 
 
 def condition_number(scene: Scene, case: Case) -> float:
-    """Return the condition number of the contact stiffness of a scene; see `StabilityRecord`."""
+    """Return the condition number of the contact stiffness of a scene, NaN where none is formed."""
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(prepare(scene, mesh)).body
-        if isinstance(body, PeriodicBody):
-            raise InputError("a periodic half-plane has no stiffness matrix: sweep a block, or a half-plane")
-        if isinstance(body, HierarchicalBody):  # which forms no stiffness
+        if body.condensed is None:
             return math.nan
         stiffness = body.condensed.stiffness
         diagonal = np.abs(np.diagonal(stiffness))
