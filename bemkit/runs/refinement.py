@@ -95,7 +95,8 @@ def refined(
         solutions.append(solution)
         now = time.perf_counter()
         if not solution.is_converged:
-            obstacle = f"the solve on {solution.n_elements} elements failed"
+            worst, word = solution.certificate.worst, solution.status.name.lower().replace("_", " ")
+            obstacle = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
         elif refinement.is_enough(solutions):
             break
         else:

@@ -82,8 +82,10 @@ class CoupledMembers:
         """
         displacement = self.deformation(self.load + self.contact_forces(state))
         missed = state.displacement.ravel() - self.offset - self.relative @ displacement
-        displacement = displacement + self.motions @ self._motion_fit(missed)
-        return displacement, state.displacement.ravel() - self.offset - self.relative @ displacement
+        for _ in range(2):  # the second time what normal equations have left of the first
+            displacement = displacement + self.motions @ self._motion_fit(missed)
+            missed = state.displacement.ravel() - self.offset - self.relative @ displacement
+        return displacement, missed
 
     def contact_forces(self, state: ContactState) -> FloatArray:
         """Return the forces (n,) [N/m] of contact on all members."""

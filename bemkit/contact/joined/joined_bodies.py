@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
+from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents, with_given_tractions
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.balance import imbalance_of
 from bemkit.contact.joined.coupled_members import CoupledMembers
@@ -22,6 +22,9 @@ from bemkit.operators.equilibrium import Imbalance
 
 MOST_DENSE = 2500
 """Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
+
+_ROUND_OFF = 1e-12
+"""Share of the forces that those of missed relative displacements may have before a response is refined."""
 
 _WITHOUT_LOAD = (
     *("shapes", "motions", "felt_motions", "is_symmetric", "_reduced", "_relative_stiffness", "_motion_fit"),
@@ -93,11 +96,27 @@ class JoinedBodies(CoupledMembers, LinearBody):
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
         if not self.is_costly:
-            return self._dense.respond(conditions)
+            return self._refined(conditions, self._dense.respond(conditions))
         refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
         return sparse_response(self, self._reduced, conditions)
+
+    def _refined(self, conditions: LinearConditions, state: ContactState) -> ContactState:
+        """Return a response less what round-off of the dense stiffness has left: one step of iterative refinement.
+
+        The bodies may travel many times as far as they are strained, and on the smallest elements round-off of the way
+        is a force.
+        """
+        _, missed = self.recover(state)
+        acting = max(np.abs(self.load).max(initial=0.0), (self.weights[:, None] * np.abs(state.traction)).max())
+        if not np.abs(missed * self.moduli).max() > _ROUND_OFF * acting:
+            return state
+        nothing = [np.zeros_like(member.load) for member in self.members]
+        homogeneous = replace(conditions, value=np.zeros_like(conditions.value))
+        correction = self.under(nothing, -missed)._dense.respond(homogeneous)
+        traction = with_given_tractions(conditions, state.traction + correction.traction)
+        return ContactState(state.displacement + correction.displacement, traction)
 
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
