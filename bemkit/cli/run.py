@@ -108,9 +108,10 @@ def run(
 
 
 def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
-    """Return the result file of a load history on one mesh, which is written step by step; None of other runs."""
-    is_stepwise = scene.n_steps > 1 and scene.mesh.accuracy is None
-    return output if is_stepwise and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+    """Return the result file of a load history, which is written step by step; None of other runs."""
+    return (
+        output if scene.n_steps > 1 and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+    )
 
 
 def _solve(

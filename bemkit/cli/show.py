@@ -17,6 +17,7 @@ from bemkit.results.outputs import STDOUT, print_data
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
+@click.option("--step", type=int, metavar="N", help="Of a load history: show the end of a step, counted from 1.")
 @click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
 @click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
 def show(
@@ -26,6 +27,7 @@ def show(
     folder: str | None,
     what: tuple[str, ...] | None,
     shows_scene: bool,
+    step: int | None,
     output: str | None,
     inside: int,
 ) -> None:
@@ -39,6 +41,8 @@ def show(
     outputs.check(result_target(output, inside))
     with shown_progress(not folder or outputs.uses_stdout):
         solution = read_result(result)
+        if step is not None:
+            solution = solution.at_step(step)
         if output is not None:
             from bemkit.results.export import export_result
 

@@ -24,7 +24,7 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at
-from bemkit.results.load_history import LoadHistory, step_rows
+from bemkit.results.load_history import LoadHistory, at_step, step_rows
 from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
@@ -128,8 +128,12 @@ class Solution(ShownInNotebooks, SolvedBody):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions in L2, relative to them.
 
-        None without an estimate and without contact tractions.
+        Of a half-plane that of all tractions but loads, in the mean. None without an estimate and without such
+        tractions.
         """
+        if self.mean_traction_errors is not None:
+            size = self.mean_traction_size
+            return float(self.mean_traction_errors.sum()) / size if size > 0.0 else None
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
         from bemkit.results.error_indicators import contact_errors, place_errors
@@ -146,6 +150,10 @@ class Solution(ShownInNotebooks, SolvedBody):
     def stated(self) -> Scene:
         """What was asked: the scene, with all its load steps."""
         return self.scene if self.loading is None else cast(Scene, self.loading.asked)
+
+    def at_step(self, number: int) -> Solution:
+        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
+        return at_step(self, number)
 
     @property
     def units(self) -> UnitNames | None:
