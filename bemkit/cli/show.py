@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import click
 
 from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress
@@ -30,21 +32,25 @@ def show(
     inside: int,
 ) -> None:
     """Show RESULT, a file written by bemkit run -o."""
-    from bemkit.results.result_file import read_result
-    from bemkit.scene.toml import scene_to_toml
-
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
     outputs = outputs_of(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
     outputs.check(result_target(output, inside))
-    with shown_progress(not folder or outputs.uses_stdout):
+    with ExitStack() as stack:
+        stack.enter_context(shown_progress(quiet=False))
+        from bemkit.results.result_file import read_result
+
         solution = read_result(result)
         if output is not None:
             from bemkit.results.export import export_result
 
             export_result(output, solution, inside=inside)
+        if outputs.uses_stdout:
+            stack.close()  # no bar among the data
         outputs.write(solution)
     if shows_scene:
+        from bemkit.scene.toml import scene_to_toml
+
         print_data(scene_to_toml(solution.stated))
     elif not (table or json_file or folder or output):
         from bemkit.cli.console import print_summary
