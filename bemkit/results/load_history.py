@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,7 +78,7 @@ class LoadStep:
     n_increments: int
     linear_solves: int
     contact: ContactTable
-    slip: FloatArray
+    slip: FloatArray = field(repr=False)
 
     @property
     def force_normal(self) -> float:
@@ -136,6 +136,10 @@ class LoadHistory:
     steps: tuple[LoadStep, ...]
     state: ContactState
     motion: SlipHistory
+
+    def __repr__(self) -> str:
+        """Return one line; the steps hold thousands of numbers."""
+        return f"LoadHistory({self.where()})"
 
     @property
     def is_complete(self) -> bool:
