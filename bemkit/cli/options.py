@@ -78,7 +78,7 @@ def result_target(output: str | None, inside: int) -> list[Path]:
     """Return the file of ``-o``, checked for its ending; ``--inside`` goes with it."""
     if output is None:
         if inside:
-            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
+            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu or .vtp")
         return []
     from bemkit.results.export import format_of
 

@@ -19,8 +19,8 @@ from bemkit.results.outputs import STDOUT, print_data
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
-@click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
-@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
+@click.option("-o", "--output", metavar="FILE", help="Write another format: .json, .csv, .npz, .vtu or .vtp.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
 def show(
     result: str,
     table: str | None,
