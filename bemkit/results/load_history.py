@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 import numpy as np
@@ -94,9 +94,9 @@ class LoadStep:
     work: StepWork
     n_increments: int
     linear_solves: int
-    end: StepEnd
-    state: ContactState
-    motion: SlipHistory
+    end: StepEnd = field(repr=False)
+    state: ContactState = field(repr=False)
+    motion: SlipHistory = field(repr=False)
 
     @property
     def time(self) -> float:
@@ -173,6 +173,10 @@ class LoadHistory:
     def motion(self) -> SlipHistory:
         """At the end of the last increment."""
         return self.steps[-1].motion
+
+    def __repr__(self) -> str:
+        """Return one line; the steps hold thousands of numbers."""
+        return f"LoadHistory({self.where()})"
 
     @property
     def is_complete(self) -> bool:

@@ -11,6 +11,7 @@ from scipy.linalg import qr
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.member import Member
+from bemkit.operators.linear.blocks import diagonal_blocks
 
 _WORTHWHILE = 0.8
 """Share of the components of a member that contacts may feel for the others to be eliminated."""
@@ -49,9 +50,9 @@ class ReducedMembers:
             transfers.append(transfer)
             first = last
         return cls(
-            sparse.csr_array(sparse.block_diag(stiffnesses, format="csr")),
+            diagonal_blocks(stiffnesses),
             sparse.csr_array(joined.relative[:, np.concatenate(kept_columns)]),
-            sparse.csr_array(sparse.block_diag(transfers, format="csr")),
+            diagonal_blocks(transfers),
         )
 
 

@@ -22,6 +22,7 @@ from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import NotConvergedError
+from bemkit.operators.linear.blocks import diagonal_blocks
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -340,10 +341,10 @@ def _rigid_coupling(prepared: PreparedAssembly) -> sparse.csr_array:
 def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
     nodal = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    relative = sparse.csr_array(_coupling(prepared) @ sparse.block_diag(nodal, format="csr"))
+    relative = sparse.csr_array(_coupling(prepared) @ diagonal_blocks(nodal))
     if prepared.assembly.rigid:
         chosen = [rigid_motions(body, prepared.units)[0] for body in prepared.assembly.rigid]
-        driven = _rigid_coupling(prepared) @ sparse.block_diag(chosen, format="csr")
+        driven = _rigid_coupling(prepared) @ diagonal_blocks(chosen)
         relative = sparse.csr_array(sparse.hstack([relative, driven], format="csr"))
     relative.eliminate_zeros()
     return relative
