@@ -53,7 +53,6 @@ HINDRANCES = {
     ),
     "100 elements are few": scene_of(100),
     "nearly incompressible": scene_of(240, material=bk.Material(1.0, 0.495)),
-    "forces act inside the body": scene_of(240, body_forces=(bk.Gravity(1.0),)),
     "too long for the thickness": scene_of(240, shape=bk.Rectangle(1.0, 0.003), parts=UNHELD[:1]),
     "no support holds its rotation": scene_of(240, discretisation=bk.ConstantCollocation(slopes=False), parts=UNHELD),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,12 @@ class NodeConditions:
             np.where(is_displacement, 1.0, 0.0)[:, :, None] * unit,
             np.where(is_displacement, displacement, traction),
         )
+
+    def beside(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
+        """Return what they ask of the rest beside known tractions and displacements, (n, 2) in the frames."""
+        known = np.einsum("nrk,nk->nr", self.on_traction, traction)
+        known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
+        return replace(self, value=self.value - known)
 
 
 class UndeterminedError(SingularMatrixError):

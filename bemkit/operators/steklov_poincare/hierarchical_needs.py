@@ -46,7 +46,7 @@ LARGEST_BLOCK = 1000
 
 def why_dense(case: BodyCase) -> str:
     """Say why the equations of a body cannot be compressed; empty if they can."""
-    mesh, conditions = case.mesh, case.conditions
+    mesh = case.mesh
     if mesh.symmetry is not None:
         return "the body is symmetric"
     if case.n_curved:
@@ -57,8 +57,6 @@ def why_dense(case: BodyCase) -> str:
         return f"the boundary has {len(mesh.loops)} closed curves"
     if case.material.effective_poisson_ratio > _LARGEST_POISSON_RATIO:
         return "the material is nearly incompressible"
-    if np.any(conditions.is_retained.any(axis=1) & conditions.is_fixed.any(axis=1)):
-        return "supports hold contact nodes"
     return ""
 
 
