@@ -79,6 +79,8 @@ SCENES = {
     "travelling block": loose_block(5.0),
     "tilted block": tilted(),
     "tresca": replace(paper(1), law=bk.Tresca(0.2)),
+    "disc": bk.load_scene("disc-between-plates"),
+    "plate with a round hole": replace(loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4)),
     "strip": replace(loose_block(), shape=bk.Rectangle(20.0, 1.0), solver=bk.AugmentedLagrangian()),
     "weight and heat": replace(
         paper(1),

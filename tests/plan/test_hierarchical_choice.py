@@ -39,10 +39,8 @@ def test_large_bodies_are_compressed_and_small_ones_are_not() -> None:
     assert chosen(scene_of(320, linear_solver=ASKED)).hierarchical == ASKED
 
 
-CURVED = replace(bk.load_scene("disc-between-plates"), discretisation=bk.ConstantCollocation())
 UNHELD = tuple(part for part in paper(1).parts if part.name != "wall")
 HINDRANCES = {
-    "elements are curved": replace(CURVED, mesh=bk.MeshOptions(elements=240)),
     "the body is symmetric": scene_of(
         240,
         symmetry=bk.Symmetry(x=0.5),

@@ -15,6 +15,7 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.curved_elements import CurvedElements
 from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
@@ -40,6 +41,8 @@ class BoundaryColumns:
         Places of the element before, of the element itself and of the one after it along the boundary.
     slopes, means : (3, n_elements) complex arrays or None
         Weights of the displacements of these three in the slope and in the mean of each element.
+    curved : CurvedElements or None
+        What evaluates the fields where elements are curved; closed forms do if all are straight.
     """
 
     constants: Constants
@@ -51,10 +54,11 @@ class BoundaryColumns:
     neighbours: IntArray
     slopes: ComplexArray | None
     means: ComplexArray | None
+    curved: CurvedElements | None = None
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> BoundaryColumns:
-        """Return the columns of a mesh of straight elements, without symmetry.
+        """Return the columns of a mesh without symmetry.
 
         Parameters
         ----------
@@ -86,6 +90,7 @@ class BoundaryColumns:
             neighbours,
             slopes,
             means,
+            None if panels.curved is None else CurvedElements.of(mesh, panels, material, order),
         )
 
     @property
@@ -145,20 +150,29 @@ class BoundaryColumns:
             s, u = np.sum(self.slopes * around, axis=0), u + np.sum(self.means * around, axis=0)
         step = max(1, _PAIRS // max(places.size, 1))
         for begin in range(0, self.n_elements, step):
-            some = slice(begin, begin + step)
-            is_own = places[:, None] == np.arange(begin, min(begin + step, self.n_elements))
-            x, start, end = self.centre[places], self.start[some], self.end[some]
-            on, on_conjugate = single_layer_fields(self.constants, x, start, end, is_own)
+            some = np.arange(begin, min(begin + step, self.n_elements))
+            on, on_conjugate = self._single_layer(self.centre[places], places, some)
             result -= on @ t[some] + on_conjugate @ t[some].conj()
-            fields = double_layer_fields(self.constants, x, start, end, is_own)
+            fields = self._double_layer(self.centre[places], places, some)
             result += fields[0] @ u[some] + fields[1] @ u[some].conj()
             result += fields[2] @ s[some] + fields[3] @ s[some].conj()
         return np.stack([result.real, result.imag], axis=1)
 
     def _of_tractions(self, x: ComplexArray, places: IntArray, elements: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        is_own = places[:, None] == elements
-        on, on_conjugate = -single_layer_fields(self.constants, x, self.start[elements], self.end[elements], is_own)
+        on, on_conjugate = -self._single_layer(x, places, elements)
         return on, on_conjugate
+
+    def _single_layer(self, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        if self.curved is not None:
+            return self.curved.fields(x, places, elements)[:2]
+        is_own = places[:, None] == elements
+        return single_layer_fields(self.constants, x, self.start[elements], self.end[elements], is_own)
+
+    def _double_layer(self, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        if self.curved is not None:
+            return self.curved.fields(x, places, elements)[2:]
+        is_own = places[:, None] == elements
+        return double_layer_fields(self.constants, x, self.start[elements], self.end[elements], is_own)
 
     def _of_displacements(
         self, x: ComplexArray, places: IntArray, elements: IntArray
@@ -167,8 +181,7 @@ class BoundaryColumns:
             touched = elements
         else:
             touched = np.unique(self.neighbours[:, elements])
-        is_own = places[:, None] == touched
-        fields = double_layer_fields(self.constants, x, self.start[touched], self.end[touched], is_own)
+        is_own, fields = places[:, None] == touched, self._double_layer(x, places, touched)
         fields[0] += 0.5 * is_own
         if self.slopes is None or self.means is None:
             return fields[0], fields[1]

@@ -38,7 +38,7 @@ class Discs:
         """Return the discs of a level of a tree."""
         begins = tree.bounds[: -1 : 2**level]
         counts = np.diff(np.append(begins, columns.n_elements))
-        ends = np.stack([columns.start, columns.end])
+        ends = np.stack([columns.start, columns.centre, columns.end])
         low, high = (
             of.reduceat(bound.real, begins) + 1j * of.reduceat(bound.imag, begins)
             for of, bound in ((np.minimum, _box(np.minimum, ends)), (np.maximum, _box(np.maximum, ends)))
@@ -68,7 +68,7 @@ def n_proxies(tolerance: float) -> int:
 
 def extents(columns: BoundaryColumns) -> FloatArray:
     """Return how far from the middle of each element its unknowns act [m]."""
-    ends = np.stack([columns.start, columns.end])
+    ends = np.stack([columns.start, columns.centre, columns.end])
     far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre).max(axis=(0, 1))
     return far
 

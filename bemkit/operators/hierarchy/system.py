@@ -64,7 +64,7 @@ class HierarchicalSystem:
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
+        Without symmetry.
     material : Material
     frame : (n_elements, 2, 2) array
         Rows are the directions of the conditions of each element.

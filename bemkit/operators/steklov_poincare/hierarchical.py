@@ -24,7 +24,7 @@ class HierarchicalCollocation(CollocationElasticity):
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
+        Without symmetry.
     material : Material
     options : Hierarchical
     slopes : bool

@@ -49,8 +49,6 @@ def why_dense(case: BodyCase) -> str:
     mesh = case.mesh
     if mesh.symmetry is not None:
         return "the body is symmetric"
-    if case.n_curved:
-        return f"{case.n_curved} elements are curved"
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
     if len(mesh.loops) > _MOST_LOOPS:
