@@ -57,7 +57,15 @@ class BoundaryColumns:
     curved: CurvedElements | None = None
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> BoundaryColumns:
+    def of(
+        cls,
+        mesh: BoundaryMesh,
+        material: Material,
+        order: IntArray,
+        *,
+        takes_slopes: bool,
+        log_length: float | None = None,
+    ) -> BoundaryColumns:
         """Return the columns of a mesh without symmetry.
 
         Parameters
@@ -67,7 +75,10 @@ class BoundaryColumns:
         order : (n_elements,) array
             The element at each place.
         takes_slopes : bool
+        log_length : float, optional [m]
+            Unit of length of the logarithm; by default the diameter of the mesh.
         """
+        log_length = mesh.diameter if log_length is None else log_length
         panels = Panels(mesh)
         place = np.empty_like(order)
         place[order] = np.arange(order.size)
@@ -81,7 +92,7 @@ class BoundaryColumns:
             slopes = np.stack([of.before, of.own, of.after])[:, order]
             means = np.stack([of.mean_before, of.mean_own, of.mean_after])[:, order]
         return cls(
-            Constants.of(material, mesh.diameter),
+            Constants.of(material, log_length),
             order,
             panels.start[order],
             panels.end[order],
@@ -90,7 +101,7 @@ class BoundaryColumns:
             neighbours,
             slopes,
             means,
-            None if panels.curved is None else CurvedElements.of(mesh, panels, material, order),
+            None if panels.curved is None else CurvedElements.of(panels, material, order, log_length),
         )
 
     @property
@@ -149,8 +160,8 @@ class BoundaryColumns:
             around = u[self.neighbours]
             s, u = np.sum(self.slopes * around, axis=0), u + np.sum(self.means * around, axis=0)
         step = max(1, _PAIRS // max(places.size, 1))
-        for begin in range(0, self.n_elements, step):
-            some = np.arange(begin, min(begin + step, self.n_elements))
+        for begin in range(0, t.size, step):
+            some = np.arange(begin, min(begin + step, t.size))
             on, on_conjugate = self._single_layer(self.centre[places], places, some)
             result -= on @ t[some] + on_conjugate @ t[some].conj()
             fields = self._double_layer(self.centre[places], places, some)

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.collocation.collocation_points import CURVED_DISTANCE, CURVED_POINTS, CollocationPoints
 from bemkit.operators.hierarchy import compiled
@@ -65,9 +64,9 @@ class CurvedElements:
     small_rule: _Rule
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, panels: Panels, material: Material, order: IntArray) -> CurvedElements:
-        """Return the elements of a mesh, without symmetry."""
-        constants, points = Constants.of(material, mesh.diameter), CollocationPoints(panels, material, mesh.diameter)
+    def of(cls, panels: Panels, material: Material, order: IntArray, log_length: float) -> CurvedElements:
+        """Return the elements of a mesh."""
+        constants, points = Constants.of(material, log_length), CollocationPoints(panels, material, log_length)
         near, far = ((panels.half * panels.reach(distance))[order] for distance in (CURVED_DISTANCE, _FAR))
         rules = (_rule(panels, order, n_points) for n_points in (CURVED_POINTS, _FEW_POINTS))
         return cls(constants, points, order, near, far, *rules)

@@ -39,9 +39,10 @@ class Discs:
         begins = tree.bounds[: -1 : 2**level]
         counts = np.diff(np.append(begins, columns.n_elements))
         ends = np.stack([columns.start, columns.centre, columns.end])
+        own = ends[:, : columns.n_elements]
         low, high = (
             of.reduceat(bound.real, begins) + 1j * of.reduceat(bound.imag, begins)
-            for of, bound in ((np.minimum, _box(np.minimum, ends)), (np.maximum, _box(np.maximum, ends)))
+            for of, bound in ((np.minimum, _box(np.minimum, own)), (np.maximum, _box(np.maximum, own)))
         )
         centre = 0.5 * (low + high)
         farthest = np.abs(ends[:, columns.reach] - np.repeat(centre, counts)).max(axis=(0, 1))
@@ -69,7 +70,7 @@ def n_proxies(tolerance: float) -> int:
 def extents(columns: BoundaryColumns) -> FloatArray:
     """Return how far from the middle of each element its unknowns act [m]."""
     ends = np.stack([columns.start, columns.centre, columns.end])
-    far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre).max(axis=(0, 1))
+    far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre[: columns.n_elements]).max(axis=(0, 1))
     return far
 
 

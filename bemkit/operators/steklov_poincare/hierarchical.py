@@ -24,7 +24,6 @@ class HierarchicalCollocation(CollocationElasticity):
     Parameters
     ----------
     mesh : BoundaryMesh
-        Without symmetry.
     material : Material
     options : Hierarchical
     slopes : bool

@@ -47,8 +47,6 @@ LARGEST_BLOCK = 1000
 def why_dense(case: BodyCase) -> str:
     """Say why the equations of a body cannot be compressed; empty if they can."""
     mesh = case.mesh
-    if mesh.symmetry is not None:
-        return "the body is symmetric"
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
     if len(mesh.loops) > _MOST_LOOPS:

@@ -9,12 +9,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
+from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
 from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
+from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -51,10 +52,29 @@ def straight(shape: Rectangle | PlateWithHole, n_elements: int) -> BoundaryMesh:
 def test_columns_are_those_of_collocation(shape: Rectangle | PlateWithHole, is_curved: bool, slopes: bool) -> None:
     mesh = discretise(shape.outline(), n_elements=60).unit if is_curved else straight(shape, 60)
     assert mesh.is_straight.all() == (not is_curved or isinstance(shape, Rectangle))
+    assert_columns_are_those_of_collocation(mesh, slopes)
+
+
+@pytest.mark.parametrize("symmetry", [Symmetry(x=1.0), Symmetry(y=0.75), Symmetry(x=1.0, y=0.75)], ids=str)
+@pytest.mark.parametrize("shape", [Rectangle(2.0, 1.5), PlateWithHole(2.0, 1.5, 0.4)], ids=["rectangle", "hole"])
+@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+def test_columns_of_symmetric_bodies_are_those_of_collocation(
+    shape: Rectangle | PlateWithHole, symmetry: Symmetry, slopes: bool
+) -> None:
+    mesh = discretise(shape.outline(), n_elements=80, symmetry=symmetry).unit
+    assert mesh.n_elements * symmetry.n_images == 80
+    assert_columns_are_those_of_collocation(mesh, slopes)
+    columns = boundary_columns(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=slopes)
+    # a point of no element sees the element alone, a point in the middle of one its images, too
+    alone, with_images = (columns.fields(columns.centre[:1], np.array([at]), np.array([40])) for at in (NOWHERE, 0))
+    assert abs(alone - with_images).max() > 1e-3
+
+
+def assert_columns_are_those_of_collocation(mesh: BoundaryMesh, slopes: bool) -> None:
     n, order = mesh.n_elements, np.random.default_rng(0).permutation(mesh.n_elements)
     single, double = collocation_matrices(mesh, MATERIAL, takes_slopes=slopes)
     dofs = (2 * order[:, None] + np.arange(2)).ravel()
-    columns = BoundaryColumns.of(mesh, MATERIAL, order, takes_slopes=slopes)
+    columns = boundary_columns(mesh, MATERIAL, order, takes_slopes=slopes)
     entries = columns.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 2, 2)
     whole = np.ix_(dofs, dofs)
     # closed forms on either side: only round-off of entries of size one differs
@@ -101,7 +121,7 @@ def test_fields_anywhere_are_integrals_of_the_kernel() -> None:
 def test_quadrature_gives_the_closed_forms_where_elements_are_straight() -> None:
     mesh, order = straight(Rectangle(1.0, 1.0), 48), np.random.default_rng(2).permutation(48)
     panels, constants = Panels(mesh), Constants.of(MATERIAL, mesh.diameter)
-    elements = CurvedElements.of(mesh, panels, MATERIAL, order)
+    elements = CurvedElements.of(panels, MATERIAL, order, mesh.diameter)
     chosen = np.array([3, 10, 47])
     start, end, centre = (of[order[chosen]] for of in (panels.start, panels.end, panels.centre))
     # close to the first of them, some half lengths away, far away, and in the middle of the last one
