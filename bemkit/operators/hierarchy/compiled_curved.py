@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 
-_options = {"cache": True, "nogil": True, "error_model": "numpy"}
+_options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(**_options)

@@ -38,13 +38,13 @@ class FoldedColumns(BoundaryColumns):
         """(k, n_elements) places on which each element acts, images among them."""
         return super().reach[:, : self.n_elements]
 
-    def fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
-        """Return what each column causes at points, in the middle of elements with its images."""
+    def fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> FloatArray:
+        """Return what columns cause at points, (2 n_points, n_columns), in the middle of elements with their images."""
         result = super().fields(x, places, columns)
         is_middle = places != NOWHERE
         for number, signs in enumerate(self.images[1:], 1) if is_middle.any() else ():
             image = super().fields(x[is_middle], places[is_middle], columns + 4 * number * self.n_elements)
-            result[is_middle] += image * signs[columns % 2]
+            result[np.repeat(is_middle, 2)] += image * signs[columns % 2]
         return result
 
     def applied(self, places: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:

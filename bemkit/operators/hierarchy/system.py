@@ -18,7 +18,7 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
-LEAF_SIZE = 48
+LEAF_SIZE = 88
 """Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 
 

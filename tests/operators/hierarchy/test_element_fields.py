@@ -14,8 +14,9 @@ from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
-from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
+from bemkit.operators.hierarchy.element_fields import Constants, element_fields
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
+from bemkit.operators.hierarchy.proxies import point_forces
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -93,9 +94,8 @@ def test_fields_anywhere_are_integrals_of_the_kernel() -> None:
     constants = Constants.of(MATERIAL, 0.7)
     x = np.array([0.3 + 0.4j, -2.0 + 0.1j, 5.0 - 3.0j])
     start, end = np.array([0.2 - 0.1j, 1.0 + 0.5j]), np.array([0.6 + 0.2j, 0.5 + 0.1j])
-    is_own = np.zeros((3, 2), bool)
-    single = single_layer_fields(constants, x, start, end, is_own)
-    double = double_layer_fields(constants, x, start, end, is_own)
+    fields = element_fields(constants, x, np.full(3, NOWHERE), start, end)
+    single, double = fields[:2], fields[2:]
     t, weights = np.polynomial.legendre.leggauss(60)
     span = end - start
     y = 0.5 * (start + end) + 0.5 * np.multiply.outer(t, span)
@@ -127,9 +127,7 @@ def test_quadrature_gives_the_closed_forms_where_elements_are_straight() -> None
     # close to the first of them, some half lengths away, far away, and in the middle of the last one
     x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
     places = np.append(np.full(6, NOWHERE), 47)
-    is_own = places[:, None] == chosen
-    layers = single_layer_fields, double_layer_fields
-    expected = np.concatenate([layer(constants, x, start, end, is_own) for layer in layers])
+    expected = element_fields(constants, x, np.where(places == 47, 2, NOWHERE), start, end)
     np.testing.assert_allclose(elements.fields(x, places, chosen), expected, atol=1e-14)
 
 
@@ -137,23 +135,24 @@ def test_quadrature_gives_the_closed_forms_where_elements_are_straight() -> None
 def test_points_on_the_line_of_an_element_and_close_to_it_keep_their_digits() -> None:
     constants, element = Constants.of(MATERIAL, 1.0), (np.array([0.0j]), np.array([1.0 + 0.0j]))
     close = np.array([0.5 + 1e-14j, 1.0 + 1e-12 + 0j, 3.0 + 0j])
-    double = double_layer_fields(constants, close, *element, np.zeros((3, 1), bool))
+    double = element_fields(constants, close, np.full(3, NOWHERE), *element)[2:]
     # just inside of its left side half of the plane is seen, 2 (1 - nu) pi B = 1 / 2; along its line nothing is
     np.testing.assert_allclose(double[0].real, [[-0.5], [0.0], [0.0]], atol=1e-13)
     assert np.isfinite(double).all()
-    own = double_layer_fields(constants, np.array([0.5 + 0j]), *element, np.ones((1, 1), bool))
+    own = element_fields(constants, np.array([0.5 + 0j]), np.array([0]), *element)[2:]
     np.testing.assert_allclose(own[:2], 0.0, atol=1e-16)
 
 
+@pytest.mark.usefixtures("backend")
 def test_points_of_no_element_see_no_jump() -> None:
     columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 20), MATERIAL, np.arange(20), takes_slopes=False)
     of_displacements = 4 * np.arange(20) + 2
-    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)
+    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)[0]
     # a unit translation of the boundary: T 1 is -1 inside of the body, -1/2 + 1/2 on its boundary, 0 outside
     np.testing.assert_allclose(inside.sum(), -1.0, atol=1e-14)
-    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)
+    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)[0]
     np.testing.assert_allclose(on.sum(), 0.0, atol=1e-14)
-    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)
+    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)[0]
     np.testing.assert_allclose(outside.sum(), 0.0, atol=1e-14)
 
 
@@ -175,7 +174,7 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
         return np.array([fault])
 
     module = types.ModuleType("compiled_fields")
-    module.single_layer_fields = broken  # type: ignore[attr-defined]
+    module.element_fields = broken  # type: ignore[attr-defined]
     name = "bemkit.operators.hierarchy.compiled_fields"
     monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
@@ -183,8 +182,18 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
     assert compiled.functions() is None
     assert words in compiled.why()
     assert "\n" not in compiled.why()
-    x, start, is_own = np.array([1j]), np.array([0j]), np.zeros((1, 1), bool)
-    assert np.isfinite(single_layer_fields(Constants(1.0, 1.0, 0.3, 1.0), x, start, start + 1.0, is_own)).all()
+    x, start = np.array([1j]), np.array([0j])
+    assert np.isfinite(element_fields(Constants(1.0, 1.0, 0.3, 1.0), x, np.array([NOWHERE]), start, start + 1.0)).all()
+
+
+@pytest.mark.usefixtures("backend")
+def test_forces_are_those_of_the_kernel() -> None:
+    x, sources = np.array([0.3 + 0.4j, -2.0 + 0.1j]), np.array([1.0 + 1.0j, -0.5j, 3.0 + 0.0j])
+    found = point_forces(x, sources, 0.3, 0.7).reshape(3, 2, 2, 2)  # source, its direction, point, component
+    rho = np.stack([(x - sources[:, None]).real, (x - sources[:, None]).imag], axis=-1)
+    r = np.linalg.norm(rho, axis=-1)[..., None, None]
+    kelvin = -(3.0 - 4.0 * 0.3) * np.log(r / 0.7) * np.eye(2) + rho[..., :, None] * rho[..., None, :] / r**2
+    np.testing.assert_allclose(found, kelvin.transpose(0, 2, 1, 3), rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.usefixtures("backend")
@@ -192,8 +201,7 @@ def test_far_away_fields_keep_their_digits() -> None:
     constants, length = Constants.of(MATERIAL, 1.0), 1e-5
     x = 3.0 * np.exp(1j * np.linspace(0.1, 6.0, 7)) + 0.2
     start, end = np.array([0.2 + 0.1j]), np.array([0.2 + 0.1j + length * np.exp(0.7j)])
-    is_own = np.zeros((7, 1), bool)
-    double = double_layer_fields(constants, x, start, end, is_own)
+    double = element_fields(constants, x, np.full(7, NOWHERE), start, end)[2:]
     # ten Gauss points are exact to round-off at 6e5 half lengths
     t, weights = np.polynomial.legendre.leggauss(10)
     tangent, nu = np.exp(0.7j), MATERIAL.effective_poisson_ratio
