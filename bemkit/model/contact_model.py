@@ -274,13 +274,15 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
         assert isinstance(elastic, PeriodicElasticity)
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
+        given = prepared.conditions, prepared.contact.nodes, prepared.force
         if prepared.linear_solver.hierarchical is not None:
             from bemkit.contact.condensation.hierarchical_body import hierarchical_body
             from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
-            assert isinstance(elastic, HierarchicalCollocation)
-            return hierarchical_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
-        return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
+            weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
+            assert isinstance(weightless, HierarchicalCollocation)
+            return hierarchical_body(weightless, *given, prepared.inside)
+        return condensed_body(elastic, *given)
     check_held(prepared)
     condensed = elastic.condense(prepared.conditions, prepared.force)
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)

@@ -286,8 +286,6 @@ class Prepared:
         direct = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
         case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), direct)
         hindrance = self.scene.discretisation.why_dense(self.mesh)
-        if self.inside is not None:
-            hindrance = "forces act inside the body"
         turning = np.ptp(free_modes(self.space, self.conditions), axis=1).max(initial=0.0)
         if not self.scene.discretisation.keeps_rotations and turning > _LEAST_TURN:
             hindrance = "no support holds its rotation, and only dense equations tell what constant elements make of it"

@@ -284,7 +284,7 @@ class ConstantCollocation(Discretisation):
         return "elements are too long for the thickness of the body" if thinness_warnings(mesh) else ""
 
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
-        """Return the compressed map of a body of straight elements without symmetry."""
+        """Return the compressed map."""
         from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
         return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)

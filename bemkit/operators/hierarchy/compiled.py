@@ -40,8 +40,8 @@ def _loaded() -> tuple[ModuleType | None, str]:
         from bemkit.operators.hierarchy import compiled_fields
 
         point, element = np.array([0.5 + 1.0j]), np.array([0.0j])
-        values = compiled_fields.single_layer_fields(
-            1.0, 0.3, 1.0, point, element, element + 1.0, np.zeros((1, 1), np.bool_)
+        values = compiled_fields.element_fields(
+            np.array([1.0, 1.0, 0.3, 1.0]), point, np.array([-1]), element, element + 1.0
         )
         if not np.isfinite(values).all():
             return None, "numba computes wrong numbers here: the kernels run in numpy"

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import solve_conditions
 from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
-LEAF_SIZE = 48
+LEAF_SIZE = 88
 """Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 
 
@@ -47,6 +47,12 @@ class NodeConditions:
             np.where(is_displacement, displacement, traction),
         )
 
+    def beside(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
+        """Return what they ask of the rest beside known tractions and displacements, (n, 2) in the frames."""
+        known = np.einsum("nrk,nk->nr", self.on_traction, traction)
+        known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
+        return replace(self, value=self.value - known)
+
 
 class UndeterminedError(SingularMatrixError):
     """Two conditions at an element that are only one."""
@@ -58,7 +64,6 @@ class HierarchicalSystem:
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
     material : Material
     frame : (n_elements, 2, 2) array
         Rows are the directions of the conditions of each element.
@@ -90,7 +95,7 @@ class HierarchicalSystem:
         self._order, n = self._tree.order, mesh.n_elements
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(n)
-        self._columns = BoundaryColumns.of(mesh, material, self._order, takes_slopes=slopes)
+        self._columns = boundary_columns(mesh, material, self._order, takes_slopes=slopes)
         may_differ = np.repeat(np.stack([may_be_traction, may_be_displacement], axis=1), 2, axis=1)
         self.compression = Compression.of(self._columns, self._tree, may_differ[self._order], tolerance)
         border = _border(mesh, material, self._order, slopes)

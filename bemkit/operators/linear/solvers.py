@@ -230,7 +230,7 @@ class Automatic:
 class Hierarchical:
     """Boundary equations compressed over a tree and factored there: time and memory grow like the number of elements.
 
-    For constant collocation on straight elements without symmetry; elsewhere what `Automatic` takes is taken, and the
+    For constant collocation; elsewhere what `Automatic` takes is taken, and the
     plan says why.
 
     Parameters

@@ -24,7 +24,6 @@ class HierarchicalCollocation(CollocationElasticity):
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
     material : Material
     options : Hierarchical
     slopes : bool
@@ -50,7 +49,8 @@ class HierarchicalCollocation(CollocationElasticity):
 
         def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
             loaded.system.state(loaded.known, _NO_ELEMENTS, _NO_CONDITIONS)
-            return loaded.everywhere()
+            displacement, traction = loaded.everywhere()
+            return displacement, traction * self.mesh.lengths[:, None]
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             displacement, _ = recover(nothing)
@@ -165,9 +165,9 @@ class LoadedSystem:
         return travel if np.abs(moved).max(initial=0.0) > _FAR * left else None
 
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
-        """Return displacements without `motion` and nodal forces (n_elements, 2), in x and y, of the last response."""
+        """Return displacements without `motion` and tractions (n_elements, 2), in x and y, of the last response."""
         traction, displacement = self.system.everywhere()
-        return displacement, traction * self.map.mesh.lengths[:, None]
+        return displacement, traction
 
 
 def _loaded(conditions: NodalConditions, force: FloatArray) -> tuple[BoolArray, BoolArray]:

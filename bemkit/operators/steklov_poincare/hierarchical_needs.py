@@ -46,19 +46,13 @@ LARGEST_BLOCK = 1000
 
 def why_dense(case: BodyCase) -> str:
     """Say why the equations of a body cannot be compressed; empty if they can."""
-    mesh, conditions = case.mesh, case.conditions
-    if mesh.symmetry is not None:
-        return "the body is symmetric"
-    if case.n_curved:
-        return f"{case.n_curved} elements are curved"
+    mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
     if len(mesh.loops) > _MOST_LOOPS:
         return f"the boundary has {len(mesh.loops)} closed curves"
     if case.material.effective_poisson_ratio > _LARGEST_POISSON_RATIO:
         return "the material is nearly incompressible"
-    if np.any(conditions.is_retained.any(axis=1) & conditions.is_fixed.any(axis=1)):
-        return "supports hold contact nodes"
     return ""
 
 
