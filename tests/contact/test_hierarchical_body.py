@@ -81,6 +81,10 @@ SCENES = {
     "tresca": replace(paper(1), law=bk.Tresca(0.2)),
     "disc": bk.load_scene("disc-between-plates"),
     "plate with a round hole": replace(loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4)),
+    "incompressible": replace(paper(1), material=bk.Material(1.0, 0.5)),
+    "nearly incompressible with a hole": replace(
+        loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4), material=bk.Material(1.0, 0.5 - 2e-8)
+    ),
     "half of a plate with a hole": squeezed(bk.PlateWithHole(2.0, 2.0, 0.4, (-1.0, -1.0)), symmetry=bk.Symmetry(x=0.0)),
     "quarter of a disc": squeezed(bk.Disk(1.0), symmetry=bk.Symmetry(x=0.0, y=0.0)),
     "strip": replace(loose_block(), shape=bk.Rectangle(20.0, 1.0), solver=bk.AugmentedLagrangian()),
