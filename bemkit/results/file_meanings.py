@@ -54,6 +54,7 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
         },
         "steps": {
             "time": ("", "time at the end of the step"),
+            "time_step": ("", "length in time of its last increment"),
             "external_work": ("energy", "work of loads, moving supports and obstacles in the step"),
             "elastic_energy": ("energy", "elastic energy at the end of the step"),
             "dissipation": ("energy", "work that friction takes up in the step"),
