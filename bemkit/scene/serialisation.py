@@ -356,7 +356,8 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
 
 def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
     found: list[Any] = []
-    for name, options in _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]").items():
+    written = f"[{heading}.NAME]" + (", in one of several bodies [bodies.BODY.parts.NAME]" if wanted is Part else "")
+    for name, options in _exactly(value, dict, f"a table of {heading}: write {written}").items():
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:
