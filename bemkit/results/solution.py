@@ -6,7 +6,8 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -287,6 +288,8 @@ def following(
 ) -> AnySolution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
 
+    Of warnings that differ in numbers alone the last one stands for all; `at_step` keeps those of a step.
+
     Parameters
     ----------
     so_far : Solution or AssemblySolution, optional
@@ -303,8 +306,17 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = dict.fromkeys((*solution.warnings, *(text for each in before for text in each.warnings)))
+    warnings = unlike((*solution.warnings, *(text for each in before for text in each.warnings)))
     loading = None if solution.loading is None else replace(solution.loading, asked=asked)
     message = f"{name}: {solution.message}"
-    whole: AnySolution = replace(total, message=message, warnings=tuple(warnings), loading=loading)
+    whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
     return whole
+
+
+def unlike(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return the first of all sentences that differ in numbers, and in what else these count, alone."""
+    first: dict[str, str] = {}
+    for text in texts:
+        kind = re.sub(r", and \d+ more [a-z]+ like it|(?<=node)s|\d+(\.\d+)?(e[-+]?\d+)?", "", text)
+        first.setdefault(kind, text)
+    return tuple(first.values())

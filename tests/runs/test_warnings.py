@@ -23,7 +23,7 @@ from bemkit.operators.material import Material
 from bemkit.plan import make_plan
 from bemkit.results import warnings as warnings_module
 from bemkit.results.result_file import read_result, write_result
-from bemkit.results.solution import Solution
+from bemkit.results.solution import Solution, unlike
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_assembly_warnings, find_warnings
 from bemkit.runs.history import run_history
@@ -247,3 +247,16 @@ def test_rotation_that_plain_constant_elements_take_for_strain(*, slopes: bool, 
     doubts = [words for words in find_warnings(run(scene)) if "taken for strain" in words]
     assert len(doubts) == warns
     assert not warns or doubts[0].startswith("The body turns by 0.001")
+
+
+def test_of_warnings_of_many_steps_that_differ_in_numbers_one_is_left() -> None:
+    narrow = "A slip zone of part 'a' at s = {} has only {}: use more elements there, or give an accuracy."
+    steps = [
+        narrow.format("3.333e-05", "3 nodes, and 1 more zone like it"),
+        narrow.format("0.25", "1 node"),
+        narrow.replace("'a'", "'b'").format("0.25", "2 nodes"),
+        narrow.replace("slip", "stick").format("0.25", "2 nodes"),
+        "The estimated error is 5.2 %: use more elements, or give an accuracy.",
+        "The estimated error is 7 %: use more elements, or give an accuracy.",
+    ]
+    assert unlike(steps) == (steps[0], *steps[2:5])
