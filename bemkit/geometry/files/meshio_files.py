@@ -54,7 +54,7 @@ def read_with_meshio(path: Path) -> PlaneMesh:
             raise GeometryError(f"it is damaged: its cells do not join its {len(points)} points: write it anew")
         n_corners, order = _TYPES[block.type]
         blocks.append(CellBlock(n_corners, order, nodes.astype(np.intp), _names(mesh, k), _curves(mesh, k)))
-    return PlaneMesh(points, tuple(blocks))
+    return PlaneMesh(points, tuple(blocks), tuple(mesh.field_data))
 
 
 def read_quietly(path: Path) -> Any:
