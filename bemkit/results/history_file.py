@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
     from bemkit.results.solution import Solution
 
-_WORK = ("external_work", "dissipation", "increment_work")
+_WORK = ("external_work", "dissipation", "increment_work", "friction_gain")
 _FLOATS = ("time", "elastic_energy", *_WORK)
 _COUNTS = ("n_increments", "linear_solves")
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")

@@ -47,11 +47,15 @@ class StepWork:
         Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
         heat it is what the other entries leave.
     dissipation : float [J/m]
-        What friction takes up at nodes that are closed at both ends of an increment; never negative.
+        What friction takes up at nodes that are closed at both ends of an increment; never negative: what it would give
+        by the trapezoidal rule counts as `increment_work`.
     increment_work : float [J/m]
         What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
         turns back under a falling friction bound by so much that friction would seem to give work. It vanishes as
         increments become smaller.
+    friction_gain : float [J/m]
+        What friction gives where it acts along the slip of an increment at its end; zero but for round-off wherever
+        friction opposes slip, and a part of no balance.
 
     Notes
     -----
@@ -62,6 +66,7 @@ class StepWork:
     external_work: float = 0.0
     dissipation: float = 0.0
     increment_work: float = 0.0
+    friction_gain: float = 0.0
 
     def __add__(self, other: StepWork) -> StepWork:
         """Return the work in both."""
@@ -69,6 +74,7 @@ class StepWork:
             self.external_work + other.external_work,
             self.dissipation + other.dissipation,
             self.increment_work + other.increment_work,
+            self.friction_gain + other.friction_gain,
         )
 
 
@@ -143,6 +149,7 @@ class LoadStep:
             "elastic_energy": self.elastic_energy,
             "dissipation": self.work.dissipation,
             "increment_work": self.work.increment_work,
+            "friction_gain": self.work.friction_gain,
             "force_normal": self.force_normal,
             "force_tangential": self.force_tangential,
             "mean_displacement": self.mean_displacement,

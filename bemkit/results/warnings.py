@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain
 
 import numpy as np
@@ -50,7 +50,7 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
         return solution.plan.warnings
     laws = solution.scene.laws
     smooth = {part for part, law in laws.items() if law.is_frictionless}
-    narrow = _narrow_zones(solution.contact, smooth)
+    narrow = _narrow_zones(solution.contact, smooth, _remedy((solution,)))
     doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
     return (*solution.plan.warnings, *chain(*doubts))
 
@@ -60,11 +60,12 @@ def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
     if not solution.is_certified:
         return solution.plan.warnings
     smooth = {pair.name for pair in solution.assembly.contacts if solution.assembly.law_of(pair).is_frictionless}
+    remedy = _remedy(solution.bodies.values())
     doubts = [
-        _large(solution.estimated_error),
+        _large(solution.estimated_error, remedy),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
-        _narrow_zones(solution.contact, smooth),
+        _narrow_zones(solution.contact, smooth, remedy),
     ]
     return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
 
@@ -75,9 +76,18 @@ def _first(doubts: list[str]) -> list[str]:
     return doubts if n_more <= 0 else [*doubts[:_MOST_ALIKE], f"There are {n_more} more doubts like the last one."]
 
 
-def _large(error: float | None) -> Iterator[str]:
+def _remedy(bodies: Iterable[SolvedBody]) -> str:
+    """Say what makes a solution better; meshes follow an accuracy only where errors are estimated and may be graded."""
+    for body in bodies:
+        is_periodic = body.mesh.surface is not None and body.mesh.surface.is_periodic
+        if is_periodic or not body.scene.discretisation.estimates_error:
+            return "use more elements"
+    return "use more elements, or give an accuracy"
+
+
+def _large(error: float | None, remedy: str) -> Iterator[str]:
     if error is not None and error > LARGEST_ERROR:
-        yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
+        yield f"The estimated error is {100.0 * error:.2g} %: {remedy}."
 
 
 def _error(solution: Solution) -> Iterator[str]:
@@ -89,7 +99,7 @@ def _error(solution: Solution) -> Iterator[str]:
     if error is None:
         energy = f"the elastic energy, {amount(solution.energy, 'energy', solution.units, 2)}, is not positive"
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
-    yield from _large(error)
+    yield from _large(error, _remedy((solution,)))
     if solution.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
     # elements without a neighbour on their piece: their strains meet no others
@@ -175,7 +185,7 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
         )
 
 
-def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[str]:
+def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[str]:
     """Doubt zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
@@ -193,7 +203,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[st
             narrow = [zone for zone in narrow if not reported[zone].all()]
             if narrow:
                 reported[np.concatenate(narrow)] = True
-                yield _narrow(part, kind, [contact.s[zone] for zone in narrow])
+                yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
 
 
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
@@ -203,11 +213,9 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
 
 
-def _narrow(part: str, kind: str, zones: Sequence[FloatArray]) -> str:
+def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> str:
     nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
     n_more, middle = len(zones) - 1, float(zones[0].mean())
     more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
-    return (
-        f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: use more elements there, or give "
-        "an accuracy."
-    )
+    there = remedy.replace("more elements", "more elements there")
+    return f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {there}."

@@ -192,7 +192,7 @@ def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixt
             main(["show", str(file), *arguments])
         assert ended.value.code == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("time,external_work,elastic_energy,dissipation,increment_work,force_normal,")
+    assert shown.startswith("time,external_work,elastic_energy,dissipation,increment_work,friction_gain,force_normal,")
     assert "[[steps]]" in shown
     assert "10 of 10 steps, up to t = 6" in shown
     with pytest.raises(SystemExit) as ended:

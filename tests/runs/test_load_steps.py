@@ -41,6 +41,7 @@ def check_balance(loading: LoadHistory, tolerance: float) -> None:
         size = max(abs(value) for value in (step.elastic_energy, *vars(work).values()))
         assert abs(rest) <= tolerance * size
         assert work.dissipation >= 0.0
+        assert 0.0 <= work.friction_gain <= tolerance * size
         energy = step.elastic_energy
 
 

@@ -168,6 +168,17 @@ def test_a_large_estimated_error_is_doubted(solution: Solution) -> None:
     assert not [words for words in find_warnings(fine) if "estimated error" in words]
 
 
+def test_an_accuracy_is_advised_only_where_meshes_can_follow_it() -> None:
+    paper = with_overrides(load_scene("paper-1"), elements=24, discretisation="linear")
+    for scene, is_possible in (
+        (paper, True),
+        (with_overrides(paper, discretisation="constant"), False),
+        (with_overrides(load_scene("rough-surface"), elements=16), False),
+    ):
+        (words,) = {words.split(": ")[-1] for words in run(scene).warnings if " zone of part " in words}
+        assert words == f"use more elements there{', or give an accuracy' if is_possible else ''}."
+
+
 def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
     lost = dataclasses.replace(solution, energy=-1e-9)
     assert lost.estimated_error is None

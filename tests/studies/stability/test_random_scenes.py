@@ -109,7 +109,11 @@ def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
     loop = bk.load_scene("friction-loop")
     steps = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     assert judge(steps)[0] in (Outcome.SUCCESS, Outcome.WARNED)
-    for changes, message in (({"dissipation": -1e-9}, "friction gave back"), ({"external_work": 1.0}, "is missing")):
+    for changes, message in (
+        ({"dissipation": -1e-9}, "friction gave back"),
+        ({"friction_gain": 1e-3}, "friction acts along slip"),
+        ({"external_work": 1.0}, "is missing"),
+    ):
         loading = steps[-1].loading
         assert loading is not None
         last = loading.steps[-1]
@@ -128,7 +132,7 @@ def test_round_off_of_a_body_that_only_moves_is_no_missing_work() -> None:
     size = step.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2
     for share, is_fault in ((1e-15, False), (1e-11, True)):  # either side of ROUND_OFF
         work = dataclasses.replace(last.work, external_work=share * size, dissipation=0.0, increment_work=0.0)
-        idle = dataclasses.replace(last, work=work, elastic_energy=0.0)
+        idle = dataclasses.replace(last, work=work, end=dataclasses.replace(step, energy=0.0))
         moved = dataclasses.replace(step, loading=dataclasses.replace(step.loading, steps=(idle,)))
         assert ("missing" in energy_fault(moved)) is is_fault
 
