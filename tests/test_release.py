@@ -93,3 +93,10 @@ def test_the_address_makes_absolute_links_of_relative_ones_and_no_others() -> No
         assert (ROOT / link).exists(), link
     assert hook["urls"]("", "v1.0.0") == {}
     assert hook["urls"](there, "v1.0.0")["Changelog"] == f"{there}/blob/v1.0.0/CHANGELOG.md"
+
+
+def test_rattler_build_reads_the_recipe() -> None:
+    rattler_build = pytest.importorskip("rattler_build")
+    (variant,) = rattler_build.Stage0Recipe.from_file(str(ROOT / "conda" / "recipe.yaml")).render()
+    package = variant.recipe.package
+    assert (str(package.name), str(package.version)) == ("bemkit", __version__)
