@@ -7,7 +7,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.factor import ElementLaws, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
@@ -133,3 +133,17 @@ def test_a_body_that_nothing_holds_and_conditions_that_are_one_are_named() -> No
     # a uniform dilatation has the pressure 2 (mu + lambda) = 2 mu / (1 - 2 nu) on all sides
     pressure = 2.0 * MATERIAL.shear_modulus / (1.0 - 2.0 * MATERIAL.poisson_ratio)
     np.testing.assert_allclose(traction, pressure * mesh.normals, atol=1e-7 * pressure)
+
+
+def test_a_leaf_that_becomes_singular_is_named() -> None:
+    mesh = mesh_of("rectangle", 220)
+    conditions, force, kept = conditions_of(mesh, 3)
+    system = system_of(mesh, conditions.frame, True, 1e-9)
+    laws = laws_of(system, mesh, conditions, force, kept)
+    factors = laws.factors.copy()
+    factors[7] = 0.0  # neither its traction nor its displacement is unknown
+    with pytest.raises(SingularClusterError, match=r"a cluster of \d+ elements is singular.*linear solver 'direct'"):
+        system.factor.update(ElementLaws(factors, laws.given))
+    system.state(laws, NOWHERE, NOTHING)
+    traction, _ = system.everywhere()
+    assert np.isfinite(traction).all()
