@@ -274,10 +274,17 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
             total = spent + record.linear_solves
             records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
     return replace(
-        result,
+        with_times(result, solutions),
         history=tuple(records),
         linear_solves=sum(solution.linear_solves for solution in solutions),
         outer_steps=sum(solution.outer_steps for solution in solutions),
+    )
+
+
+def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolution:
+    """Return a solution with the times and the memory of all that led to it."""
+    return replace(
+        result,
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
         memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
     )

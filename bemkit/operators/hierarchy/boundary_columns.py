@@ -90,8 +90,8 @@ class BoundaryColumns:
         slopes = means = None
         if takes_slopes:
             of = GradientReconstruction.of(mesh, panels)
-            slopes = np.stack([of.before, of.own, of.after])[:, order]
-            means = np.stack([of.mean_before, of.mean_own, of.mean_after])[:, order]
+            slopes = np.stack([each[order] for each in (of.before, of.own, of.after)])
+            means = np.stack([each[order] for each in (of.mean_before, of.mean_own, of.mean_after)])
         return cls(
             Constants.of(material, log_length),
             order,
@@ -138,10 +138,10 @@ class BoundaryColumns:
             values: FloatArray = fast.columns(*about, columns)
             return values.T
         result = np.empty((columns.size, x.size), complex)
-        step = max(1, _PAIRS // max(x.size, 1))
-        for begin in range(0, columns.size, step):
+        step = max(1, 4 * _PAIRS // max(columns.size, 1))  # about four columns an element
+        for begin in range(0, x.size, step):
             some = slice(begin, begin + step)
-            result[some] = self._some_fields(x, places, columns[some]).T
+            result[:, some] = self._some_fields(x[some], places[some], columns).T
         return result.view(float).T
 
     def applied(self, places: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:

@@ -21,6 +21,8 @@ from bemkit.operators.linear.threads import for_each_chunk
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
+_UNEVEN = 10.0
+"""Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
 _FIRST_GUESS, _GROWTH = 100, 1.3
 """Guesses of ranks: of a leaf, and from one level to the next."""
 
@@ -175,7 +177,8 @@ class _LevelView:
         for kind in (0, 1):
             own = (candidates // 2) % 2 == kind
             sizes[own] /= norms[own].max(initial=0.0) or 1.0
-        return sketched(fields, weights, sizes, self._tolerance_at(cluster, candidates // 4), self.guesses[cluster])
+        guess = self._guess(cluster, np.append(points, candidates // 4))
+        return sketched(fields, weights, sizes, self._tolerance_at(cluster, candidates // 4), guess)
 
     def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
         """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
@@ -191,7 +194,14 @@ class _LevelView:
         groups = (kind == np.arange(3)[:, None]) * np.square(weights)
         largest = np.sqrt(np.max((groups @ np.square(fields)) * np.square(sizes), axis=1, initial=0.0))
         weights /= np.where(largest > 0.0, largest, 1.0)[kind]
-        return sketched(fields, weights, sizes, self._tolerance_at(cluster, rows // 2), self.guesses[cluster])
+        guess = self._guess(cluster, np.append(points, near_columns // 4))
+        return sketched(fields, weights, sizes, self._tolerance_at(cluster, rows // 2), guess)
+
+    def _guess(self, cluster: int, elements: IntArray) -> int | None:
+        """Return a guess of the rank; none where random combinations would lose the smallest elements."""
+        lengths = self.columns.lengths[elements]
+        is_even = lengths.max(initial=0.0) <= _UNEVEN * lengths.min(initial=np.inf)
+        return self.guesses[cluster] if is_even else None
 
     def _proxies(self, cluster: int) -> ComplexArray:
         return self.discs.points(cluster, n_proxies(self.tolerance))

@@ -24,7 +24,6 @@ from bemkit.operators.linear.threads import for_each_chunk
 
 _SMALLEST_PIVOT = 1e-13
 """Pivots below this share of the largest entry of their column are round-off."""
-_HELD = "the body held by its supports and its contact boundary"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +60,26 @@ class Border:
     balances: FloatArray
 
 
-class _LU:
-    """Factors of a dense matrix, its columns of any size."""
+class SingularClusterError(SingularMatrixError):
+    """A cluster of the tree whose own equations do not determine its unknowns, whatever the rest of the body does."""
 
-    def __init__(self, matrix: FloatArray, name: str, smallest_size: float = 0.0) -> None:
+    def __init__(self, n_elements: int) -> None:
+        super().__init__(
+            f"a cluster of {n_elements} elements is singular: check that supports and contacts hold the body; if they "
+            "do, take the linear solver 'direct'"
+        )
+
+
+class _LU:
+    """Factors of a dense matrix, its columns of any size; raises `error` if it is singular."""
+
+    def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:
         from scipy.linalg.lapack import dgetrf
 
         sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
         self._factor, self._pivots, info = dgetrf(matrix)
         if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):
-            raise SingularMatrixError(f"{name} is singular: check that supports and contacts hold the body")
+            raise error
 
     def solve(self, right: FloatArray) -> FloatArray:
         from scipy.linalg.lapack import dgetrs
@@ -185,7 +194,10 @@ class HierarchicalFactor:
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
         root = self._cluster(-1, 0)
-        return _LU(root.scattering, "the balance of the body").solve(root.alone)
+        error = SingularMatrixError(
+            "the balance of the body is singular: check that supports and contacts hold the body"
+        )
+        return _LU(root.scattering, error).solve(root.alone)
 
     @property
     def n_bytes(self) -> int:
@@ -207,7 +219,7 @@ class HierarchicalFactor:
         outgoing[:, skeleton.columns.size :] = self.border.balances[:, 4 * places.start : 4 * places.stop].T
         both = np.concatenate([entries, outgoing], axis=1).reshape(n, 4, -1)
         of_unknowns = (factors.transpose(0, 2, 1) @ both).reshape(2 * n, -1)
-        factor = _LU(of_unknowns[:, : rows.size].T, _HELD)
+        factor = _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
         response = factor.solve(np.concatenate([skeleton.row_map.matrix(), self.border.errors[rows]], axis=1))
         outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros(2 * n)
         if given.any():
@@ -236,7 +248,7 @@ class HierarchicalFactor:
         felt[:, -1] *= -1.0
         twice = from_two[:, :n_two] @ from_one[:, :n_one]
         felt[:n_one] -= from_two[:, :n_two] @ felt[n_one:]
-        felt[:n_one] = _LU(np.eye(n_one) - twice, _HELD, 1.0).solve(felt[:n_one])
+        felt[:n_one] = _LU(np.eye(n_one) - twice, self._singular(level, cluster), 1.0).solve(felt[:n_one])
         felt[n_one:] -= from_one[:, :n_one] @ felt[:n_one]
         caused = []
         for each, of_rows in ((one, felt[:n_one]), (two, felt[n_one:])):
@@ -262,6 +274,10 @@ class HierarchicalFactor:
         n_one = self.compression.skeletons[level - 1][2 * cluster].rows.size
         halves = (of_children[:n_one], of_children[n_one:])
         return [(2 * cluster + k, np.append(half, border)) for k, half in enumerate(halves)]
+
+    def _singular(self, level: int, cluster: int) -> SingularClusterError:
+        places = self.compression.tree.places(level, cluster)
+        return SingularClusterError(places.stop - places.start)
 
     def _cluster(self, level: int, cluster: int) -> _Cluster:
         factored = self._levels[level][cluster]

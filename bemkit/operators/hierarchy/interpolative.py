@@ -100,7 +100,7 @@ def interpolative(matrix: FloatArray, tolerance: float) -> Interpolation:
 
 
 def sketched(
-    matrix: FloatArray, row_weights: FloatArray, column_sizes: FloatArray, tolerance: float, guess: int
+    matrix: FloatArray, row_weights: FloatArray, column_sizes: FloatArray, tolerance: float, guess: int | None
 ) -> Interpolation:
     """Interpolate the columns of a matrix from random combinations of its rows.
 
@@ -113,20 +113,21 @@ def sketched(
         By which columns are multiplied before they are compared; the weights returned hold without.
     tolerance : float
         As of `interpolative`.
-    guess : int
-        Of the rank; a wrong one costs time, nothing else.
+    guess : int or None
+        Of the rank; a wrong one costs time, nothing else. None takes all rows, which keeps more digits of rows that are
+        far smaller than others.
     """
     m, n = matrix.shape
     while True:
-        n_rows = guess + _SPARE
-        is_whole = n_rows >= min(m, 2 * n)
-        if is_whole:
+        n_rows = m if guess is None else guess + _SPARE
+        if guess is None or n_rows >= min(m, 2 * n):
+            guess = None
             sketch = (matrix * row_weights[:, None]) * column_sizes
         else:
             random = _random(_power_of_two(n_rows), _power_of_two(m))[:n_rows, :m]
             sketch = ((random * row_weights) @ matrix) * column_sizes
         result = interpolative(sketch, tolerance)
-        if is_whole or result.skeleton.size + _SPARE <= n_rows:
+        if guess is None or result.skeleton.size + _SPARE <= n_rows:
             return result.scaled(column_sizes)
         guess *= 2
 

@@ -175,6 +175,7 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
 
     module = types.ModuleType("compiled_fields")
     module.element_fields = broken  # type: ignore[attr-defined]
+    module.__file__ = "compiled_fields.py"
     name = "bemkit.operators.hierarchy.compiled_fields"
     monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
