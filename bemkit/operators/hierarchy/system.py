@@ -140,6 +140,38 @@ class HierarchicalSystem:
         state: FloatArray = (local.factors @ unknowns[places, :, None])[:, :, 0] + local.given
         return state
 
+    def responses(self, known: ElementLaws, moved: IntArray, elements: IntArray) -> FloatArray:
+        """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4, n_moved), under unit displacements of others one by one.
+
+        Parameters
+        ----------
+        known : ElementLaws
+            Of all elements, by `laws`; what is given there counts for nothing.
+        moved : (n_moved,) array
+            Directions 2 * element + direction that `known` holds fast.
+        elements : (n,) array
+        """
+        self.factor.update(known)
+        places = self._place[elements]
+        leaves = self._tree.leaves_of(places)
+        at = np.searchsorted(self._places_in(leaves), places)
+        result = np.empty((elements.size, 4, moved.size))
+        moved_place, unit = self._place[moved // 2], self._frame[moved // 2, moved % 2]
+        for leaf in self._tree.leaves_of(moved_place).tolist():
+            own = self._tree.places(0, leaf)
+            columns = np.flatnonzero((moved_place >= own.start) & (moved_place < own.stop))
+            given = np.zeros((own.stop - own.start, 4, columns.size))
+            given[moved_place[columns] - own.start, 2:, np.arange(columns.size)] = unit[columns]
+            unknowns = self.factor.responses(leaf, given, leaves)[at]
+            states = np.einsum("nqz,nzk->nqk", known.factors[places], unknowns)
+            is_own = np.flatnonzero((places >= own.start) & (places < own.stop))
+            states[is_own] += given[places[is_own] - own.start]
+            result[:, :, columns] = states
+        local: FloatArray = np.concatenate(
+            [np.einsum("nkc,ncm->nkm", self._frame[elements], each) for each in (result[:, :2], result[:, 2:])], axis=1
+        )
+        return local
+
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
         laws = self.factor.laws

@@ -40,6 +40,8 @@ _EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 30e3, 10e3, 6e6
 """For each element at the tolerance 1e-10."""
 _BYTES, _BYTES_OF_CONTACT = 20e3, 13e3
 """Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
+_BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
+"""Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
 LARGEST_BLOCK = 1000
 """Order that the largest dense block of a tree hardly exceeds."""
@@ -58,7 +60,7 @@ def why_dense(case: BodyCase) -> str:
 
 
 def choose_collocation_solver(
-    requested: LinearSolverChoice, case: BodyCase, hindrance: str, memory: float
+    requested: LinearSolverChoice, case: BodyCase, memory: float, hindrance: str = ""
 ) -> ChosenLinearSolver:
     """Choose between the dense and the compressed equations of collocation.
 
@@ -67,10 +69,10 @@ def choose_collocation_solver(
     requested : LinearSolver, Hierarchical or Automatic
     case : BodyCase
         Its linear solver counts for nothing.
-    hindrance : str
-        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
     memory : float [bytes]
         Of the computer.
+    hindrance : str, optional
+        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
 
     Returns
     -------
@@ -120,4 +122,8 @@ def _needs(case: BodyCase, options: Hierarchical) -> BodyNeeds:
     memory = int(digits * (_BYTES * n + _BYTES_OF_CONTACT * n_both))
     evaluations = digits * n * (_EVALUATIONS_COMPILED if compiled.is_installed() else _EVALUATIONS)
     flops = digits * _FLOPS * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
-    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=True)
+    if case.is_condensed:
+        memory += int(_BYTES_OF_STATE * case.n_retained**2)
+        flops += _FLOPS_OF_STATE * case.n_retained**2
+    is_matrix_free = not case.is_condensed
+    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=is_matrix_free)
