@@ -69,6 +69,8 @@ class _LU:
     def __init__(self, matrix: FloatArray, name: str, smallest_size: float = 0.0) -> None:
         from scipy.linalg.lapack import dgetrf
 
+        if not matrix.size:
+            return
         sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
         self._factor, self._pivots, info = dgetrf(matrix)
         if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):

@@ -26,10 +26,9 @@ _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
 """Of a tree that is worth its name."""
 _MOST_LOOPS = 40
-"""Each loop has an equation of its own that passes through the whole tree."""
+"""Each loop of a symmetric body has an equation of its own that passes through the whole tree."""
 _LEAST_COMPRESSIBILITY = 1e-8
-"""1/2 less Poisson's ratio: below, the pressure in a body with holes is told by its whole boundary alone, and clusters
-of the tree, which are solved before that, lose the digits."""
+"""1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
 _SHARE = 0.5
 """Predicted share of the time of the dense equations below which they are compressed."""
 _EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
@@ -52,10 +51,14 @@ def why_dense(case: BodyCase) -> str:
     mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
-    if len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary has {len(mesh.loops)} closed curves"
-    if len(mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY:
-        return "the material is incompressible and the body has holes"
+    if mesh.symmetry is not None and len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary of half the body has {len(mesh.loops)} closed curves"
+    if (
+        mesh.symmetry is not None
+        and len(mesh.loops) > 1
+        and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
+    ):
+        return "the material is incompressible, and the body symmetric and with holes"
     return ""
 
 
