@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 from dataclasses import dataclass
 from functools import lru_cache
@@ -31,6 +32,27 @@ class QuarterDisk:
         arc = Side("arc", Arc((0.0, 0.0), r, -0.5 * np.pi, 0.0))
         top, left = Side("top", Segment((r, 0.0), (0.0, 0.0))), Side("left", Segment((0.0, 0.0), (0.0, -r)))
         return Outline(((arc, top, left),))
+
+
+@dataclass(frozen=True)
+class Perforated:
+    """A plate of width and height 2 about the origin with rows of round holes."""
+
+    n_x: int
+    n_y: int
+
+    def outline(self) -> Outline:
+        """Return the sides and two arcs for each hole."""
+        corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        names = ("bottom", "right", "top", "left")
+        sides = [Side(name, Segment(corners[k - 4], corners[k - 3])) for k, name in enumerate(names)]
+        loops = [tuple(sides)]
+        for i, j in itertools.product(range(self.n_x), range(self.n_y)):
+            centre = 2.0 * (i + 0.5) / self.n_x - 1.0, 2.0 * (j + 0.5) / self.n_y - 1.0
+            ends = (0.0, -np.pi, -2.0 * np.pi)
+            arcs = (Arc(centre, 0.6 / max(self.n_x, self.n_y), *pair) for pair in itertools.pairwise(ends))
+            loops.append(tuple(Side(f"hole-{i}-{j}-{k}", arc) for k, arc in enumerate(arcs)))
+        return Outline(tuple(loops))
 
 
 def paper(example: int, discretisation: Any = None, mesh: bk.MeshOptions | None = None) -> bk.Scene:

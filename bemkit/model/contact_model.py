@@ -252,12 +252,7 @@ def build_model(prepared: Prepared) -> Model:
         If the supports do not hold the body even with all contact nodes sticking.
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
-    chosen = prepared.linear_solver
-    elastic = (
-        discretisation.elastic_map(mesh, prepared.material, chosen.solver)
-        if chosen.hierarchical is None
-        else discretisation.hierarchical_map(mesh, prepared.material, chosen.hierarchical)
-    )
+    elastic = discretisation.chosen_map(mesh, prepared.material, prepared.linear_solver)
     elastic = _driven_by(elastic, prepared.drive)
     if prepared.inside is not None:
         elastic = HeavyElasticity(elastic, prepared.inside)
@@ -275,7 +270,7 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
         given = prepared.conditions, prepared.contact.nodes, prepared.force
-        if prepared.linear_solver.hierarchical is not None:
+        if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:
             from bemkit.contact.condensation.hierarchical_body import hierarchical_body
             from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 

@@ -15,7 +15,7 @@ from bemkit.geometry.spaces import (
     break_nodes,
     check_degree,
 )
-from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical, LinearSolver
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
@@ -93,9 +93,19 @@ class Discretisation(Protocol):
         """Say why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` makes them."""
         return f"{self.method} has no such equations"
 
+    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
+        """Whether the elastic energy may be negative on a mesh, so that the stiffness has to be examined."""
+        return False
+
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
         """Return the map with its equations compressed over a tree, the usual one unless `why_dense` is empty."""
         return self.elastic_map(mesh, material, DenseCholesky())
+
+    def chosen_map(self, mesh: BoundaryMesh, material: Material, chosen: ChosenLinearSolver) -> SteklovPoincare:
+        """Return the map with the linear solver that was chosen for it."""
+        if chosen.hierarchical is None:
+            return self.elastic_map(mesh, material, chosen.solver)
+        return self.hierarchical_map(mesh, material, chosen.hierarchical)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Foresee what the map takes; nothing is foreseen unless this is written."""
@@ -280,8 +290,12 @@ class ConstantCollocation(Discretisation):
         return CollocationElasticity(mesh, material, slopes=self.slopes)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Name thinness: only a dense stiffness tells whether elements that are too long make the energy negative."""
-        return "elements are too long for the thickness of the body" if thinness_warnings(mesh) else ""
+        """Nothing."""
+        return ""
+
+    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
+        """Whether elements are too long for the thickness of the body."""
+        return bool(thinness_warnings(mesh))
 
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
         """Return the compressed map."""

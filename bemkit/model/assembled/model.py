@@ -217,10 +217,10 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     for group in groups(bodies):
         first = bodies[group[0]]
         material = first.material.scaled(prepared.units.modulus)
-        solver = linear_solver(prepared, int(group[0])).solver
+        chosen = linear_solver(prepared, int(group[0]))
         first_inside = prepared.insides[group[0]]
         try:
-            map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
+            map_ = first.scene.discretisation.chosen_map(first.own_mesh.unit, material, chosen)
             base = _loaded(map_, first_inside).condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         except (SingularMatrixError, NotConvergedError) as error:
             raise type(error)(f"body {first.name!r}: {error}") from error

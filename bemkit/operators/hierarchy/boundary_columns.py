@@ -144,6 +144,19 @@ class BoundaryColumns:
             result[:, some] = self._some_fields(x[some], places[some], columns).T
         return result.view(float).T
 
+    def of_forces(self, felt: FloatArray, places: IntArray, forces: ComplexArray) -> FloatArray:
+        """Return what the equations in the middle of elements feel of point forces.
+
+        Parameters
+        ----------
+        felt : (2 n_forces, 2 n_places) array
+            The displacements there, by 8 pi mu (1 - nu).
+        places : (n_places,) array
+        forces : (n_forces,) complex array
+            Where they act.
+        """
+        return felt
+
     def applied(self, places: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return (1/2 + T) u - U t, (n, 2), in the middle of some elements.
 

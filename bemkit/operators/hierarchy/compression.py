@@ -186,7 +186,7 @@ class _LevelView:
         points, number = np.unique(rows // 2, return_inverse=True)
         x, proxies = of.centre[points], self._proxies(cluster)
         circle = PROXY_RATIO * float(self.discs.radius[cluster])
-        forces = point_forces(x, proxies, of.constants.poisson_ratio, circle)
+        forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
         fields = np.concatenate([of.fields(x, points, near_columns).T, forces])[:, 2 * number + rows % 2]
         weights = np.append(1.0 / np.sqrt(of.lengths[near_columns // 4]), np.ones(len(forces)))
         sizes = np.sqrt(of.lengths[rows // 2])

@@ -12,7 +12,8 @@ tractions). They are passed through all clusters beside the skeletons and solved
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -76,6 +77,8 @@ class _LU:
     def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:
         from scipy.linalg.lapack import dgetrf
 
+        if not matrix.size:
+            return
         sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
         self._factor, self._pivots, info = dgetrf(matrix)
         if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):
@@ -95,8 +98,8 @@ class _Cluster:
 
     Parameters
     ----------
-    scattering, alone : arrays
-        Its columns cause, and to the balances it adds, ``alone - scattering @ f``.
+    scattering, alone : (n_caused, n_felt), (n_caused, k) arrays
+        Its columns cause, and to the balances it adds, ``alone - scattering @ f``, for k different loads.
     response, at_rest : arrays
         The unknowns of a leaf, and what the rows of both children of another cluster feel, are
         ``at_rest - response @ f``.
@@ -106,6 +109,10 @@ class _Cluster:
     alone: FloatArray
     response: FloatArray
     at_rest: FloatArray
+
+    def unloaded(self, k: int) -> _Cluster:
+        """Return the same under k times no load."""
+        return replace(self, alone=np.zeros((len(self.alone), k)), at_rest=np.zeros((len(self.at_rest), k)))
 
     @property
     def n_bytes(self) -> int:
@@ -155,9 +162,12 @@ class HierarchicalFactor:
         self.laws = laws
         changed = sorted(self._stale)
         n_integrals = len(changed) * tree.bounds[1] ** 2
-        for leaf, factored in zip(
-            changed, for_each_chunk(lambda leaf: self._leaf(leaf, laws), changed, n_integrals=n_integrals), strict=True
-        ):
+
+        def factor_leaf(leaf: int) -> _Cluster:
+            places = tree.places(0, leaf)
+            return self._leaf(leaf, laws.factors[places], laws.given[places].reshape(-1, 1))
+
+        for leaf, factored in zip(changed, for_each_chunk(factor_leaf, changed, n_integrals=n_integrals), strict=True):
             self._levels[0][leaf] = factored
         for level in range(1, tree.n_levels + 1):
             changed = sorted({cluster // 2 for cluster in changed})
@@ -175,41 +185,69 @@ class HierarchicalFactor:
         leaves : (n_leaves,) array
             Ascending.
         """
-        felt = {0: self.errors()}
-        tree = self.compression.tree
-        for level in range(tree.n_levels, 0, -1):
-            wanted = set((leaves >> (level - 1)).tolist())
-            felt = {
-                child: of_child
-                for cluster, of_cluster in felt.items()
-                for child, of_child in self._felt_by_children(level, cluster, of_cluster)
-                if child in wanted
-            }
-        parts = []
-        for number in leaves.tolist():
-            leaf = self._cluster(0, number)
-            parts.append(leaf.at_rest - leaf.response @ felt[number])
-        return np.concatenate([np.zeros(0), *parts]).reshape(-1, 2)
+        parts = self._descend(self.errors()[:, None], leaves, self._cluster)
+        return np.concatenate([np.zeros((0, 1)), *parts])[:, 0].reshape(-1, 2)
+
+    def responses(self, leaf: int, given: FloatArray, leaves: IntArray) -> FloatArray:
+        """Return the unknowns z (n, 2, k) of the elements of some leaves if nothing is given but in one leaf.
+
+        Parameters
+        ----------
+        leaf : int
+        given : (n_of_leaf, 4, k) array
+            What stands in the place of the given part of the laws there.
+        leaves : (n_leaves,) array
+            Ascending.
+        """
+        assert self.laws is not None  # `update` comes first
+        k, n_levels = given.shape[2], self.compression.tree.n_levels
+        places = self.compression.tree.places(0, leaf)
+        path = [self._leaf(leaf, self.laws.factors[places], given.reshape(-1, k))]
+        for level in range(1, n_levels + 1):
+            below = leaf >> (level - 1)
+            pair = path[-1], self._cluster(level - 1, below ^ 1).unloaded(k)
+            path.append(self._merged(level, leaf >> level, *(pair if below % 2 == 0 else pair[::-1])))
+
+        def cluster_at(level: int, cluster: int) -> _Cluster:
+            return path[level] if cluster == leaf >> level else self._cluster(level, cluster).unloaded(k)
+
+        parts = self._descend(_of_border(path[-1]), leaves, cluster_at)
+        return np.concatenate([np.zeros((0, k)), *parts]).reshape(-1, 2, k)
+
+    def _descend(
+        self, errors: FloatArray, leaves: IntArray, cluster_at: Callable[[int, int], _Cluster]
+    ) -> list[FloatArray]:
+        """Return the unknowns (2 n_elements, k) of some leaves from those of the border (n_border, k)."""
+        felt = {0: errors}
+        for level in range(self.compression.tree.n_levels, 0, -1):
+            wanted, below = set((leaves >> (level - 1)).tolist()), {}
+            for number, of_cluster in felt.items():
+                cluster = cluster_at(level, number)
+                of_children = cluster.at_rest - cluster.response @ of_cluster
+                n_one = self.compression.skeletons[level - 1][2 * number].rows.size
+                for child, half in ((2 * number, of_children[:n_one]), (2 * number + 1, of_children[n_one:])):
+                    if child in wanted:
+                        below[child] = np.concatenate([half, errors])
+            felt = below
+        of_leaves = ((cluster_at(0, number), felt[number]) for number in leaves.tolist())
+        return [leaf.at_rest - leaf.response @ of_leaf for leaf, of_leaf in of_leaves]
 
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
         root = self._cluster(-1, 0)
-        error = SingularMatrixError(
-            "the balance of the body is singular: check that supports and contacts hold the body"
-        )
-        return _LU(root.scattering, error).solve(root.alone)
+        return _of_border(root)[:, 0]
 
     @property
     def n_bytes(self) -> int:
         """Memory of all factors [bytes]."""
         return sum(each.n_bytes for level in self._levels for each in level if each is not None)
 
-    def _leaf(self, number: int, laws: ElementLaws) -> _Cluster:
+    def _leaf(self, number: int, factors: FloatArray, given: FloatArray) -> _Cluster:
+        """Factor a leaf under laws (n, 4, 2) and k loads (4 n, k)."""
         compression = self.compression
         places, columns = compression.tree.places(0, number), compression.unknowns[number]
         rows = np.arange(2 * places.start, 2 * places.stop)
         n, n_border = places.stop - places.start, self.border.errors.shape[1]
-        factors, given = laws.factors[places], laws.given[places]
         entries = np.zeros((4 * n, rows.size))
         own = columns - 4 * places.start
         entries[own] = compression.columns.entries(rows, columns).T
@@ -221,31 +259,36 @@ class HierarchicalFactor:
         of_unknowns = (factors.transpose(0, 2, 1) @ both).reshape(2 * n, -1)
         factor = _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
         response = factor.solve(np.concatenate([skeleton.row_map.matrix(), self.border.errors[rows]], axis=1))
-        outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros(2 * n)
+        outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros((2 * n, given.shape[1]))
         if given.any():
-            at_rest = -factor.solve(given.ravel() @ entries)
-        alone = outgoing_of_unknowns @ at_rest + given.ravel() @ outgoing
+            at_rest = -factor.solve(entries.T @ given)
+        alone = outgoing_of_unknowns @ at_rest + outgoing.T @ given
         return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
-        """Merge two clusters.
+        return self._merged(
+            level, cluster, self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
+        )
+
+    def _merged(self, level: int, cluster: int, one: _Cluster, two: _Cluster) -> _Cluster:
+        """Merge two clusters under the same loads.
 
         What the rows of both feel is, with f what those of the parent feel and e the unknowns of the border,
         f1 + S12 W2 (f2, e) = R1 f + S12 a2 and the same with 1 and 2 exchanged. The second is put into the first.
         """
-        one, two = self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
         on_one, on_two = self.compression.couplings(level - 1, cluster)
         n_border, n_one, n_two = self.border.errors.shape[1], len(on_one), len(on_two)
         parent = self._skeleton(level, cluster)
         n_rows = 0 if parent is None else parent.rows.size
-        # columns: what the rows feel, the border, and 1
+        # columns: what the rows feel, the border, and the loads
         from_two = on_one @ np.column_stack([two.scattering, two.alone])[: on_one.shape[1]]
         from_one = on_two @ np.column_stack([one.scattering, one.alone])[: on_two.shape[1]]
-        felt = np.zeros((n_one + n_two, n_rows + n_border + 1), order="F")
+        n_felt = n_rows + n_border
+        felt = np.zeros((n_one + n_two, n_felt + one.alone.shape[1]), order="F")
         if parent is not None:
             felt[:, :n_rows] = parent.row_map.matrix()
         felt[:n_one, n_rows:], felt[n_one:, n_rows:] = -from_two[:, n_two:], -from_one[:, n_one:]
-        felt[:, -1] *= -1.0
+        felt[:, n_felt:] *= -1.0
         twice = from_two[:, :n_two] @ from_one[:, :n_one]
         felt[:n_one] -= from_two[:, :n_two] @ felt[n_one:]
         felt[:n_one] = _LU(np.eye(n_one) - twice, self._singular(level, cluster), 1.0).solve(felt[:n_one])
@@ -253,27 +296,19 @@ class HierarchicalFactor:
         caused = []
         for each, of_rows in ((one, felt[:n_one]), (two, felt[n_one:])):
             causes = each.scattering[:, : len(of_rows)] @ of_rows
-            causes[:, n_rows:-1] += each.scattering[:, len(of_rows) :]
-            causes[:, -1] -= each.alone
+            causes[:, n_rows:n_felt] += each.scattering[:, len(of_rows) :]
+            causes[:, n_felt:] -= each.alone
             caused.append(causes)
         skeletons = np.concatenate([causes[: len(causes) - n_border] for causes in caused])
         balances = sum(causes[len(causes) - n_border :] for causes in caused)
-        of_parent = np.zeros((0, n_rows + n_border + 1)) if parent is None else parent.column_map.gather(skeletons)
+        of_parent = np.zeros((0, felt.shape[1])) if parent is None else parent.column_map.gather(skeletons)
         scattering = np.concatenate([of_parent, balances])
         return _Cluster(
-            np.ascontiguousarray(scattering[:, :-1]),
-            -scattering[:, -1],
-            np.ascontiguousarray(-felt[:, :-1]),
-            felt[:, -1].copy(),
+            np.ascontiguousarray(scattering[:, :n_felt]),
+            -scattering[:, n_felt:],
+            np.ascontiguousarray(-felt[:, :n_felt]),
+            felt[:, n_felt:].copy(),
         )
-
-    def _felt_by_children(self, level: int, cluster: int, felt: FloatArray) -> list[tuple[int, FloatArray]]:
-        """Return what the rows of both children feel, with their numbers, from what their parent feels."""
-        parent, border = self._cluster(level, cluster), felt[felt.size - self.border.errors.shape[1] :]
-        of_children = parent.at_rest - parent.response @ felt
-        n_one = self.compression.skeletons[level - 1][2 * cluster].rows.size
-        halves = (of_children[:n_one], of_children[n_one:])
-        return [(2 * cluster + k, np.append(half, border)) for k, half in enumerate(halves)]
 
     def _singular(self, level: int, cluster: int) -> SingularClusterError:
         places = self.compression.tree.places(level, cluster)
@@ -287,3 +322,9 @@ class HierarchicalFactor:
     def _skeleton(self, level: int, cluster: int) -> Skeleton | None:
         """Return the skeleton of a cluster, none of the root."""
         return None if level == self.compression.tree.n_levels else self.compression.skeletons[level][cluster]
+
+
+def _of_border(root: _Cluster) -> FloatArray:
+    """Return the unknowns (n_border, k) of the boundary as a whole."""
+    error = SingularMatrixError("the balance of the body is singular: check that supports and contacts hold the body")
+    return _LU(root.scattering, error).solve(root.alone)

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
+from bemkit.operators.hierarchy.sourced_columns import SourcedColumns
 from bemkit.operators.material import Material
 
 
@@ -53,8 +54,24 @@ class FoldedColumns(BoundaryColumns):
         return super().applied(places, *whole)
 
 
-def boundary_columns(mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> BoundaryColumns:
-    """Return the columns of a mesh; see `BoundaryColumns.of`."""
+def boundary_columns(
+    mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool, holes: list[IntArray] | None = None
+) -> BoundaryColumns:
+    """Return the columns of a mesh; see `BoundaryColumns.of`.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    order : (n_elements + n_holes,) array
+        The element at each place, or the number of elements and that of a hole.
+    takes_slopes : bool
+    holes : list of arrays, optional
+        The elements of each hole that has a place of its own; of a symmetric body none has.
+    """
+    if holes:
+        inner = BoundaryColumns.of(mesh, material, order[order < mesh.n_elements], takes_slopes=takes_slopes)
+        return SourcedColumns.around(inner, mesh, material, order, holes)
     if mesh.symmetry is None:
         return BoundaryColumns.of(mesh, material, order, takes_slopes=takes_slopes)
     images = mesh.symmetry.images

@@ -26,10 +26,9 @@ _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
 """Of a tree that is worth its name."""
 _MOST_LOOPS = 40
-"""Each loop has an equation of its own that passes through the whole tree."""
+"""Each loop of a symmetric body has an equation of its own that passes through the whole tree."""
 _LEAST_COMPRESSIBILITY = 1e-8
-"""1/2 less Poisson's ratio: below, the pressure in a body with holes is told by its whole boundary alone, and clusters
-of the tree, which are solved before that, lose the digits."""
+"""1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
 _SHARE = 0.5
 """Predicted share of the time of the dense equations below which they are compressed."""
 _EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
@@ -40,6 +39,8 @@ _EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 40e3, 6e3, 1.6e6
 """For each element at the tolerance 1e-10."""
 _BYTES, _BYTES_OF_CONTACT = 8.5e3, 3.5e3
 """Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
+_BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
+"""Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
 LARGEST_BLOCK = 1000
 """Order that the largest dense block of a tree hardly exceeds."""
@@ -50,15 +51,19 @@ def why_dense(case: BodyCase) -> str:
     mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
-    if len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary has {len(mesh.loops)} closed curves"
-    if len(mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY:
-        return "the material is incompressible and the body has holes"
+    if mesh.symmetry is not None and len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary of half the body has {len(mesh.loops)} closed curves"
+    if (
+        mesh.symmetry is not None
+        and len(mesh.loops) > 1
+        and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
+    ):
+        return "the material is incompressible, and the body symmetric and with holes"
     return ""
 
 
 def choose_collocation_solver(
-    requested: LinearSolverChoice, case: BodyCase, hindrance: str, memory: float
+    requested: LinearSolverChoice, case: BodyCase, memory: float, hindrance: str = ""
 ) -> ChosenLinearSolver:
     """Choose between the dense and the compressed equations of collocation.
 
@@ -67,10 +72,10 @@ def choose_collocation_solver(
     requested : LinearSolver, Hierarchical or Automatic
     case : BodyCase
         Its linear solver counts for nothing.
-    hindrance : str
-        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
     memory : float [bytes]
         Of the computer.
+    hindrance : str, optional
+        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
 
     Returns
     -------
@@ -132,4 +137,8 @@ def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = 
         is_compiled = compiled.is_installed()  # whether it works takes a while to find out
     evaluations = digits * n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
     flops = digits * _FLOPS * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
-    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=True)
+    if case.is_condensed:
+        memory += int(_BYTES_OF_STATE * case.n_retained**2)
+        flops += _FLOPS_OF_STATE * case.n_retained**2
+    is_matrix_free = not case.is_condensed
+    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=is_matrix_free)
