@@ -111,8 +111,8 @@ def test_pieces_end_where_the_status_changes() -> None:
 def test_later_meshes_start_near_their_solution() -> None:
     *_, before, last = risen("paper-1", 3e-5)
     own_solves = last.linear_solves - sum(each.linear_solves for each in risen("paper-1", 3e-5)[:-1])
-    assert own_solves <= 4
-    assert before.linear_solves <= 4
+    assert own_solves <= 7
+    assert before.linear_solves <= 7
 
 
 def test_a_fixed_degree_takes_layers_alone() -> None:
@@ -161,7 +161,7 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
     old = layered_partition(base, {})
     excess = np.zeros(len(old.sides))
     excess[0], excess[1] = FACTOR**-1.5, 1.5  # two layers more, and a half
-    fine = refined_partition(old, excess, {})
+    fine = refined_partition(old, excess, {}, 1.0)
     start, first = old.parameters[0][:2]
     expected = [start, *(first * FACTOR ** np.array([2.0, 1.0])), first, 0.5 * (first + 0.5)]
     np.testing.assert_allclose(fine.parameters[0][:5], expected, rtol=1e-12)
@@ -173,9 +173,9 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
 def test_pieces_move_with_the_places_of_the_changes() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     old = layered_partition(base, {0: [0.3]})
-    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]})
+    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]}, 1.0)
     np.testing.assert_allclose(moved.parameters[0], old.parameters[0] * 0.35 / 0.3, rtol=1e-12)
-    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]})
+    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]}, 1.0)
     np.testing.assert_allclose(anew.parameters[1], layered_partition(base, {0: [0.35, 0.6]}).parameters[1])
 
 
@@ -233,7 +233,7 @@ def test_layers_end_where_coordinates_do() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     partition = layered_partition(base, {})
     for _ in range(12):  # 36 layers would be 1e-26 long
-        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {})
+        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {}, 1.0)
         if len(partition.sides) > 2000:
             break
     assert partition.mesh.lengths.min() >= 0.9 * SHORTEST * partition.mesh.lengths.sum()
