@@ -75,6 +75,9 @@ def of_one_degree(
     spaces: Sequence[BoundarySpace], elements: IntArray
 ) -> Iterator[tuple[IntArray, tuple[BoundarySpace, ...]]]:
     """Yield those of some elements that have one degree in each of several spaces, and the spaces as they see them."""
+    if not any(isinstance(space, LagrangeSpace) and space.element_degrees is not None for space in spaces):
+        yield elements, tuple(spaces)
+        return
     kinds, group = np.unique([element_degrees(space)[elements] for space in spaces], axis=1, return_inverse=True)
     for number, degrees in enumerate(kinds.T.tolist()):
         seen = zip(spaces, degrees, strict=True)
