@@ -155,7 +155,7 @@ def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]
     matrices = [np.zeros((form.test.n_dofs, form.trial.n_dofs)) for form in forms]
     for targets, _ in found:
         for matrix, target in zip(matrices, targets, strict=True):
-            matrix[np.ix_(*target.vector_dofs)] += target.dofs_matrix()
+            target.add_to(matrix)
     return matrices, n_pairs
 
 
@@ -246,6 +246,16 @@ class _Target:
         components = np.arange(2)
         return (2 * self.test_nodes[:, None] + components).ravel(), (2 * self.trial_nodes[:, None] + components).ravel()
 
+    def add_to(self, matrix: FloatArray) -> None:
+        """Add the matrix to its places in the one of all dofs."""
+        own = self.dofs_matrix()
+        rows, columns = (_end_and_inner(dofs) for dofs in self.vector_dofs)
+        for (own_rows, to_rows), (own_columns, to_columns) in product(rows, columns):
+            if isinstance(to_rows, np.ndarray) and isinstance(to_columns, np.ndarray):
+                matrix[np.ix_(to_rows, to_columns)] += own[own_rows, own_columns]
+            else:
+                matrix[to_rows, to_columns] += own[own_rows, own_columns]
+
     def dofs_matrix(self) -> FloatArray:
         """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
         if self._form.test.mesh.symmetry is not None:
@@ -279,6 +289,15 @@ class _Target:
         for values, dofs in zip(gathered, self.test_dofs[rows].T, strict=True):
             for positions, nodes in consecutive_runs(dofs):
                 self.matrix[nodes] += values[positions]
+
+
+def _end_and_inner(dofs: IntArray) -> list[tuple[slice, slice | IntArray]]:
+    """Split ascending dofs into some and the last ones, which follow each other: positions and dofs.
+
+    In a space of several degrees the inner dofs of elements of one degree do, and slices need no index for each entry.
+    """
+    first = int(np.max(np.flatnonzero(np.diff(dofs) != 1), initial=-1)) + 1
+    return [(slice(first), dofs[:first]), (slice(first, None), slice(int(dofs[first]), int(dofs[-1]) + 1))]
 
 
 def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:

@@ -14,8 +14,17 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
-from bemkit.geometry.meshing.layers import has_same_pieces, is_at_end, layered_partition, origins, refined_partition
+from bemkit.geometry.meshing.layers import (
+    FACTOR,
+    SHORTEST,
+    has_same_pieces,
+    is_at_end,
+    layered_partition,
+    origins,
+    refined_partition,
+)
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.coefficient_decay import CoefficientErrors
 from bemkit.results.solution import Solution
@@ -67,10 +76,26 @@ class LayeredMeshes:
         errors = [self.error(solution) for solution in solutions if solution.coefficient_errors is not None]
         return len(errors) > FEWEST_LEVELS and min(errors[-2:]) > 0.5 * min(errors[:-2])
 
+    def _check_lengths(self, solution: Solution) -> None:
+        """Raise an error that names the place if the largest error is that of an element as short as can be."""
+        errors, mesh = solution.coefficient_errors, solution.mesh
+        if errors is None:
+            return
+        worst = int(np.argmax(self._share(solution, errors)))
+        if mesh.lengths[worst] < 2.0 / FACTOR * SHORTEST * mesh.lengths.sum():
+            x, y = mesh.centres[worst]
+            raise GeometryError(
+                f"the largest error stands at ({x:.6g}, {y:.6g}), where an element of the length "
+                f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
+            )
+
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return a mesh of the next degree, with more layers where that is not enough."""
         solution, partition = solutions[-1], level.partition
-        if self._is_stuck(solutions) or (level.number > 0 and solution.estimated_error is None):
+        if level.number > 0 and solution.estimated_error is None:
+            return None
+        if self._is_stuck(solutions):
+            self._check_lengths(solution)
             return None
         ends = zone_ends(solution)
         if level.number == 0 and len(solutions) < MOST_LOOKS and len(ends) < len(solution.transitions):

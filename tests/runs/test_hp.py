@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, origins, refined_partition
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.hp import LayeredMeshes
@@ -179,6 +179,31 @@ def test_pieces_move_with_the_places_of_the_changes() -> None:
     np.testing.assert_allclose(anew.parameters[1], layered_partition(base, {0: [0.35, 0.6]}).parameters[1])
 
 
+def test_layers_follow_places_that_move() -> None:
+    """Down to a tenth of the motion on both sides of the place, and no further than the resolution."""
+    base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
+    old = layered_partition(base, {0: [0.3]})
+    for resolution, longest in ((1e-6, 0.1 * 1e-3), (0.01, 0.01 * 0.7)):
+        moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.301]}, resolution)
+        beside = [moved.parameters[0][-1] - moved.parameters[0][-2], moved.parameters[1][1] - moved.parameters[1][0]]
+        assert max(beside) <= longest
+        assert min(beside) >= FACTOR**2 * longest
+        elements, layers = origins(old, moved)
+        assert elements[len(moved.parameters[0]) - 2] == len(old.parameters[0]) - 2
+        np.testing.assert_allclose(layers[:1], 0.0, atol=1e-12)
+        assert layers.max() > 0.8
+
+
+def test_free_elements_gain_by_degrees() -> None:
+    """Their tractions are round-off, which does not fall, and say nothing of their error."""
+    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) == 5)
+    errors, loaded = solution.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
+    assert errors is not None
+    free = np.setdiff1d(np.arange(solution.mesh.n_elements), loaded)
+    assert free.size > 5
+    assert np.median(errors.energy_decay[free]) < 0.6
+
+
 def test_curves_turn_little_on_an_element() -> None:
     mesh = layered_partition(divide(bk.Disk(1.0).outline(), {}), {}).mesh
     assert mesh.lengths.max() <= np.pi / 4.0 + 1e-12
@@ -227,6 +252,16 @@ def test_elements_of_high_degree_are_judged_without_neighbours() -> None:
     assert any("no error can be estimated" in warning for warning in low.warnings)
     assert high.warnings == ()
     assert high.estimated_error is not None
+
+
+@pytest.mark.slow
+def test_a_pressure_without_bound_is_named() -> None:
+    """Beside a sheared side pressures grow like a logarithm: its tail in L2 is the root of the length of an element."""
+    *_, last = risen("clamped-angle", 1e-6)
+    assert last.status is bk.Status.ACCURACY_NOT_REACHED
+    assert "the largest error stands at (1, 0), where an element of the length" in last.message
+    assert last.estimated_traction_error is not None
+    assert last.estimated_traction_error <= 2e-5
 
 
 def test_layers_end_where_coordinates_do() -> None:
