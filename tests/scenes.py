@@ -14,6 +14,7 @@ import numpy as np
 
 import bemkit as bk
 from bemkit.geometry.curves import Arc, Segment
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model.prepared import prepare
 
@@ -116,14 +117,15 @@ def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
     scene, mesh = solution.scene, solution.mesh
     for _ in range(n_bisections):
         mesh = mesh.refined(np.arange(mesh.n_elements))
-    fine = bk.run(scene, mesh=mesh).boundary.displacement
-    space, fine_space = (scene.discretisation.displacement_space(m) for m in (solution.mesh, mesh))
+    space = scene.discretisation.displacement_space(solution.mesh)
+    scene = dataclasses.replace(scene, discretisation=bk.Galerkin(space.degree))
+    fine, fine_space = bk.run(scene, mesh=mesh).boundary.displacement, scene.discretisation.displacement_space(mesh)
     n_parts = 2**n_bisections
     own = np.arange(mesh.n_elements)
     xi = (2.0 * (own % n_parts)[:, None] + 1.0 + fine_space.local_nodes) / n_parts - 1.0
     inherited = np.empty_like(fine)
     for local, dofs in enumerate(fine_space.element_dofs.T):
-        at_dofs = solution.boundary.displacement[space.element_dofs[own // n_parts]]
+        at_dofs = values_on_elements(space, solution.boundary.displacement, own // n_parts)
         inherited[dofs] = np.einsum("pe,epc->ec", space.basis(xi[:, local]), at_dofs)
     prepared = prepare(scene, mesh)
     tractions = scene.discretisation.traction_space(mesh.unit)

@@ -18,6 +18,7 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
+from bemkit.geometry.local_values import element_degrees, from_own_nodes
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import dof_points
@@ -219,6 +220,7 @@ class Model:
         for part, elements, _ in parts_on(self.scene, self.mesh):
             if isinstance(part.condition, Contact):
                 at_nodes = tractions[self._rows_of(part.name, elements)]
+                at_nodes = from_own_nodes(space, at_nodes, elements)
                 traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes)
 
     def _rows_of(self, part: str, elements: IntArray) -> IntArray:
@@ -232,8 +234,9 @@ class Model:
         for rows in (np.flatnonzero(~own), np.flatnonzero(own)):
             row[self.nodes.nodes[rows]] = rows
         found = row[self.prepared.space.element_dofs[elements]]
-        for end, following in ((0, 1), (-1, -2)) if self.prepared.space.degree else ():
-            there, beside = found[:, end], found[:, following]
+        everywhere, last = np.arange(elements.size), element_degrees(self.prepared.space)[elements] - 1
+        for end, following in ((0, 1), (-1, last)) if self.prepared.space.degree else ():
+            there, beside = found[:, end], found[everywhere, following]
             turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
             found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
         return found

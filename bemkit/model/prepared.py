@@ -18,7 +18,7 @@ from bemkit.contact.condensation.nodes import contact_conditions, free_motions
 from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.model.particular import particular_solution, stress_of
@@ -164,7 +164,7 @@ def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundaryS
         condition = part.condition
         axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
         if isinstance(condition, Roller):
-            normals = mesh.normals_at(elements, space.local_nodes)
+            normals = mesh.normals_at(elements, element_nodes(space)[elements])
             result.append(Support(part.name, elements, normals[:, :, None, :]))
         elif isinstance(condition, Clamped):
             result.append(Support(part.name, elements, axes))

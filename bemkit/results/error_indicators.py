@@ -17,10 +17,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.reflection import reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, break_nodes, dof_points
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.contact_table import ContactTable, Transition
 
@@ -300,7 +302,7 @@ def _end_slopes(space: BoundarySpace, displacement: FloatArray) -> tuple[FloatAr
     """Return du/ds (n_elements, 2) at the start and at the end of each element."""
     mesh = space.mesh
     ends = np.array([-1.0, 1.0])
-    slopes = np.einsum("pq,epc->eqc", _derivative(space, ends), displacement[space.element_dofs])
+    slopes = np.einsum("pq,epc->eqc", _derivative(space, ends), values_on_elements(space, displacement))
     slopes /= mesh.jacobian(np.arange(mesh.n_elements), ends)[:, :, None]
     return slopes[:, 0], slopes[:, 1]
 

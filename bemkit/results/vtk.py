@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.operators.material import Plane
 from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
@@ -61,7 +62,8 @@ def _boundary(body: Solution | BodyResult, number: int) -> Block:
     n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
     xi = np.linspace(-1.0, 1.0, n_points)
     points = mesh.points(np.arange(mesh.n_elements), xi).reshape(-1, 2)
-    values = np.einsum("pq,epc->eqc", space.basis(xi), body.boundary.displacement[space.element_dofs]).reshape(-1, 2)
+    at_nodes = values_on_elements(space, body.boundary.displacement)
+    values = np.einsum("pq,epc->eqc", space.basis(xi), at_nodes).reshape(-1, 2)
     start = (n_points * np.arange(mesh.n_elements)[:, None] + np.arange(n_points - 1)).ravel()
     traction = in_space(np.repeat(body.boundary.traction, n_points - 1, axis=0))
     of_body = np.full(len(start), float(number))

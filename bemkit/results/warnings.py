@@ -8,8 +8,9 @@ from itertools import chain
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import break_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.assembly_solution import AssemblySolution
@@ -162,7 +163,7 @@ def boundary_gradients(body: SolvedBody) -> tuple[FloatArray, FloatArray]:
     mesh, displacement = body.mesh, body.boundary.displacement
     space = body.scene.discretisation.displacement_space(mesh)
     if space.degree > 0:
-        at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+        at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), values_on_elements(space, displacement))
         return norms(at_ends[:, 1] - at_ends[:, 0]) / mesh.lengths, mesh.lengths
     before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
     lengths = 0.5 * (mesh.lengths[before] + mesh.lengths[after])

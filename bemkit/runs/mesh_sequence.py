@@ -28,16 +28,20 @@ class Level:
     partition : Partition
     number : int
         Which of the discretisations that follow each other; see `Discretisation.at_level`.
+    degrees : tuple of int
+        Of each element, where they are lower than those of that discretisation.
     """
 
     asked: Scene
     partition: Partition
     number: int = 0
+    degrees: tuple[int, ...] = ()
 
     @cached_property
     def scene(self) -> Scene:
         """The scene with the discretisation of this level."""
-        return replace(self.asked, discretisation=self.asked.discretisation.at_level(self.number))
+        discretisation = self.asked.discretisation.at_level(self.number)
+        return replace(self.asked, discretisation=discretisation.with_degrees(self.degrees))
 
     @property
     def n_elements(self) -> int:

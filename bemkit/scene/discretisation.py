@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import (
-    LARGEST_DEGREE,
-    BoundarySpace,
-    ConstantSpace,
-    LagrangeSpace,
-    break_nodes,
-    check_degree,
-)
+from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
@@ -62,11 +61,19 @@ class Discretisation(Protocol):
         """Whether it makes no sense without meshes that follow an accuracy."""
         return False
 
+    def of_images(self, n_images: int) -> Discretisation:
+        """Return what it is on the whole body, of which a mesh with a symmetry is one of so many images."""
+        return self
+
     def at_level(self, number: int) -> Discretisation:
         """Return what to use on a mesh of those that follow an accuracy; the first one has the `number` 0.
 
         Where the number may be skipped, the discretisations should be ever better ones.
         """
+        return self
+
+    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
+        """Return it with the degrees of each element that a mesh has; itself unless they may differ."""
         return self
 
     @abstractmethod
@@ -157,35 +164,57 @@ class Galerkin(SymmetricGalerkin):
 
     Parameters
     ----------
-    degree : int
-        p, from 1 to 12. High degrees pay on smooth fields, and on meshes whose elements become shorter towards corners
-        and towards places where contact changes, which an accuracy makes.
+    degree : int or sequence of int
+        p, from 1 to 12, of all elements or of each one. High degrees pay on smooth fields, and on meshes whose elements
+        become shorter towards corners and towards places where contact changes, which an accuracy makes. Where degrees
+        differ, elements share the node between them, and tractions are of degree 1 where displacements are.
 
     Raises
     ------
     GeometryError
-        If the degree is no whole number from 1 to 12.
+        If a degree is no whole number from 1 to 12; on a mesh, if there is not one for each element.
     """
 
-    degree: int
+    degree: int | tuple[int, ...]
 
     def __post_init__(self) -> None:
-        check_degree(self.degree)
+        if isinstance(self.degree, Sequence) and not isinstance(self.degree, str):
+            if not self.degree:
+                raise GeometryError("degree has no entries: give one whole number, or one for each element")
+            object.__setattr__(self, "degree", tuple(self.degree))
+        for degree in self._degrees:
+            check_degree(degree)
+
+    @property
+    def _degrees(self) -> tuple[int, ...]:
+        """The degrees given."""
+        return self.degree if isinstance(self.degree, tuple) else (self.degree,)
+
+    @property
+    def largest_degree(self) -> int:
+        """The largest degree of an element."""
+        return max(self._degrees)
 
     @property
     def method(self) -> str:
         """Galerkin, and from degree 3 on which."""
-        return "Galerkin" if self.degree <= 2 else f"Galerkin of degree {self.degree}"
+        if min(self._degrees) < self.largest_degree:
+            return f"Galerkin of degrees {min(self._degrees)} to {self.largest_degree}"
+        return "Galerkin" if self.largest_degree <= 2 else f"Galerkin of degree {self.largest_degree}"
 
     @property
     def estimates_error(self) -> bool:
-        """True."""
-        return True
+        """True but for elements of degree 1 among others, on which nothing tells it."""
+        return len(set(self._degrees)) == 1 or min(self._degrees) > 1
 
     @property
     def takes_layers(self) -> bool:
         """From degree 3 on."""
-        return self.degree > 2
+        return self.largest_degree > 2
+
+    def of_images(self, n_images: int) -> Discretisation:
+        """Return the degrees of all elements, if there is one for each."""
+        return replace(self, degree=self.degree * n_images) if isinstance(self.degree, tuple) else self
 
     def at_level(self, number: int) -> Discretisation:
         """Return quadratic elements for the first look of a higher degree, later itself."""
@@ -198,13 +227,27 @@ class Galerkin(SymmetricGalerkin):
         """
         if mesh.surface is not None:
             return ConstantSpace(mesh)
-        return LagrangeSpace(mesh, degree=self.degree)
+        return LagrangeSpace(mesh, degree=self.largest_degree, element_degrees=self._on(mesh))
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
-        if self.degree == 1:
+        if self.largest_degree == 1:
             return ConstantSpace(mesh)
-        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.degree - 1)
+        degrees = self._on(mesh)
+        own = None if degrees is None else np.maximum(degrees - 1, 1)
+        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.largest_degree - 1, element_degrees=own)
+
+    def _on(self, mesh: BoundaryMesh) -> IntArray | None:
+        """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""
+        if not isinstance(self.degree, tuple):
+            return None
+        degrees, n_own = np.array(self.degree), mesh.n_elements
+        if degrees.size != n_own:
+            raise GeometryError(
+                f"degree has {degrees.size} entries, but the mesh has {n_own} elements: give one degree for each "
+                "element, or a single one"
+            )
+        return None if (degrees == degrees[0]).all() else degrees
 
 
 @dataclass(frozen=True)
@@ -236,7 +279,7 @@ class HpGalerkin(Galerkin):
         If the degree is no whole number from 1 to 12.
     """
 
-    degree: int = field(default=2, repr=False)
+    degree: int | tuple[int, ...] = field(default=2, repr=False)
 
     @property
     def takes_layers(self) -> bool:
@@ -251,6 +294,10 @@ class HpGalerkin(Galerkin):
     def at_level(self, number: int) -> Discretisation:
         """Return the degree 2 for the first look, and a degree more for each number."""
         return HpGalerkin(min(2 + number, LARGEST_DEGREE))
+
+    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
+        """Return the degrees themselves, if there are any."""
+        return HpGalerkin(degrees) if degrees else self
 
 
 @dataclass(frozen=True)

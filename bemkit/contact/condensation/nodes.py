@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
 APPROACH_TOLERANCE = 1e-3
@@ -93,7 +93,7 @@ def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatA
     """
     dofs = space.element_dofs[elements]
     order = dofs.ravel()[np.sort(np.unique(dofs.ravel(), return_index=True)[1])]
-    local_normals = space.mesh.normals_at(elements, space.local_nodes)
+    local_normals = space.mesh.normals_at(elements, element_nodes(space)[elements])
     normals = np.zeros((space.n_dofs // 2, 2))
     np.add.at(normals, dofs, local_normals * space.mesh.lengths[elements][:, None, None])
     normals /= np.maximum(np.hypot(*normals.T), np.finfo(float).tiny)[:, None]

@@ -13,10 +13,11 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.errors import InputError
+from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.grading import Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Rectangle
-from bemkit.geometry.spaces import ConstantSpace, break_nodes
+from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
 from bemkit.operators.material import Material
 from bemkit.results.solution import Solution

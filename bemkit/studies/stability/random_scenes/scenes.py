@@ -132,7 +132,7 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
     if discretisation.estimates_error and draw.chance(0.04):
         return MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 100)))
     low, high = draw.one_by_weight({(3, 9): 0.08, (10, 40): 0.67, (41, 80): 0.2, (81, 160): 0.05})
-    if isinstance(discretisation, Galerkin) and discretisation.degree > 2:
+    if isinstance(discretisation, Galerkin) and discretisation.takes_layers:
         low, high = 3, 30  # of many nodes each
     gradings: dict[Grading, float] = {
         Uniform(): 6.0,
