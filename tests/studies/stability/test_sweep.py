@@ -139,12 +139,6 @@ def test_a_scene_without_a_solution_is_no_baseline() -> None:
         list(sweep(scene, AXES))
 
 
-@pytest.mark.parametrize("name", ["cylinder-on-half-plane", "rough-surface"])
-def test_half_planes_are_refused(name: str) -> None:
-    with pytest.raises(StabilityError, match=r"the body is a half-plane, .*: give a block around it"):
-        list(sweep(bk.load_scene(name), AXES))
-
-
 def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
     row = StabilityRecord("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")
