@@ -40,8 +40,11 @@ def sweep(
     Raises
     ------
     StabilityError
-        If the scene itself has no converged solution, or no contact, or an axis says nothing of it.
+        If the scene itself has no converged solution, or no contact, or several load steps, or an axis says nothing of
+        it.
     """
+    if scene.n_steps > 1:
+        raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
     if not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     for axis in axes:

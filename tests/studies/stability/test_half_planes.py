@@ -13,7 +13,7 @@ from bemkit.geometry.grading import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.scene.transform import with_turned_loads
 from bemkit.studies.stability.axes import AXES, Similarity, find_axes
-from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
+from bemkit.studies.stability.independent_check import IndependentCheck, check_assembly, check_solution
 from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.nodes import Fields
 from bemkit.studies.stability.sweep import TWIN, StabilityError, difference, solve_and_judge, sweep
@@ -180,3 +180,20 @@ def test_a_half_plane_is_pushed_to_the_edge_of_sliding() -> None:
     for value, verdict in ((0.5, "right"), (0.9999, "right"), (1.01, "named")):
         case = axis.make(baseline, value)
         assert solve_and_judge("sliding", case, None).verdict == verdict
+
+
+def test_a_half_plane_among_several_bodies_is_checked_too() -> None:
+    press = bk.Part("top", bk.Traction(0.0, -1e-3), sides=("top",))
+    material = bk.Material(1.0, 0.3)
+    base = bk.Body(name="base", shape=bk.HalfPlaneBody(-2.0, 2.0), material=material, parts=(), mesh=bk.MeshOptions(30))
+    shape = bk.Rectangle(1.0, 0.5, (-0.4, 0.0))
+    block = bk.Body(name="block", shape=shape, material=material, parts=(press,), mesh=bk.MeshOptions(40))
+    contacts = (bk.ContactPair(("block.bottom", "base.surface")),)
+    solution = bk.run(bk.Assembly(title="block", bodies=(base, block), contacts=contacts, law=bk.Coulomb(0.5)))
+    assert check_assembly(solution).worst <= 1e-11
+    result = solution.bodies["base"]
+    displacement = result.boundary.displacement.copy()
+    displacement[3, 1] *= 1.001  # away from contact, where nothing else looks
+    moved = replace(result, boundary=replace(result.boundary, displacement=displacement))
+    seen = check_assembly(replace(solution, bodies={**solution.bodies, "base": moved}))
+    assert seen.faults == ("elasticity",)
