@@ -89,17 +89,19 @@ def _sweep(
         from bemkit.scene.toml import load_single_body, scene_to_toml, with_overrides
         from bemkit.studies.stability.axes import find_axes
         from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
-        from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_verdicts
+        from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_left_out, print_verdicts
         from bemkit.studies.stability.sweep import sweep
 
-        axes = find_axes(axis)
+        chosen = with_overrides(load_single_body(scene or "paper-1"), elements=elements, discretisation=discretisation)
+        every = find_axes(axis)
+        # an axis that is asked for by its name is refused by the sweep
+        axes = every if axis else tuple(each for each in every if not each.reason_against(chosen))
         texts = (
             TextFile(csv, "CSV file of stability rows", CSV_START, to_csv),
             TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),
         )
         outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
         reserve(outputs.check(FILE.check(output)))
-        chosen = with_overrides(load_single_body(scene or "paper-1"), elements=elements, discretisation=discretisation)
         shows_tables = not quiet and not outputs.uses_stdout
         labels = {"scene": scene_to_toml(chosen) if output else ""}
         finished = FILE.finished(output, labels)
@@ -116,5 +118,6 @@ def _sweep(
         records = list(sweep(chosen, axes, run_axis))
     outputs.write(records)
     if shows_tables:
+        print_left_out({each.name: each.reason_against(chosen) for each in every if each not in axes})
         print_verdicts(records)
     return int(any(record.verdict == "wrong" for record in records))

@@ -13,9 +13,12 @@ from bemkit.operators.counts import Entries, Factorisation, FactorKind, Operatio
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.flexibility import strip_flexibility
 from bemkit.operators.half_plane.surface import SurfaceElasticity
-from bemkit.operators.linear.dense import Cholesky
+from bemkit.operators.linear.dense import Cholesky, SingularMatrixError
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
+
+_ROUND_OFF = 1e-10
+"""Share of a motion that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +61,17 @@ def half_plane_work(n_elements: int, n_acting: int) -> OperationCounts:
     )
 
 
+def _check_resisted(motions: FloatArray, drive: FarDrive) -> None:
+    """Refuse loads far away that drive a motion which no direction (n_acting, 3) resists, and a turn about one node."""
+    driven = motions[:, list(drive.driven)]
+    if np.linalg.matrix_rank(driven, _ROUND_OFF * max(float(np.abs(driven).max(initial=0.0)), 1.0)) < len(drive.driven):
+        loads = " and ".join(f"far.{('force_x', 'force_y', 'moment')[k]}" for k in drive.driven)
+        raise SingularMatrixError(
+            f"{loads} drive the half-plane along a motion that its {len(motions)} directions in contact or held leave "
+            "free: give the motion instead of the load, or more elements in contact"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class _Condensation:
     """A half-plane whose forces on some directions are unknown.
@@ -94,6 +108,7 @@ class _Condensation:
         flexibility = rotate_rows(rotate_columns(elastic.flexibility, frame), frame)
         motions = np.einsum("nkc,ncm->nkm", frame, elastic.drive.motions_at(dof_points(elastic.displacement_space)))
         acting = np.flatnonzero(~conditions.is_free)
+        _check_resisted(motions.reshape(-1, 3)[acting], elastic.drive)
         retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
         stiffness = np.zeros((0, 0))
         if acting.size:

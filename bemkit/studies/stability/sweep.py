@@ -17,7 +17,7 @@ from bemkit.runs.run import run
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis, Case, Similarity
-from bemkit.studies.stability.independent_check import check_solution
+from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
@@ -40,12 +40,16 @@ def sweep(
     Raises
     ------
     StabilityError
-        If the scene itself has no converged solution, or no contact, or its body is a half-plane.
+        If the scene itself has no converged solution, or no contact, or several load steps, or an axis says nothing of
+        it.
     """
-    if scene.far is not None:
-        raise StabilityError("the body is a half-plane, which this suite cannot judge yet: give a block around it")
+    if scene.n_steps > 1:
+        raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
     if not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
+    for axis in axes:
+        if reason := axis.reason_against(scene):
+            raise StabilityError(f"axis {axis.name!r} says nothing of this scene: {reason}: leave it out")
     baseline = attempt(lambda: run(scene))
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
@@ -79,7 +83,7 @@ def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> Stabil
             drift = difference(reference, solution, case.similarity)
         if second.solution is not None:
             twin = difference(solution, second.solution, TWIN, in_mean=case.levels > 0)
-    verdict, objection = _judge(case, reference, first, second, drift, twin)
+    verdict, objection = _judge(case, reference, first, second, check, drift, twin)
     return StabilityRecord(
         axis=axis,
         value=case.value,
@@ -175,17 +179,17 @@ def _judge(
     reference: Solution | None,
     first: Attempt[Solution],
     second: Attempt[Solution],
+    check: IndependentCheck | None,
     drift: float,
     twin: float,
 ) -> tuple[Verdict, str]:
     """Return the verdict and what speaks against the record, if anything does."""
     if first.status != second.status:
         return Verdict.WRONG, f"{first.status}, but its similar twin: {second.status} ({second.message})"
-    if not first.is_converged or first.solution is None or second.solution is None:
+    if not first.is_converged or first.solution is None or second.solution is None or check is None:
         if case.is_solvable or case.keeps_steps:
             return Verdict.WRONG, f"solvable, but: {first.message}"
         return Verdict.NAMED, ""
-    check, other = check_solution(first.solution), check_solution(second.solution)
     objections = {
         "no solution exists": case.is_solvable is False,
         f"the independent check finds {check.worst:.1e}": not check.is_good,
@@ -195,8 +199,8 @@ def _judge(
         objections["other active sets"] = not np.array_equal(first.solution.contact.status, reference.contact.status)
         objections["other linear solves"] = first.solution.linear_solves != reference.linear_solves
     differs = not twin <= case.precision
-    is_free = math.isinf(case.drift_limit) and other.is_good
-    objections["the similar twin differs"] = differs and not is_free
+    is_another = differs and math.isinf(case.drift_limit) and check_solution(second.solution).is_good
+    objections["the similar twin differs"] = differs and not is_another
     found = [text for text, speaks_against in objections.items() if speaks_against]
     if found:
         return Verdict.WRONG, "; ".join(found)

@@ -37,6 +37,8 @@ class AssemblyCheck(Entries):
         Resultant of loads, contacts and forces inside on each body, along free translations.
     negative_energy, energy : float
         Elastic energy of a body below zero; of all against half the work of loads and of contacts.
+    elasticity : float
+        Of half-planes, see `IndependentCheck`.
     reciprocity, coarseness, hidden_overlap
         See `Entries`: the worst of the bodies, the moments on them among them; how deep points between nodes are in
         the partner, over the displacement that strains the body.
@@ -56,6 +58,7 @@ class AssemblyCheck(Entries):
     equilibrium: float
     negative_energy: float
     energy: float
+    elasticity: float
 
     @property
     def needs_warning(self) -> str:
@@ -93,6 +96,7 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
         equilibrium=largest_imbalance(joints),
         negative_energy=max(body.negative_energy() for body in bodies),
         energy=energy_mismatch(joints),
+        elasticity=max(body.elasticity() for body in bodies),
         reciprocity=max(max(body.reciprocity(), body.moment()) for body in bodies),
         coarseness=max(body.coarseness for body in bodies),
         hidden_overlap=hidden_overlap(joints),
