@@ -13,7 +13,6 @@ import pytest
 from rich.console import Console
 
 import bemkit as bk
-from bemkit.cli import verify as command
 from bemkit.cli.main import main
 from bemkit.hdf5 import ResultFileError
 from bemkit.studies.engine import Task, compute
@@ -84,7 +83,7 @@ WRONG = {
 def test_a_row_made_wrong_is_missed(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(command, "verify_cases", partial(verify, cases=WRONG))
+    monkeypatch.setattr(module, "verify", partial(verify, cases=WRONG))
     with pytest.raises(SystemExit) as caught:
         main(["verify", name, "--quick"])
     assert caught.value.code == 1
