@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 _Row = TypeVar("_Row", ContactForce, RigidResult)
 _FIELDS = ("displacement", "traction", "traction_dofs")
+_PLACES = ("part", "x", "y", "s", "from", "to")
+_OF_ASSEMBLIES = ("friction_bound", "directions", "contacts", "rigid")
 
 
 def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
@@ -82,15 +84,15 @@ def read_ends(
     """
     n = len(tables)
     rows = rows_of(reader.table("steps/certificate", floats=CERTIFICATE_ENTRIES))
-    moves = rows_of(
-        reader.table("steps/transitions", texts=("part", "from", "to"), floats=("x", "y", "s"), integers=("step",))
-    )
+    transitions = _read_transitions(reader, n)
     bodies = [_read_body(reader, f"steps/bodies/{number}", body, n) for number, body in enumerate(_bodies(last))]
     if len(rows) != n:
         raise InputError(f"{len(rows)} certificates for {n} steps")
     if isinstance(asked, Assembly) != isinstance(last, AssemblySolution):
         raise InputError("the steps are not those of the result")
     scenes: Sequence[Any] = _loads(asked)
+    names = _OF_ASSEMBLIES if isinstance(last, AssemblySolution) else ()
+    columns = {name: reader.floats(f"steps/{name}") for name in names}
     ends: list[Solution | AssemblySolution] = []
     for k, (scene, table, row) in enumerate(zip(scenes[:n], tables, rows, strict=True)):
         own: dict[str, Any] = {
@@ -98,11 +100,7 @@ def read_ends(
             "message": Status.CONVERGED.value,
             "certificate": Certificate(**row),
             "contact": table,
-            "transitions": tuple(
-                Transition(at["part"], at["x"], at["y"], at["s"], at["from"], at["to"])
-                for at in moves
-                if at["step"] == k
-            ),
+            "transitions": transitions[k],
             "loading": None,
         }
         if isinstance(last, Solution):
@@ -111,21 +109,21 @@ def read_ends(
             own["force_tangential"] = float(np.sum(table.weight * table.sigma_t))
             ends.append(replace(last, scene=scene, **own))
         else:
-            ends.append(_assembly_end(reader, last, scene, [body[k] for body in bodies], k, own))
+            numbers = {name: column[k] for name, column in columns.items()}
+            ends.append(_assembly_end(last, scene, [body[k] for body in bodies], numbers, own))
     return ends
 
 
 def _assembly_end(
-    reader: Reader,
     last: AssemblySolution,
     step: Assembly,
     bodies: Sequence[tuple[BoundaryFields, float]],
-    k: int,
+    numbers: Mapping[str, FloatArray],
     common: dict[str, Any],
 ) -> AssemblySolution:
     assembly = step.with_contacts(last.assembly.contacts) if step.touching else step
     scenes = {body.name: assembly.scene_of(body) for body in assembly.placed_bodies}
-    bound = reader.floats("steps/friction_bound")[k]
+    bound = numbers["friction_bound"]
     contact_names = [own.name for own in last.contacts]
     return replace(
         last,
@@ -134,12 +132,19 @@ def _assembly_end(
             name: replace(body, scene=scenes[name], boundary=boundary, energy=energy)
             for (name, body), (boundary, energy) in zip(last.bodies.items(), bodies, strict=True)
         },
-        contact_directions=reader.floats("steps/directions")[k].reshape(-1, 2).copy(),
+        contact_directions=numbers["directions"].reshape(-1, 2).copy(),
         friction_bound=None if np.isnan(bound).all() else bound.copy(),
-        contacts=tuple(_rows(reader.floats("steps/contacts")[k], contact_names, ContactForce)),
-        rigid={own.name: own for own in _rows(reader.floats("steps/rigid")[k], last.rigid, RigidResult)},
+        contacts=tuple(_rows(numbers["contacts"], contact_names, ContactForce)),
+        rigid={own.name: own for own in _rows(numbers["rigid"], last.rigid, RigidResult)},
         **common,
     )
+
+
+def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ...]]:
+    """Return the places of change of each step."""
+    table = reader.table("steps/transitions", texts=("part", "from", "to"), floats=("x", "y", "s"), integers=("step",))
+    rows = [(row["step"], Transition(*(row[name] for name in _PLACES))) for row in rows_of(table)]
+    return [tuple(each for step, each in rows if step == k) for k in range(n_steps)]
 
 
 def _read_body(
