@@ -18,7 +18,7 @@ from bemkit.pictures.contact_traction import draw_contact_traction
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.friction_cone import draw_friction_cone
-from bemkit.pictures.load_history import draw_friction_loop, draw_work
+from bemkit.pictures.load_history import draw_friction_loop, draw_work, has_friction
 from bemkit.pictures.shown import Result
 from bemkit.pictures.status_over_time import draw_status_over_time
 from bemkit.pictures.stress import STRESSES, draw_stress
@@ -197,7 +197,13 @@ _ALL = (
     ),
     Picture("scene", "bodies, supports, loads and obstacles alone", _once(draw_scene), _possible, _never),
     Picture("convergence", "violations over the solver's steps", _once(draw_convergence), _possible, _never),
-    Picture("friction-loop", "friction over displacement", _once(draw_friction_loop), _without_history, _always),
+    Picture(
+        "friction-loop",
+        "friction over displacement",
+        _once(draw_friction_loop),
+        _without_history,
+        lambda result: result.loading is not None and has_friction(result.loading),
+    ),
     Picture("work", "work and energy over time", _once(draw_work), _without_history, _always),
     Picture(
         "status-over-time",

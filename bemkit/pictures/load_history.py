@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+_NO_FRICTION = 1e-9
+"""Friction over pressing force that round-off explains."""
+
+
 def history_of(solution: Result) -> LoadHistory:
     """Return the load history of a result; InputError without one."""
     if solution.loading is None:
@@ -53,7 +57,14 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     axes.margins(0.08)
     show_grid(axes)
     ignore_round_off(axes, max(float(np.abs(forces).max()), *(abs(step.force_normal) for step in loading.steps)))
+    moved = max(float(np.abs([step.contact.u_n, step.contact.u_t]).max(initial=0.0)) for step in loading.steps)
+    ignore_round_off(axes, moved, "x")
     return axes
+
+
+def has_friction(loading: LoadHistory) -> bool:
+    """Tell whether friction forces are more than round-off in any step."""
+    return any(abs(step.force_tangential) > _NO_FRICTION * abs(step.force_normal) for step in loading.steps)
 
 
 def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:

@@ -5,7 +5,7 @@ Drawn with matplotlib's object interface, so that no display and no global state
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +41,7 @@ def label_values(axes: Axes, name: str, scale: float = 0.0) -> None:
     axes.legend(frameon=False)
 
 
-def ignore_round_off(axes: Axes, scale: float) -> None:
+def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") -> None:
     """Widen the range of values where they do not vary but by round-off, so that these lines are flat.
 
     Parameters
@@ -49,12 +49,15 @@ def ignore_round_off(axes: Axes, scale: float) -> None:
     axes : Axes
     scale : float
         Size of the quantity where it matters: the largest value of the whole result, say.
+    axis : {"x", "y"}
+        Along which the values stand.
     """
-    low, high = axes.get_ylim()
+    low, high = axes.get_ylim() if axis == "y" else axes.get_xlim()
     if high - low < _NOISE * scale:
         middle = 0.5 * (low + high)
-        axes.set_ylim(middle - _FLAT * scale, middle + _FLAT * scale)
-    axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True, useOffset=False)
+        flat = middle - _FLAT * scale, middle + _FLAT * scale
+        _ = axes.set_ylim(flat) if axis == "y" else axes.set_xlim(flat)
+    axes.ticklabel_format(axis=axis, scilimits=(-2, 3), useMathText=True, useOffset=False)
 
 
 def legend_below(axes: Axes, n_columns: int = 3) -> None:

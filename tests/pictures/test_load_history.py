@@ -15,6 +15,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure
 
 from bemkit.pictures import draw_friction_loop, draw_status_over_time, draw_work, figures
+from bemkit.pictures.catalogue import default_pictures
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 UNITS = bk.UnitNames(length="mm", stress="MPa")
@@ -39,6 +40,19 @@ def test_the_loop_begins_at_rest_and_passes_through_all_steps(solution: bk.Solut
     np.testing.assert_array_equal(line.get_ydata(), expected)
     assert axes.get_xlabel() == "mean tangential displacement [mm]"
     assert axes.get_ylabel().startswith("friction force on the body [")
+
+
+def test_a_history_without_friction_has_no_loop_unless_it_is_asked_for_and_no_round_off_in_it() -> None:
+    law = bk.Frictionless()
+    still = replace(LOOP, law=law, steps=(LOOP.steps[0],))
+    result = bk.run(still)
+    assert result.loading is not None
+    names = [picture.name for picture in default_pictures(result)]
+    assert "friction-loop" not in names
+    assert "work" in names
+    axes = draw_friction_loop(result, Figure().add_subplot())
+    assert np.ptp(axes.get_xlim()) > 1e-3 * np.abs(result.contact.u_t).max()
+    assert np.ptp(axes.get_ylim()) > 1e-3 * result.force_normal
 
 
 def test_work_is_drawn_as_it_adds_up(solution: bk.Solution, loading: LoadHistory) -> None:
