@@ -23,7 +23,7 @@ _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
 _UNEVEN = 10.0
 """Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
-_FIRST_GUESS, _GROWTH = 100, 1.3
+_FIRST_GUESS, _GROWTH = 90, 1.25
 """Guesses of ranks: of a leaf, and from one level to the next."""
 
 

@@ -16,7 +16,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 
 _SPARE = 10
-"""Random rows beyond the rank; with fewer of them a decomposition is made anew from more."""
+"""Random rows beyond the rank and a quarter of it; with fewer of them a decomposition is made anew from more."""
+_SKETCHED = 0.3
+"""Tolerance of a sketch by that asked for: random combinations know what is left out to such a factor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,15 +121,15 @@ def sketched(
     """
     m, n = matrix.shape
     while True:
-        n_rows = m if guess is None else guess + _SPARE
+        n_rows = m if guess is None else guess + guess // 3 + _SPARE
         if guess is None or n_rows >= min(m, 2 * n):
             guess = None
             sketch = (matrix * row_weights[:, None]) * column_sizes
         else:
             random = _random(_power_of_two(n_rows), _power_of_two(m))[:n_rows, :m]
             sketch = ((random * row_weights) @ matrix) * column_sizes
-        result = interpolative(sketch, tolerance)
-        if guess is None or result.skeleton.size + _SPARE <= n_rows:
+        result = interpolative(sketch, tolerance if guess is None else _SKETCHED * tolerance)
+        if guess is None or result.skeleton.size + result.skeleton.size // 4 + _SPARE <= n_rows:
             return result.scaled(column_sizes)
         guess *= 2
 

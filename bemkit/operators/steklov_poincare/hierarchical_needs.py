@@ -121,7 +121,7 @@ def _kernels(case: BodyCase, options: Hierarchical) -> PlanItem:
     """Say which kernels are used, and what the others would cost."""
     is_compiled = compiled.functions() is not None
     here, there = (_seconds(_needs(case, options, is_compiled=each)) for each in (is_compiled, not is_compiled))
-    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.2g} s instead of {here:.2g} s"
+    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
     return PlanItem("compiled kernels (numba)", is_compiled, f"{compiled.why()}; {others}")
 
 

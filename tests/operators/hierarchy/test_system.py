@@ -7,7 +7,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
-from bemkit.operators.hierarchy.factor import ElementLaws, SingularClusterError
+from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
@@ -172,3 +172,24 @@ def test_a_leaf_that_becomes_singular_is_named() -> None:
     system.state(laws, NOWHERE, NOTHING)
     traction, _ = system.everywhere()
     assert np.isfinite(traction).all()
+
+
+def test_an_interrupted_factorisation_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = mesh_of("rectangle", 400)
+    conditions, force, kept = conditions_of(mesh, 3)
+    system, fresh = (system_of(mesh, conditions.frame, True, 1e-9) for _ in range(2))
+    laws, other = (laws_of(system, mesh, conditions, force, factor * kept) for factor in (1.0, 2.0))
+    system.state(laws, NOWHERE, NOTHING)
+
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(HierarchicalFactor, "_parent", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            system.state(other, NOWHERE, NOTHING)
+    for conditions_now in (laws, other):
+        system.state(conditions_now, NOWHERE, NOTHING)
+        fresh.state(conditions_now, NOWHERE, NOTHING)
+        for found, expected in zip(system.everywhere(), fresh.everywhere(), strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
