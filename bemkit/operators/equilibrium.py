@@ -94,7 +94,8 @@ class Unbalanced:
         Imbalance
             What is missing at a node by the largest force, the work by the sum of the forces that could do any. If
             nothing is given, and no other force is more than round-off, the body has only been moved: then by the
-            terms. They do not excuse what is missing of a load, or a body on its way to infinity would balance any.
+            terms. They do not excuse what is missing of a load, or a body on its way to infinity would balance any. It
+            is 1 where something is missing and there is nothing to measure it by.
         """
         loads = float(np.abs(given).sum())
         largest = max(float(np.abs(self.contact).max()), float(np.abs(given).max(initial=0.0)), reaction)
@@ -104,7 +105,7 @@ class Unbalanced:
         noise = NOISE_FACTOR * of_sums if loads == 0.0 else 0.0
         largest, total = (max(size, terms) if size <= noise else size for size in (largest, total))
         at_nodes, on_motions = (
-            Imbalance(0.0, 0.0) if size == 0.0 else Imbalance(missing / size, 0.0, left / size)
+            Imbalance(missing / size, 0.0, left / size) if size > 0.0 else Imbalance(float(missing > 0.0), 0.0)
             for missing, left, size in (
                 (self.at_nodes, self.nodes_round_off, largest),
                 (self.on_motions, of_sums, total),

@@ -107,6 +107,19 @@ def test_displacement_and_force_tell_the_same_story() -> None:
     assert by_motion.force_normal == pytest.approx(0.05, rel=1e-3)
 
 
+def test_forces_far_away_act_on_a_single_element_too() -> None:
+    """Its stiffness is zero, which made every force small: the half-plane ended at rest without touching."""
+    part = bk.Part("zone", bk.Contact(bk.Gap(0.01)), where=bk.Expression("x > 0.4 and x < 0.8"))
+    far = bk.FarField(force_x=1e-4, force_y=1e-3)
+    scene = replace(PUNCH, parts=(part,), far=far, mesh=bk.MeshOptions(elements=5))
+    solution = bk.run(scene)
+    assert solution.is_converged
+    assert solution.contact.n_contact == 1
+    assert solution.force_normal == pytest.approx(1e-3, rel=1e-9)
+    with pytest.raises(bk.InputError, match=r"slides the body to the right with 0\.0007 more than friction can hold"):
+        bk.run(replace(scene, far=replace(far, force_x=1e-3)))
+
+
 @pytest.mark.parametrize(
     ("where", "far", "named"),
     [

@@ -131,3 +131,10 @@ def test_round_off_of_a_moved_body_is_no_force_but_a_load_is(terms: float, share
     assert moved.beside(np.array([noise])).round_off == 1e-6
     more = 1.1 / share * noise
     assert Unbalanced(np.array([more]), more, more, round_off, round_off, terms).beside(np.zeros(3)).worst == 1.0
+
+
+@pytest.mark.parametrize("missing", [0.0, 1e-30, 1.0])
+def test_nothing_is_small_beside_nothing(missing: float) -> None:
+    """A stiffness of zero, as of one contact node of a driven half-plane, balances no load."""
+    state = Unbalanced(np.zeros(2), missing, missing, 0.0, 0.0, terms=0.0)
+    assert state.beside(np.zeros(2)).worst == float(missing > 0.0)

@@ -188,4 +188,6 @@ class _Condensation:
             recover=recover,
             under=self.under,
             follow=follow,
+            volume_force=np.array(drive.load),
+            inner_force=abs(drive.load[2]),  # lengths are measured by that of the strip
         )

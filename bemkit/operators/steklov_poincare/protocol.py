@@ -42,7 +42,8 @@ class CondensedMap:
     work : OperationCounts
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     volume_force : (3,) array, optional
-        Resultants along x and y, and moment about the origin, of forces inside the body; none by default.
+        Resultants along x and y, and moment about the origin, of forces inside the body; none by default. Of a
+        half-plane, the loads that drive it from far away.
     inner_force : float [N/m]
         Sum of the sizes of the forces that what acts inside could exert on the boundary, balanced or not.
     weightless : CondensedMap, optional
