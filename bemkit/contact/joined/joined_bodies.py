@@ -13,9 +13,9 @@ from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.balance import imbalance_of
+from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
-from bemkit.contact.joined.reduced_members import ReducedMembers
 from bemkit.contact.joined.sparse_form import sparse_response
 from bemkit.contact.rigid_motions import RigidMotions
 from bemkit.operators.equilibrium import Imbalance
@@ -24,7 +24,7 @@ MOST_DENSE = 2500
 """Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
 
 _WITHOUT_LOAD = (
-    *("shapes", "motions", "felt_motions", "is_symmetric", "_reduced", "_relative_stiffness", "_motion_fit"),
+    *("shapes", "motions", "felt_motions", "is_symmetric", "_compliance", "_relative_stiffness", "_motion_fit"),
     *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
 )
 """What stays as it is under another load."""
@@ -97,7 +97,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        return sparse_response(self, self._reduced, conditions)
+        return sparse_response(self, self._compliance, conditions)
 
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
@@ -119,8 +119,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         return tuple(np.split(displacement, np.cumsum([member.n_components for member in self.members])[:-1]))
 
     @cached_property
-    def _reduced(self) -> ReducedMembers:
-        return ReducedMembers.of(self)
+    def _compliance(self) -> Compliance:
+        return Compliance.of(self)
 
     @cached_property
     def _relative_stiffness(self) -> RelativeStiffness:
