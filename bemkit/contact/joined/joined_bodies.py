@@ -23,9 +23,16 @@ from bemkit.operators.equilibrium import Imbalance
 MOST_DENSE = 2500
 """Contact components and rigid motions up to which the stiffness of relative displacements is formed."""
 
+_ALIKE = 1e3
+"""Ratio of the moduli at contacts up to which a stiffness of all of them is formed. Of stiff bodies that soft ones
+press together it would multiply motions, and their round-off, by the large modulus."""
+
+_TOO_UNLIKE = 1e9
+"""Ratio from which on no response may be certain: the round-off of displacements is 1e-7 of the forces."""
+
 _WITHOUT_LOAD = (
     *("shapes", "motions", "felt_motions", "is_symmetric", "_compliance", "_relative_stiffness", "_motion_fit"),
-    *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
+    *("owners", "moduli", "modulus", "stiffness_scale", "is_costly", "_forms_stiffness"),
 )
 """What stays as it is under another load."""
 
@@ -92,12 +99,25 @@ class JoinedBodies(CoupledMembers, LinearBody):
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return relative displacements and tractions; see `LinearBody.respond`."""
-        if not self.is_costly:
+        if self._forms_stiffness:
             return self._dense.respond(conditions)
         refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        return sparse_response(self, self._compliance, conditions)
+        try:
+            return sparse_response(self, self._compliance, conditions)
+        except SingularResponse as error:
+            ratio = float(self.moduli.max() / self.moduli.min())
+            if ratio < _TOO_UNLIKE:
+                raise
+            raise SingularResponse(
+                f"{error}; contacts of some bodies are {ratio:.0e} times stiffer than those of others, of which double "
+                "precision leaves too few digits: make the stiff bodies rigid, or one body"
+            ) from error
+
+    @cached_property
+    def _forms_stiffness(self) -> bool:
+        return not self.is_costly and float(self.moduli.max()) <= _ALIKE * float(self.moduli.min())
 
     def rigid_motions(self) -> RigidMotions:
         """Return the relative displacements of the rigid motions of each member that no support resists."""
