@@ -12,7 +12,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
 from bemkit.contact.conditions import LinearConditions
-from bemkit.contact.joined.balance import imbalance_of
+from bemkit.contact.joined.balance import LIGHTEST, imbalance_of
 from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
@@ -128,6 +128,13 @@ class JoinedBodies(CoupledMembers, LinearBody):
     def rigid_load(self) -> FloatArray:
         """Return the work of the loads on these motions."""
         return np.asarray(self.motions.T @ self.load)
+
+    def shares(self, forces: FloatArray) -> FloatArray:
+        """Return the largest of the forces on the partner that carries less, relative to the largest of all."""
+        takes_part = self.owners[::2].tocoo()
+        of_members = np.zeros(len(self.members))
+        np.maximum.at(of_members, takes_part.col, forces[takes_part.row])
+        return np.asarray(np.maximum(self.least_of_partners(of_members)[::2] / forces.max(), LIGHTEST))
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far each member is from equilibrium, and the state from a response; see `imbalance_of`."""
