@@ -17,7 +17,8 @@ from bemkit.atomic_files import reserved
 from bemkit.cli.progress import live_progress
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, make_folder, plain_table, stdout_console
-from bemkit.scene.toml import load_single_body, scene_to_toml, with_overrides
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.toml import load_scene, load_single_body, scene_to_toml, with_overrides
 from bemkit.studies.engine import Task, compute_with_progress
 
 if TYPE_CHECKING:
@@ -268,19 +269,20 @@ def _sweep(
     quiet: bool,
 ) -> int:
     """Compute what is missing, keep every record at once, and print each axis when it is complete."""
-    from bemkit.studies.stability.axes import find_axes
+    from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
+    from bemkit.studies.stability.axes import AXES, find_axes
     from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
     from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_verdicts
     from bemkit.studies.stability.sweep import sweep
 
-    axes = find_axes(axis)
+    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+    axes = find_axes(axis, ASSEMBLY_AXES if isinstance(chosen, Assembly) else AXES)
     texts = (
         TextFile(csv, "CSV file of stability rows", CSV_START, to_csv),
         TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),
     )
     outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
     click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    chosen = with_overrides(load_single_body(scene or "paper-1"), elements=elements, discretisation=discretisation)
     shows_tables = not quiet and not outputs.uses_stdout
     labels = {"scene": scene_to_toml(chosen) if output else ""}
     finished = FILE.finished(output, labels)
