@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
     from bemkit.formulas import Expression as Expression
+    from bemkit.geometry.corners import corner_nodes as corner_nodes
     from bemkit.geometry.drawn import ArcTo as ArcTo
     from bemkit.geometry.drawn import LineTo as LineTo
     from bemkit.geometry.drawn import Loop as Loop
@@ -64,7 +65,6 @@ if TYPE_CHECKING:
     from bemkit.geometry.spaces import LagrangeSpace as LagrangeSpace
     from bemkit.geometry.spaces import LinearSpace as LinearSpace
     from bemkit.geometry.spaces import QuadraticSpace as QuadraticSpace
-    from bemkit.geometry.spaces import corner_nodes as corner_nodes
     from bemkit.geometry.symmetry import Symmetry as Symmetry
     from bemkit.operators.boundary import adjoint_double_layer as adjoint_double_layer
     from bemkit.operators.boundary import assemble as assemble
@@ -168,7 +168,8 @@ _HOME = {
         *("Disk", "ExteriorOf", "HalfPlaneBody", "PeriodicHalfPlaneBody", "PlateWithHole", "Polygon", "Rectangle"),
         *("Ring", "Sector"),
     ),
-    "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace", "corner_nodes"),
+    "geometry.corners": ("corner_nodes",),
+    "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace"),
     "geometry.symmetry": ("Symmetry",),
     "operators.boundary": ("adjoint_double_layer", "assemble", "double_layer", "hypersingular", "mass", "single_layer"),
     "operators.linear.solvers": ("Automatic", "DenseCholesky", "Hierarchical", "Krylov"),

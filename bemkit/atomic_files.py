@@ -80,7 +80,7 @@ def replacing(target: Path) -> Iterator[Path]:
         If the system refuses, for example because the disk is full.
     """
     _remove_leftovers(target)
-    temporary = target.with_name(_hidden(target, f"{uuid.uuid4().hex}.tmp"))
+    temporary = hidden_beside(target, f"{uuid.uuid4().hex}.tmp")
     try:
         with contextlib.closing(FileLock(temporary, waits=True)):
             yield temporary
@@ -111,7 +111,7 @@ def reserved(targets: Iterable[Path]) -> Iterator[None]:
 
 @contextmanager
 def _reserved(target: Path) -> Iterator[None]:
-    path = target.with_name(_hidden(target, "lock"))
+    path = hidden_beside(target, "lock")
     try:
         lock = FileLock(path)
     except HeldElsewhereError as error:
@@ -130,13 +130,14 @@ def _reserved(target: Path) -> Iterator[None]:
                 path.unlink()
 
 
-def _hidden(target: Path, ending: str) -> str:
-    return f".{target.name[:100]}.{ending}"
+def hidden_beside(target: Path, ending: str) -> Path:
+    """Return the name of a hidden file that goes with another one."""
+    return target.with_name(f".{target.name[:100]}.{ending}")
 
 
 def _remove_leftovers(target: Path) -> None:
     """Remove temporary files of the target that no living process holds."""
-    name = glob.escape(_hidden(target, ""))
+    name = glob.escape(hidden_beside(target, "").name)
     for path in target.parent.glob(f"{name}{'[0-9a-f]' * 32}.tmp"):
         with contextlib.suppress(OSError), contextlib.closing(FileLock(path, may_create=False)) as lock:
             if lock.is_sure:

@@ -93,6 +93,16 @@ def seal(path: Path, mark: bytes) -> None:
         stream.write(_user_block(stream, mark))
 
 
+def checksum_in(path: Path) -> str:
+    """Return the checksum that stands in a sealed file, empty if there is no such file; see `opened` for its proof."""
+    try:
+        with path.open("rb") as stream:
+            block = stream.read(USER_BLOCK)
+    except OSError:
+        return ""
+    return block[len(MARK) :].rstrip(b"\0").decode("ascii", "replace") if block.startswith(MARK) else ""
+
+
 def _user_block(stream: BufferedReader | BufferedRandom, mark: bytes) -> bytes:
     """Return what the block before the HDF5 content must be, and go back to the beginning of the file."""
     stream.seek(USER_BLOCK)

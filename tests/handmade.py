@@ -8,7 +8,8 @@ from bemkit.contact.condensation.nodes import ContactNodes, contact_conditions, 
 from bemkit.contact.condensation.reduction import condensed_body
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
-from bemkit.geometry.spaces import dof_points, dof_weights
+from bemkit.geometry.local_values import dof_weights
+from bemkit.geometry.spaces import dof_points
 
 
 def contact_along_normals(space, elements, *, is_frictionless=False):

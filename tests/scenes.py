@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,6 +14,7 @@ import numpy as np
 
 import bemkit as bk
 from bemkit.geometry.curves import Arc, Segment
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.outline import Outline, Side
 from bemkit.model.prepared import prepare
 
@@ -31,6 +33,27 @@ class QuarterDisk:
         arc = Side("arc", Arc((0.0, 0.0), r, -0.5 * np.pi, 0.0))
         top, left = Side("top", Segment((r, 0.0), (0.0, 0.0))), Side("left", Segment((0.0, 0.0), (0.0, -r)))
         return Outline(((arc, top, left),))
+
+
+@dataclass(frozen=True)
+class Perforated:
+    """A plate of width and height 2 about the origin with rows of round holes."""
+
+    n_x: int
+    n_y: int
+
+    def outline(self) -> Outline:
+        """Return the sides and two arcs for each hole."""
+        corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        names = ("bottom", "right", "top", "left")
+        sides = [Side(name, Segment(corners[k - 4], corners[k - 3])) for k, name in enumerate(names)]
+        loops = [tuple(sides)]
+        for i, j in itertools.product(range(self.n_x), range(self.n_y)):
+            centre = 2.0 * (i + 0.5) / self.n_x - 1.0, 2.0 * (j + 0.5) / self.n_y - 1.0
+            ends = (0.0, -np.pi, -2.0 * np.pi)
+            arcs = (Arc(centre, 0.6 / max(self.n_x, self.n_y), *pair) for pair in itertools.pairwise(ends))
+            loops.append(tuple(Side(f"hole-{i}-{j}-{k}", arc) for k, arc in enumerate(arcs)))
+        return Outline(tuple(loops))
 
 
 def paper(example: int, discretisation: Any = None, mesh: bk.MeshOptions | None = None) -> bk.Scene:
@@ -94,14 +117,15 @@ def true_error(solution: bk.Solution, n_bisections: int = 2) -> float:
     scene, mesh = solution.scene, solution.mesh
     for _ in range(n_bisections):
         mesh = mesh.refined(np.arange(mesh.n_elements))
-    fine = bk.run(scene, mesh=mesh).boundary.displacement
-    space, fine_space = (scene.discretisation.displacement_space(m) for m in (solution.mesh, mesh))
+    space = scene.discretisation.displacement_space(solution.mesh)
+    scene = dataclasses.replace(scene, discretisation=bk.Galerkin(space.degree))
+    fine, fine_space = bk.run(scene, mesh=mesh).boundary.displacement, scene.discretisation.displacement_space(mesh)
     n_parts = 2**n_bisections
     own = np.arange(mesh.n_elements)
     xi = (2.0 * (own % n_parts)[:, None] + 1.0 + fine_space.local_nodes) / n_parts - 1.0
     inherited = np.empty_like(fine)
     for local, dofs in enumerate(fine_space.element_dofs.T):
-        at_dofs = solution.boundary.displacement[space.element_dofs[own // n_parts]]
+        at_dofs = values_on_elements(space, solution.boundary.displacement, own // n_parts)
         inherited[dofs] = np.einsum("pe,epc->ec", space.basis(xi[:, local]), at_dofs)
     prepared = prepare(scene, mesh)
     tractions = scene.discretisation.traction_space(mesh.unit)

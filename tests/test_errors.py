@@ -21,13 +21,14 @@ MISTAKES_OF_THE_CALLER = {"TypeError", "AttributeError", "AssertionError"}
 """Built-in errors that tell a programmer of a wrong call; no input of the command line leads to them."""
 
 
-COMPILED = "bemkit.operators.hierarchy.compiled_fields"
+COMPILED = "bemkit.operators.hierarchy.compiled_"
 
 
 def all_modules() -> list[str]:
-    """Return all modules that can be imported here; one needs the extra ``fast``."""
-    left_out = {"bemkit.__main__"} | ({COMPILED} if find_spec("numba") is None else set())
-    return [module.name for module in pkgutil.walk_packages(bemkit.__path__, "bemkit.") if module.name not in left_out]
+    """Return all modules that can be imported here; some need the extra ``fast``."""
+    left_out = ("bemkit.__main__", *([COMPILED] if find_spec("numba") is None else []))
+    names = (module.name for module in pkgutil.walk_packages(bemkit.__path__, "bemkit."))
+    return [name for name in names if not name.startswith(left_out)]
 
 
 def error_classes() -> set[type[BaseException]]:

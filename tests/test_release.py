@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
@@ -74,3 +75,28 @@ def test_the_classifiers_name_the_oldest_python() -> None:
 @pytest.mark.parametrize("requirement", PROJECT["dependencies"])
 def test_every_dependency_has_a_lower_bound(requirement: str) -> None:
     assert re.fullmatch(r"[\w-]+>=[\d.]+", requirement)
+
+
+def test_the_address_makes_absolute_links_of_relative_ones_and_no_others() -> None:
+    pytest.importorskip("hatchling")
+    hook = runpy.run_path(str(ROOT / "hatch_build.py"))
+    text = "![a](docs/a.png) [b](docs/b.md#c) [d](#e) [f](https://g.h) `pip install '.[plot]'` (see)"
+    there = "https://host.example/who/bemkit"
+    assert hook["absolute"](text, there, "v1.0.0") == (
+        f"![a]({there}/raw/v1.0.0/docs/a.png) [b]({there}/blob/v1.0.0/docs/b.md#c) [d](#e) [f](https://g.h) "
+        "`pip install '.[plot]'` (see)"
+    )
+    assert hook["absolute"](text, "", "v1.0.0") == text
+    readme = hook["absolute"]((ROOT / "README.md").read_text("utf-8"), there, "v1.0.0")
+    assert not re.search(r"\]\((?!https:)", readme)
+    for link in re.findall(rf"{there}/(?:raw|blob)/v1\.0\.0/([^)#]+)", readme):
+        assert (ROOT / link).exists(), link
+    assert hook["urls"]("", "v1.0.0") == {}
+    assert hook["urls"](there, "v1.0.0")["Changelog"] == f"{there}/blob/v1.0.0/CHANGELOG.md"
+
+
+def test_rattler_build_reads_the_recipe() -> None:
+    rattler_build = pytest.importorskip("rattler_build")
+    (variant,) = rattler_build.Stage0Recipe.from_file(str(ROOT / "conda" / "recipe.yaml")).render()
+    package = variant.recipe.package
+    assert (str(package.name), str(package.version)) == ("bemkit", __version__)

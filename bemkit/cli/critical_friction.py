@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli.options import shown_progress
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, Outputs, TextFile
-from bemkit.runs.critical_friction import CriticalFriction
-from bemkit.runs.critical_friction import critical_friction as critical_friction_of
-from bemkit.scene.toml import load_scene, with_overrides
+
+if TYPE_CHECKING:
+    from bemkit.runs.critical_friction import CriticalFriction
 
 
 @click.command("critical-friction")
@@ -21,14 +23,17 @@ from bemkit.scene.toml import load_scene, with_overrides
 @click.option("--json", "json_file", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 def critical_friction(scene: str, elements: int | None, accuracy: float | None, json_file: str | None) -> None:
     """Find the friction coefficients at which sliding states of SCENE lose uniqueness."""
-    chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy)
+    with shown_progress(quiet=False), concerning(scene):
+        from bemkit.runs.critical_friction import critical_friction as critical_friction_of
+        from bemkit.scene.toml import load_scene, with_overrides
 
-    def as_json(found: CriticalFriction) -> str:
-        return json.dumps({"title": chosen.title, **found.as_dict()}, indent=2, allow_nan=False) + "\n"
+        chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy)
 
-    outputs = Outputs((TextFile(json_file, "JSON file", JSON_START, as_json),))
-    outputs.check()
-    with concerning(scene):
+        def as_json(found: CriticalFriction) -> str:
+            return json.dumps({"title": chosen.title, **found.as_dict()}, indent=2, allow_nan=False) + "\n"
+
+        outputs = Outputs((TextFile(json_file, "JSON file", JSON_START, as_json),))
+        outputs.check()
         found = critical_friction_of(chosen)
     outputs.write(found)
     if not outputs.uses_stdout:

@@ -27,10 +27,11 @@ _COMMANDS = {
     "scenes": ("scenes", "List the scenes that come with bemkit."),
     "schema": ("schema", "Print the JSON schema of scene files, for editors."),
     "show": ("show", "Show a result file."),
-    "stability": ("study", "Drive a scene to its extremes, or solve random ones, and judge the answers."),
+    "stability": ("stability", "Drive a scene to its extremes, or solve random ones, and judge the answers."),
     "study": ("study", "Measure error against run time; make the tables of the paper."),
     "sweep": ("sweep", "Solve a scene under several values of its numbers."),
     "verify": ("verify", "Compare with closed forms and other known answers."),
+    "warm-up": ("warm_up", "Compile the kernels of large scenes, once for an installation."),
 }
 """The module of each command, which is loaded when it is asked for, and what the list of commands says of it."""
 

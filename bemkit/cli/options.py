@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.record_file import R
     from bemkit.results.solution import Solution
     from bemkit.solvers.base import StepRecord
+    from bemkit.studies.engine import Task
 
 
 def degree_of(context: click.Context, parameter: click.Parameter, value: str | None) -> int | Literal["hp"] | None:
@@ -76,17 +78,60 @@ def result_target(output: str | None, inside: int) -> list[Path]:
     """Return the file of ``-o``, checked for its ending; ``--inside`` goes with it."""
     if output is None:
         if inside:
-            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu")
+            raise click.UsageError("--inside goes into a file: give -o with a name that ends in .vtu or .vtp")
         return []
     from bemkit.results.export import format_of
 
     return [format_of(output, inside).check(Path(output))]
 
 
+def reserve(paths: Iterable[Path]) -> None:
+    """Keep files for this process until the command ends; see `bemkit.atomic_files.reserved`."""
+    from bemkit.atomic_files import reserved
+
+    click.get_current_context().with_resource(reserved(paths))
+
+
+def is_watched(quiet: bool) -> bool:
+    """Whether a person looks at standard error and wants to see progress there."""
+    return not quiet and sys.stderr.isatty()
+
+
 def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord], None] | None]:
     """Return what shows a person how far a command is; nothing where nobody looks."""
-    if quiet or not sys.stderr.isatty():
+    if not is_watched(quiet):
         return nullcontext()
     from bemkit.cli.progress import live_progress
 
     return live_progress(is_live=True)
+
+
+class StudyProgress(ExitStack):
+    """Shows that a study begins, in a ``with`` statement around what it loads and prepares, and then its tasks.
+
+    Parameters
+    ----------
+    quiet : bool
+    """
+
+    def __init__(self, quiet: bool) -> None:
+        super().__init__()
+        self._is_live = is_watched(quiet)
+        self.enter_context(shown_progress(quiet))
+
+    def compute(
+        self,
+        tasks: Sequence[Task[R]],
+        name: str,
+        *,
+        processes: int = 1,
+        cluster: str | None = None,
+        finished: Mapping[Hashable, R] | None = None,
+    ) -> Iterator[R]:
+        """Return records as they are ready; see `bemkit.studies.engine.compute_with_progress`."""
+        from bemkit.studies.engine import compute_with_progress
+
+        self.close()  # its bar takes the place of the first
+        return compute_with_progress(
+            tasks, name, is_live=self._is_live, processes=processes, cluster=cluster, finished=finished
+        )

@@ -33,13 +33,14 @@ def plan(
     is_json: bool,
 ) -> None:
     """Say what SCENE needs and what it leaves out, without solving it."""
-    from bemkit.scene.toml import load_scene, with_overrides
+    with shown_progress(is_json):
+        from bemkit.scene.toml import load_scene, with_overrides
 
-    chosen = with_overrides(
-        load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
-    )
-    with shown_progress(is_json), concerning(scene):
-        made = _planned(chosen)
+        chosen = with_overrides(
+            load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation, degree=degree
+        )
+        with concerning(scene):
+            made = _planned(chosen)
     if is_json:
         import json
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from bemkit.cli.progress import live_progress
+from bemkit.cli.options import reserve, shown_progress
 
 
 def picture_names(context: click.Context, parameter: click.Parameter, value: str | None) -> tuple[str, ...] | None:
@@ -40,14 +40,13 @@ def plot(source: str, what: tuple[str, ...] | None, place: str, dots_per_inch: i
     Without --what the pictures that suit the result are drawn. The place is a folder, or a file ending in .png, .svg
     or .pdf for one picture, in .gif or .mp4 for the animation.
     """
-    with live_progress(is_live=not quiet and sys.stderr.isatty()) as callback:
-        from bemkit.atomic_files import reserved
+    with shown_progress(quiet) as callback:
         from bemkit.cli.sources import solved, solved_steps
         from bemkit.pictures.files import ANIMATION, check_place, save_pictures
 
         if what is None and Path(place).suffix in (".gif", ".mp4"):
             what = (ANIMATION,)
-        click.get_current_context().with_resource(reserved(check_place(place, what)))
+        reserve(check_place(place, what))
         moves = what is not None and ANIMATION in what
         steps = solved_steps(source, callback) if moves else [solved(source, callback)]
         paths = save_pictures(steps, place, what, dots_per_inch=dots_per_inch)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
-from bemkit.cli.progress import live_progress
+from bemkit.cli.options import reserve, shown_progress
 
 
 @click.command()
@@ -18,12 +16,11 @@ def report(source: str, place: str, quiet: bool) -> None:
 
     The page holds summary, pictures, tables, certificate, plan, scene and versions, and needs no other file.
     """
-    with live_progress(is_live=not quiet and sys.stderr.isatty()) as callback:
-        from bemkit.atomic_files import reserved
+    with shown_progress(quiet) as callback:
         from bemkit.cli.sources import solved
         from bemkit.report.page import check_report, save_report
 
-        click.get_current_context().with_resource(reserved([check_report(place)]))
+        reserve([check_report(place)])
         path = save_report(place, solved(source, callback))
     if not quiet:
         print(path)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from bemkit.cli.exit_codes import INACCURATE, NOT_CONVERGED
-from bemkit.cli.options import degree_of, outputs_of, pictures_of, result_target, shown_progress
+from bemkit.cli.options import degree_of, outputs_of, pictures_of, reserve, result_target, shown_progress
 from bemkit.errors import concerning
 
 if TYPE_CHECKING:
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene")
-@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz or .vtu.")
-@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
+@click.option("-o", "--output", metavar="FILE", help="Write the result: .h5, .json, .csv, .npz, .vtu or .vtp.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
 @click.option("--json", "json_file", metavar="FILE", help="Write the summary as JSON; - is standard output.")
 @click.option("--csv", "csv_file", metavar="FILE", help="Write the contact table as CSV; - is standard output.")
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
@@ -63,11 +63,10 @@ def run(
     """Solve SCENE, a TOML file or the name of a shipped scene."""
     with ExitStack() as stack:
         callback = stack.enter_context(shown_progress(quiet))  # shown before anything is loaded
-        from bemkit.atomic_files import reserved
         from bemkit.scene.toml import load_scene, with_overrides
 
         outputs = outputs_of(json_file, csv_file, folder, what=what)
-        click.get_current_context().with_resource(reserved(outputs.check(result_target(output, inside))))
+        reserve(outputs.check(result_target(output, inside)))
         chosen = with_overrides(
             load_scene(scene),
             elements=elements,
@@ -108,9 +107,10 @@ def run(
 
 
 def _history_file(scene: Scene | Assembly, output: str | None) -> str | None:
-    """Return the result file of a load history on one mesh, which is written step by step; None of other runs."""
-    is_stepwise = scene.n_steps > 1 and scene.mesh.accuracy is None
-    return output if is_stepwise and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+    """Return the result file of a load history, which is written step by step; None of other runs."""
+    return (
+        output if scene.n_steps > 1 and output is not None and Path(output).suffix.lower() in (".h5", ".hdf5") else None
+    )
 
 
 def _solve(

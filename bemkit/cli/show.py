@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+
 import click
 
 from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress
@@ -17,8 +19,9 @@ from bemkit.results.outputs import STDOUT, print_data
 @click.option("--plot", "folder", metavar="DIR", help="Draw figures into a folder.")
 @click.option("--what", metavar="NAME,...", callback=pictures_of, help="Which figures; bemkit plot --help lists them.")
 @click.option("--scene", "shows_scene", is_flag=True, help="Print the scene inside as TOML.")
-@click.option("-o", "--output", metavar="FILE", help="Write the result in another format: .json, .csv, .npz or .vtu.")
-@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu.")
+@click.option("--step", type=int, metavar="N", help="Of a load history: show the end of a step, counted from 1.")
+@click.option("-o", "--output", metavar="FILE", help="Write another format: .json, .csv, .npz, .vtu or .vtp.")
+@click.option("--inside", type=int, default=0, metavar="N", help="Stress inside on N points across, in a .vtu or .vtp.")
 def show(
     result: str,
     table: str | None,
@@ -26,25 +29,32 @@ def show(
     folder: str | None,
     what: tuple[str, ...] | None,
     shows_scene: bool,
+    step: int | None,
     output: str | None,
     inside: int,
 ) -> None:
     """Show RESULT, a file written by bemkit run -o."""
-    from bemkit.results.result_file import read_result
-    from bemkit.scene.toml import scene_to_toml
-
     if sum([table is not None, json_file == STDOUT, shows_scene]) > 1:
         raise click.UsageError("--csv, --json - and --scene all print to standard output: give one of them")
     outputs = outputs_of(json_file, STDOUT if table else None, folder, table=table or "contact", what=what)
     outputs.check(result_target(output, inside))
-    with shown_progress(not folder or outputs.uses_stdout):
+    with ExitStack() as stack:
+        stack.enter_context(shown_progress(quiet=False))
+        from bemkit.results.result_file import read_result
+
         solution = read_result(result)
+        if step is not None:
+            solution = solution.at_step(step)
         if output is not None:
             from bemkit.results.export import export_result
 
             export_result(output, solution, inside=inside)
+        if outputs.uses_stdout:
+            stack.close()  # no bar among the data
         outputs.write(solution)
     if shows_scene:
+        from bemkit.scene.toml import scene_to_toml
+
         print_data(scene_to_toml(solution.stated))
     elif not (table or json_file or folder or output):
         from bemkit.cli.console import print_summary

@@ -1,32 +1,24 @@
-"""The commands of studies: ``bemkit study errors | paper-tables | solutions`` and ``bemkit stability``."""
+"""The commands of studies: ``bemkit study errors | paper-tables | solutions``."""
 
 from __future__ import annotations
 
 import json
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
-from os import cpu_count
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.atomic_files import reserved
-from bemkit.cli.progress import live_progress
+from bemkit.cli.options import StudyProgress, reserve, shown_progress
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, make_folder, plain_table, stdout_console
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.toml import load_scene, load_single_body, scene_to_toml, with_overrides
-from bemkit.studies.engine import Task, compute_with_progress
+from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, plain_table, stdout_console
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from bemkit.results.solution import Solution
     from bemkit.studies.accuracy.records import ErrorRecord
-    from bemkit.studies.stability.records import StabilityRecord
 
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
@@ -91,51 +83,51 @@ def errors(
     Errors are measured against a closed form or a reference solution, or with --over-resolve against a fine solution.
     The exit code is 1 if a run did not converge.
     """
-    from bemkit.studies.accuracy.options import StudyOptions, read_measures
-    from bemkit.studies.accuracy.records import CSV_START, FILE, to_csv
-    from bemkit.studies.accuracy.report import FIGURE, draw_errors, print_reference, print_study
-    from bemkit.studies.accuracy.runs import error_tasks
-
     if jobs > 1 and repeat is not None:
         raise click.UsageError("--jobs measures no run times: leave out --repeat, or --jobs")
-    shown = read_measures(measures)
-    problem = load_single_body(scene)
+    with StudyProgress(quiet) as progress:
+        from bemkit.scene.toml import load_single_body
+        from bemkit.studies.accuracy.options import StudyOptions, read_measures
+        from bemkit.studies.accuracy.records import CSV_START, FILE, to_csv
+        from bemkit.studies.accuracy.report import FIGURE, draw_errors, print_reference, print_study
+        from bemkit.studies.accuracy.runs import error_tasks
 
-    def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
-        return {FIGURE: draw_errors(records, shown, title=problem.title)}
+        shown = read_measures(measures)
+        problem = load_single_body(scene)
 
-    table = TextFile(csv_file, "CSV file of an error study", CSV_START, to_csv)
-    # sharp at the width of a page, and a small file
-    outputs = Outputs((table,), folder, figures, FIGURE, dots_per_inch=110)
-    click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    options = StudyOptions(
-        elements=elements,
-        accuracies=accuracies,
-        discretisation=discretisation,
-        degrees=degrees,
-        meshes=meshes,
-        solver=solver,
-        exponent=exponent,
-        most_elements=most_elements,
-        over_resolve=over_resolve,
-        repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
-    )
-    runs = options.runs(problem)
-    shows_tables = not quiet and not outputs.uses_stdout
-    with concerning(scene):
-        labels = options.labels(problem)
-        finished = FILE.finished(output, labels)
-        reference = options.reference(problem)
-        if shows_tables:
-            print_reference(problem.title, reference)
-        tasks = error_tasks(runs, reference, options.repeat)
-        computed = compute_with_progress(
-            tasks, "error study", is_live=_is_live(quiet), processes=jobs, finished=finished
+        def figures(records: Sequence[ErrorRecord]) -> dict[str, Figure]:
+            return {FIGURE: draw_errors(records, shown, title=problem.title)}
+
+        table = TextFile(csv_file, "CSV file of an error study", CSV_START, to_csv)
+        # sharp at the width of a page, and a small file
+        outputs = Outputs((table,), folder, figures, FIGURE, dots_per_inch=110)
+        reserve(outputs.check(FILE.check(output)))
+        options = StudyOptions(
+            elements=elements,
+            accuracies=accuracies,
+            discretisation=discretisation,
+            degrees=degrees,
+            meshes=meshes,
+            solver=solver,
+            exponent=exponent,
+            most_elements=most_elements,
+            over_resolve=over_resolve,
+            repeat=None if jobs > 1 else repeat or DEFAULT_REPEAT,
         )
-        by_key = {record.key: record for record in FILE.keep(output, computed, finished, labels)}
-        records = [by_key[run.key] for run in runs]
-        if shows_tables:
-            print_study(records, shown)
+        runs = options.runs(problem)
+        shows_tables = not quiet and not outputs.uses_stdout
+        with concerning(scene):
+            labels = options.labels(problem)
+            finished = FILE.finished(output, labels)
+            reference = options.reference(problem)
+            tasks = error_tasks(runs, reference, options.repeat)
+            computed = progress.compute(tasks, "error study", processes=jobs, finished=finished)
+            if shows_tables:
+                print_reference(problem.title, reference)
+            by_key = {record.key: record for record in FILE.keep(output, computed, finished, labels)}
+            records = [by_key[run.key] for run in runs]
+            if shows_tables:
+                print_study(records, shown)
     outputs.write(records)
     return 0 if all(record.is_certified for record in records) else NOT_CONVERGED
 
@@ -146,13 +138,14 @@ def errors(
 @click.option("-q", "--quiet", is_flag=True, help="Print neither the progress bar nor the tables.")
 def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> None:
     """Reproduce the source paper's Tables 1 and 2: outer steps of the augmented Lagrangian method over rho."""
-    from bemkit.studies import paper_tables as module
+    with StudyProgress(quiet) as progress:
+        from bemkit.studies import paper_tables as module
 
-    as_json = TextFile(json_file, "JSON file", JSON_START, module.to_json)
-    as_csv = TextFile(csv_file, "CSV file of the paper's tables", module.CSV_START, module.to_csv)
-    outputs = Outputs((as_json, as_csv))
-    outputs.check()
-    tables = module.paper_tables(partial(compute_with_progress, name="paper tables", is_live=_is_live(quiet)))
+        as_json = TextFile(json_file, "JSON file", JSON_START, module.to_json)
+        as_csv = TextFile(csv_file, "CSV file of the paper's tables", module.CSV_START, module.to_csv)
+        outputs = Outputs((as_json, as_csv))
+        outputs.check()
+        tables = module.paper_tables(partial(progress.compute, name="paper tables"))
     outputs.write(tables)
     if not quiet and not outputs.uses_stdout:
         module.print_paper_tables(tables)
@@ -165,18 +158,20 @@ def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> No
 @click.option("--json", "json_file", metavar="FILE", help="Write all summaries as JSON; - is standard output.")
 def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
     """Look for several solutions of SCENE from several starts."""
-    from bemkit.results.tables import finite_only
-    from bemkit.runs.run import run_probe
+    with shown_progress(quiet=False):
+        from bemkit.results.tables import finite_only
+        from bemkit.runs.run import run_probe
+        from bemkit.scene.toml import load_single_body, with_overrides
 
-    def as_json(found: Sequence[Solution]) -> str:
-        content = {"starts": starts, "solutions": [finite_only(solution.summary()) for solution in found]}
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+        def as_json(found: Sequence[Solution]) -> str:
+            content = {"starts": starts, "solutions": [finite_only(solution.summary()) for solution in found]}
+            return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
-    summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
-    summaries.check()
-    chosen = with_overrides(load_single_body(scene), elements=elements)
-    with live_progress(is_live=_is_live(quiet=False)), concerning(scene):
-        found = run_probe(chosen, n_starts=starts)
+        summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
+        summaries.check()
+        chosen = with_overrides(load_single_body(scene), elements=elements)
+        with concerning(scene):
+            found = run_probe(chosen, n_starts=starts)
     summaries.write(found)
     if json_file != STDOUT:
         _print_solutions(found, starts)
@@ -200,108 +195,3 @@ def _print_solutions(found: Sequence[Solution], n_starts: int) -> None:
         words = (str(counts[word]) for word in ("separated", "slip", "stick"))
         table.add_row(*words, *(f"{value:.6g}" for value in forces))
     console.print(table)
-
-
-@click.command()
-@click.argument("scene", required=False)
-@click.option("--axis", "axis", multiple=True, metavar="NAME", help="Only this axis; may be given several times.")
-@click.option("-o", "--output", metavar="FILE", help="Keep the rows (HDF5); rows already in the file are not repeated.")
-@click.option("--csv", "csv", metavar="FILE", help="Write the rows as CSV; - is standard output.")
-@click.option("--markdown", "markdown", metavar="FILE", help="Write tables as Markdown; - is standard output.")
-@click.option("--plot", "plot", metavar="DIR", help="Draw one figure for each axis into a folder.")
-@click.option("--elements", type=int, metavar="N", help="Number of boundary elements, instead of the scene's.")
-@click.option("--discretisation", metavar="WORD", help="Such as linear or constant, instead of the scene's.")
-@click.option("--random", "count", type=click.IntRange(1), metavar="N", help="Solve N random scenes instead.")
-@click.option("--seed", type=click.IntRange(0), metavar="N", help="Of the random scenes (0).")
-@click.option("--first", type=click.IntRange(0), metavar="N", help="Number of the first random scene (0).")
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Processes for random scenes (all processors).")
-@click.option("--save", metavar="DIR", help="Keep random scenes that fail as TOML in a folder.")
-@click.option("-q", "--quiet", is_flag=True, help="Print neither progress nor tables.")
-def stability(count: int | None, quiet: bool, **asked: Any) -> int:
-    """Drive SCENE (paper-1 by default) to its extremes and judge every answer by independent evidence.
-
-    With --random many scenes of every kind are judged instead. The exit code is 1 if an answer is wrong or an error
-    has no name.
-    """
-    of_trials = {name: asked.pop(name) for name in ("seed", "first", "jobs", "save")}
-    superfluous = of_trials if count is None else asked
-    for name, value in superfluous.items():
-        if value not in (None, ()):
-            remedy = "goes with random scenes: add --random, such as --random 200"
-            if count is not None:
-                remedy = "goes with a sweep of one scene: leave it out, or --random"
-            raise click.UsageError(f"{'SCENE' if name == 'scene' else '--' + name} {remedy}")
-    return _sweep(**asked, quiet=quiet) if count is None else _try_random(count, **of_trials, quiet=quiet)
-
-
-def _try_random(
-    count: int, *, seed: int | None, first: int | None, jobs: int | None, save: str | None, quiet: bool
-) -> int:
-    """Solve and judge random scenes; those that fail are on the disk as soon as they are known."""
-    from bemkit.studies.stability.report import print_trials
-    from bemkit.studies.stability.trials import save_trial, trial_tasks
-
-    if save is not None:
-        make_folder(Path(save))
-    tasks = trial_tasks(seed or 0, range(first or 0, (first or 0) + count))
-    trials = []
-    processes = min(jobs or cpu_count() or 1, count)
-    for trial in compute_with_progress(tasks, "random scenes", is_live=_is_live(quiet), processes=processes):
-        trials.append(trial)
-        if save is not None and trial.is_failure:
-            save_trial(trial, Path(save))
-    trials.sort(key=lambda trial: trial.index)
-    if not quiet:
-        print_trials(trials)
-    return int(any(trial.is_failure for trial in trials))
-
-
-def _sweep(
-    scene: str | None,
-    *,
-    axis: tuple[str, ...],
-    output: str | None,
-    csv: str | None,
-    markdown: str | None,
-    plot: str | None,
-    elements: int | None,
-    discretisation: str | None,
-    quiet: bool,
-) -> int:
-    """Compute what is missing, keep every record at once, and print each axis when it is complete."""
-    from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
-    from bemkit.studies.stability.axes import AXES, find_axes
-    from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
-    from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_verdicts
-    from bemkit.studies.stability.sweep import sweep
-
-    chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
-    axes = find_axes(axis, ASSEMBLY_AXES if isinstance(chosen, Assembly) else AXES)
-    texts = (
-        TextFile(csv, "CSV file of stability rows", CSV_START, to_csv),
-        TextFile(markdown, "Markdown file of stability tables", MARKDOWN_START, partial(to_markdown, axes)),
-    )
-    outputs = Outputs(texts, plot, partial(draw_axes, axes), figure_name(axes[0]))
-    click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    shows_tables = not quiet and not outputs.uses_stdout
-    labels = {"scene": scene_to_toml(chosen) if output else ""}
-    finished = FILE.finished(output, labels)
-    remaining = iter(axes)
-
-    def run_axis(tasks: Sequence[Task[StabilityRecord]]) -> list[StabilityRecord]:
-        axis = next(remaining)
-        computed = compute_with_progress(tasks, axis.name, is_live=_is_live(quiet), finished=finished)
-        records = list(FILE.keep(output, computed, finished, labels))
-        if shows_tables:
-            print_axis(axis, records)
-        return records
-
-    records = list(sweep(chosen, axes, run_axis))
-    outputs.write(records)
-    if shows_tables:
-        print_verdicts(records)
-    return int(any(record.verdict == "wrong" for record in records))
-
-
-def _is_live(quiet: bool) -> bool:
-    return not quiet and sys.stderr.isatty()

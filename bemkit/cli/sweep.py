@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from functools import partial
+from typing import TYPE_CHECKING
 
 import click
 
-from bemkit.atomic_files import reserved
+from bemkit.cli.options import StudyProgress, reserve
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, Outputs, TextFile, csv_text
-from bemkit.scene.toml import load_scene, with_overrides
-from bemkit.studies.engine import StudyError, compute_with_progress
-from bemkit.studies.sweep.grid import read_variation
-from bemkit.studies.sweep.records import FILE, RESULTS, UNITS
-from bemkit.studies.sweep.report import draw_all, figure_name, print_sweep
-from bemkit.studies.sweep.sweep import run_sweep
-from bemkit.studies.sweep.table import Sweep
+
+if TYPE_CHECKING:
+    from bemkit.studies.sweep.table import Sweep
 
 NOT_CONVERGED = 1
 DEFAULT_SHOWN = "force_tangential"
@@ -63,30 +59,47 @@ def sweep(
         raise click.UsageError("--jobs and --on both say where to compute: give one of them")
     if folder is None and (over is not None or show):
         raise click.UsageError("--over and --show go with figures: add --plot DIR")
-    pairs = [read_variation(text) for text in vary]
-    values = dict(pairs)
-    repeated = [key for number, (key, _) in enumerate(pairs) if key in [name for name, _ in pairs[:number]]]
-    if repeated:
-        raise StudyError(f"key {repeated[0]!r} is given twice: give all its values at once")
-    abscissa, shown = over or pairs[0][0], show or (DEFAULT_SHOWN,)
-    names = [*values, *UNITS]
+    with StudyProgress(quiet) as progress:
+        from bemkit.scene.toml import load_scene, with_overrides
+        from bemkit.studies.sweep.grid import read_variations
+        from bemkit.studies.sweep.records import FILE
+        from bemkit.studies.sweep.sweep import run_sweep
+
+        values = read_variations(vary)
+        outputs = _outputs(tuple(values), csv_file, json_file, folder, over, show or (DEFAULT_SHOWN,))
+        own = FILE.check(output)  # reserved by the sweep itself
+        reserve(path for path in outputs.check(own) if path not in own)
+        chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation)
+        computed = partial(progress.compute, name="sweep", processes=jobs or 1, cluster=cluster)
+        with concerning(scene):
+            found = run_sweep(chosen, values, computed, file=output, cold=cold)
+    outputs.write(found)
+    if not quiet and not outputs.uses_stdout:
+        from bemkit.studies.sweep.report import print_sweep
+
+        print_sweep(found)
+    return 0 if all(row.status == "converged" for row in found.rows) else NOT_CONVERGED
+
+
+def _outputs(
+    keys: tuple[str, ...],
+    csv_file: str | None,
+    json_file: str | None,
+    folder: str | None,
+    over: str | None,
+    shown: tuple[str, ...],
+) -> Outputs[Sweep]:
+    """Return where the table goes, with figures of some columns over the first key or another column."""
+    from bemkit.studies.sweep.records import RESULTS, UNITS
+    from bemkit.studies.sweep.report import draw_all, figure_name
+    from bemkit.studies.sweep.table import Sweep
+
+    abscissa, names = over or keys[0], [*keys, *UNITS]
     for name in (abscissa, *shown):
         if name not in names:
             raise click.UsageError(f"{name!r} is no column of numbers: give one of {', '.join(names)}")
     texts = (
-        TextFile(csv_file, "CSV file of a sweep over these keys", csv_text([*values, *RESULTS], ()), Sweep.to_csv),
+        TextFile(csv_file, "CSV file of a sweep over these keys", csv_text([*keys, *RESULTS], ()), Sweep.to_csv),
         TextFile(json_file, "JSON file", JSON_START, Sweep.to_json),
     )
-    outputs = Outputs(texts, folder, partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0]))
-    targets = outputs.check(FILE.check(output))
-    own = {path for path in FILE.check(output)}  # reserved by the sweep itself
-    click.get_current_context().with_resource(reserved([path for path in targets if path not in own]))
-    chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy, discretisation=discretisation)
-    is_live = not quiet and sys.stderr.isatty()
-    computed = partial(compute_with_progress, name="sweep", is_live=is_live, processes=jobs or 1, cluster=cluster)
-    with concerning(scene):
-        found = run_sweep(chosen, values, computed, file=output, cold=cold)
-    outputs.write(found)
-    if not quiet and not outputs.uses_stdout:
-        print_sweep(found)
-    return 0 if all(row.status == "converged" for row in found.rows) else NOT_CONVERGED
+    return Outputs(texts, folder, partial(draw_all, abscissa, shown), figure_name(abscissa, shown[0]))

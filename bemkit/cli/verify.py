@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from functools import partial
 
 import click
 
-from bemkit.atomic_files import reserved
+from bemkit.cli.options import StudyProgress, reserve
 from bemkit.results.outputs import JSON_START, Outputs, TextFile
-from bemkit.studies.engine import compute_with_progress
-from bemkit.studies.verification.records import FILE, Verification
-from bemkit.studies.verification.report import MARKDOWN_START, print_verification, to_markdown
-from bemkit.studies.verification.verification import verify as verify_cases
 
 MISSED = 1
 
@@ -31,15 +26,18 @@ def verify(
 
     NAMES choose cases, such as westergaard or 'pin*'; all by default. The exit code is 1 if one is missed.
     """
-    texts = (
-        TextFile(json_file, "JSON file", JSON_START, Verification.to_json),
-        TextFile(markdown, "Markdown file of a verification", MARKDOWN_START, to_markdown),
-    )
-    outputs = Outputs(texts)
-    click.get_current_context().with_resource(reserved(outputs.check(FILE.check(output))))
-    is_live = not quiet and sys.stderr.isatty()
-    run = partial(compute_with_progress, name="verification", is_live=is_live)
-    found = verify_cases(names, quick=quick, run=run, file=output)
+    with StudyProgress(quiet) as progress:
+        from bemkit.studies.verification.records import FILE, Verification
+        from bemkit.studies.verification.report import MARKDOWN_START, print_verification, to_markdown
+        from bemkit.studies.verification.verification import verify as verify_cases
+
+        texts = (
+            TextFile(json_file, "JSON file", JSON_START, Verification.to_json),
+            TextFile(markdown, "Markdown file of a verification", MARKDOWN_START, to_markdown),
+        )
+        outputs = Outputs(texts)
+        reserve(outputs.check(FILE.check(output)))
+        found = verify_cases(names, quick=quick, run=partial(progress.compute, name="verification"), file=output)
     outputs.write(found)
     if not quiet and not outputs.uses_stdout:
         print_verification(found)

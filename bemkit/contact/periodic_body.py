@@ -50,6 +50,8 @@ class PeriodicBody(LinearBody):
     force: FloatArray
 
     is_costly = True
+    condensed = None
+    """No stiffness is formed."""
 
     @property
     def weights(self) -> FloatArray:  # type: ignore[override]  # read-only here

@@ -15,6 +15,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.symmetry import is_reversing
 
@@ -47,7 +48,15 @@ def element_images(space: BoundarySpace) -> Iterator[tuple[slice, FloatArray, In
             "choose local nodes that are symmetric about 0, or leave out the symmetry"
         )
     for g, signs in enumerate(symmetry.images):
-        yield slice(g * n, g * n + n), signs, space.element_dofs[:, :: -1 if is_reversing(signs) else 1]
+        dofs = space.element_dofs
+        yield slice(g * n, g * n + n), signs, _reversed(space, dofs) if is_reversing(signs) else dofs
+
+
+def _reversed(space: BoundarySpace, dofs: IntArray) -> IntArray:
+    """Return the dofs of each element from its end to its start; those that it repeats stay its last ones."""
+    columns = np.arange(dofs.shape[1])
+    last = columns[-1] - (space.degree - element_degrees(space))[:, None]
+    return np.take_along_axis(dofs, np.maximum(last - columns, 0), axis=1)
 
 
 def reflected_to_whole(space: BoundarySpace, whole: BoundarySpace, values: FloatArray) -> FloatArray:

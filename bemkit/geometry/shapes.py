@@ -291,7 +291,8 @@ class PeriodicHalfPlaneBody:
 
     Notes
     -----
-    Far below, the body moves like the mean of its surface: displacements count from there.
+    Under a resultant force the body gives way without a limit. What is at rest here is the mean of the surface less
+    ``period T / (pi E')``, T the mean traction, as if that were a wave as long as the period.
     """
 
     period: float

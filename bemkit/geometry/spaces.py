@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
-from bemkit.geometry.vectors import angles_between
 
 LARGEST_DEGREE = 12
 """Highest polynomial degree of an element; integrals are exact to round-off up to it."""
@@ -83,28 +82,18 @@ def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatA
     """
     mesh = space.mesh if mesh is None else mesh
     points = np.empty((space.n_dofs // 2, 2))
-    points[space.element_dofs] = mesh.points(np.arange(mesh.n_elements), space.local_nodes)
+    points[space.element_dofs] = mesh.points(np.arange(mesh.n_elements), element_nodes(space))
     return points
 
 
-def dof_weights(space: BoundarySpace, elements: IntArray) -> FloatArray:
-    """Return the integrals of the scalar basis functions over some elements.
-
-    Parameters
-    ----------
-    space : BoundarySpace
-    elements : (n,) array
-        The elements to integrate over.
-
-    Returns
-    -------
-    (n_scalar,) array [m]
-    """
-    xi, weights = gauss_legendre(space.degree + 2 if bool(space.mesh.is_straight[elements].all()) else 16)
-    local = (space.mesh.jacobian(elements, xi) * weights) @ space.basis(xi).T
-    result = np.zeros(space.n_dofs // 2)
-    np.add.at(result, space.element_dofs[elements], local)
-    return result
+def element_nodes(space: BoundarySpace) -> FloatArray:
+    """Return where on each element its dofs are values: (n_elements, n_local) local coordinates."""
+    if not isinstance(space, LagrangeSpace) or space.element_degrees is None:
+        return np.broadcast_to(space.local_nodes, space.element_dofs.shape)
+    nodes = np.ones(space.element_dofs.shape)
+    for degree in np.unique(space.element_degrees).tolist():
+        nodes[space.element_degrees == degree, :degree] = gauss_lobatto(degree)[:-1]
+    return nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +164,7 @@ class ElementwiseSpace:
 
 @dataclass(frozen=True, eq=False)
 class LagrangeSpace:
-    """Piecewise polynomials of any degree, continuous except at the nodes named in `broken`.
+    """Piecewise polynomials of any degrees, continuous except at the nodes named in `broken`.
 
     Parameters
     ----------
@@ -184,16 +173,25 @@ class LagrangeSpace:
         Nodes where the function may jump (tractions jump at corners). `corner_nodes(mesh)` finds the corners.
     degree : int
         From 1 to `LARGEST_DEGREE`. The dofs of an element are the values at its Gauss-Lobatto points.
+    element_degrees : (n_elements,) int array, optional
+        Where elements differ; `degree` is then the largest one. Neighbours share the node between them.
 
     Raises
     ------
     GeometryError
-        If the degree is out of range, or `broken` does not have one flag for each node.
+        If a degree is out of range, or there is not one flag for each node or one degree for each element.
+
+    Notes
+    -----
+    Where degrees differ, `local_nodes` and `basis` are those of the largest one, in which any element can be written
+    (see `bemkit.geometry.local_values`), and the rows of `element_dofs` repeat the dof at the end of an element that
+    has fewer.
     """
 
     mesh: BoundaryMesh
     broken: BoolArray | None = None
     degree: int = field(kw_only=True)
+    element_degrees: IntArray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         check_degree(self.degree)
@@ -201,6 +199,8 @@ class LagrangeSpace:
             raise GeometryError(
                 f"broken has the shape {self.broken.shape}: give one flag for each of the {self.mesh.n_nodes} nodes"
             )
+        if self.element_degrees is not None:
+            _check_element_degrees(self.element_degrees, self.mesh.n_elements, self.degree)
 
     @property
     def is_continuous(self) -> bool:
@@ -220,9 +220,13 @@ class LagrangeSpace:
     @cached_property
     def element_dofs(self) -> IntArray:
         """(n_elements, degree + 1) array of scalar dofs: start, inner nodes, end; those of mesh nodes come first."""
-        ends, n_inner = self._end_dofs, self.degree - 1
-        inner = int(ends.max()) + 1 + np.arange(self.mesh.n_elements * n_inner).reshape(self.mesh.n_elements, n_inner)
-        return np.column_stack([ends[:, 0], inner, ends[:, 1]])
+        ends, inner = self._end_dofs, np.arange(1, self.degree)
+        degrees = np.full(self.mesh.n_elements, self.degree) if self.element_degrees is None else self.element_degrees
+        by_degree = np.argsort(degrees, kind="stable")  # dofs of elements of one degree follow each other
+        n_before = np.empty_like(degrees)
+        n_before[by_degree] = np.cumsum(degrees[by_degree] - 1) - (degrees[by_degree] - 1)
+        numbers = int(ends.max()) + n_before[:, None] + inner
+        return np.column_stack([ends[:, 0], np.where(inner < degrees[:, None], numbers, ends[:, 1:]), ends[:, 1]])
 
     @cached_property
     def _end_dofs(self) -> IntArray:
@@ -239,12 +243,75 @@ class LagrangeSpace:
 
     def basis(self, xi: FloatArray) -> FloatArray:
         """Evaluate the Lagrange polynomials, each one at its own node and zero at the others."""
-        nodes = self.local_nodes
-        values = np.ones((nodes.size, xi.size))
-        for own, value in zip(nodes, values, strict=True):
-            for other in nodes[nodes != own]:
-                value *= (xi - other) / (own - other)
-        return values
+        return lagrange_polynomials(self.local_nodes, xi)
+
+    @cached_property
+    def lifting(self) -> FloatArray | None:
+        """(n_elements, n_local, n_local) matrices from values at the dofs to those at `local_nodes`; None if equal."""
+        if self.element_degrees is None:
+            return None
+        matrices = np.zeros((self.mesh.n_elements, self.degree + 1, self.degree + 1))
+        for degree in np.unique(self.element_degrees).tolist():
+            columns = np.array([*range(degree), self.degree])
+            values = lagrange_polynomials(gauss_lobatto(degree), self.local_nodes)
+            own = np.flatnonzero(self.element_degrees == degree)
+            matrices[own[:, None], :, columns] = values[None]
+        return matrices
+
+    def of_degree(self, degree: int) -> _OneDegree:
+        """Return the space as its elements of one degree see it."""
+        return _OneDegree(self, degree)
+
+
+@dataclass(frozen=True, eq=False)
+class _OneDegree:
+    """A space whose elements have several degrees, as those of one degree see it; only their rows mean something."""
+
+    space: LagrangeSpace
+    degree: int
+
+    @property
+    def mesh(self) -> BoundaryMesh:
+        """That of the space."""
+        return self.space.mesh
+
+    @property
+    def broken(self) -> BoolArray | None:
+        """Those of the space."""
+        return self.space.broken
+
+    @property
+    def is_continuous(self) -> bool:
+        """As the space."""
+        return self.space.is_continuous
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of vector dofs of the whole space."""
+        return self.space.n_dofs
+
+    @property
+    def local_nodes(self) -> FloatArray:
+        """(degree + 1,) array: the Gauss-Lobatto points."""
+        return gauss_lobatto(self.degree)
+
+    @cached_property
+    def element_dofs(self) -> IntArray:
+        """(n_elements, degree + 1) array of scalar dofs."""
+        return self.space.element_dofs[:, [*range(self.degree), -1]]
+
+    def basis(self, xi: FloatArray) -> FloatArray:
+        """Evaluate the Lagrange polynomials."""
+        return lagrange_polynomials(self.local_nodes, xi)
+
+
+def lagrange_polynomials(nodes: FloatArray, xi: FloatArray) -> FloatArray:
+    """Return the (n_nodes, n_points) values of the polynomials that are 1 at one of the nodes and 0 at the others."""
+    apart = nodes[:, None] - nodes
+    np.fill_diagonal(apart, 1.0)
+    factors = (xi - nodes[:, None]) / apart[:, :, None]
+    factors[np.diag_indices(nodes.size)] = 1.0
+    return np.asarray(factors.prod(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,32 +334,10 @@ def check_degree(degree: int) -> None:
         raise GeometryError(f"degree is {degree!r}: give a whole number from 1 to {LARGEST_DEGREE}")
 
 
-@lru_cache(maxsize=4)
-def break_nodes(mesh: BoundaryMesh) -> BoolArray:
-    """Return the (n_nodes,) mask, read-only, of nodes where tractions may jump: corners and ends of boundary parts."""
-    if mesh.symmetry is not None:
-        return break_nodes(mesh.whole)[: mesh.n_nodes]
-    owner = np.full(mesh.n_elements, -1)
-    for number, name in enumerate(mesh.parts):
-        owner[mesh.part(name)] = number
-    before, after = mesh.node_elements.T
-    changes = (owner[before] != owner[after]) | (before == after)  # the same only at the ends of a half-plane
-    breaks: BoolArray = corner_nodes(mesh) | changes
-    read_only(breaks)
-    return breaks
-
-
-def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:
-    """Return the (n_nodes,) mask of nodes where the tangent turns by more than `angle` [rad].
-
-    The direction of a short element is known only as well as its coordinates are; that round-off is added to `angle`.
-    """
-    if mesh.symmetry is not None:
-        return corner_nodes(mesh.whole, angle)[: mesh.n_nodes]
-    incoming, outgoing = mesh.node_elements[:, 0], mesh.node_elements[:, 1]
-    before = mesh.normals_at(incoming, np.array([1.0]))[:, 0]
-    after = mesh.normals_at(outgoing, np.array([-1.0]))[:, 0]
-    shortest = np.minimum(mesh.lengths[incoming], mesh.lengths[outgoing])
-    round_off = 8.0 * np.finfo(float).eps * np.abs(mesh.nodes).max(axis=1) / shortest
-    corners: BoolArray = np.abs(angles_between(before, after)) > angle + round_off
-    return corners
+def _check_element_degrees(degrees: IntArray, n_elements: int, largest: int) -> None:
+    if degrees.shape != (n_elements,):
+        raise GeometryError(f"degree has {degrees.size} entries for {n_elements} elements: give one for each element")
+    for degree in np.unique(degrees).tolist():
+        check_degree(degree)
+    if degrees.max() != largest:
+        raise GeometryError(f"degree is {largest}, and that of elements up to {degrees.max()}: give the largest one")

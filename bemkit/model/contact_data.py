@@ -10,9 +10,10 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import ContactNodes, contact_frame, nodes_on
 from bemkit.contact.obstacle import Obstacle, measure_contact
+from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
-from bemkit.geometry.spaces import BoundarySpace, dof_points, dof_weights
+from bemkit.geometry.spaces import BoundarySpace, dof_points, element_nodes
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 
@@ -162,11 +163,12 @@ class _Side:
         lengths = mesh.lengths[elements]
         begin = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
         dofs = space.element_dofs[elements]
+        places = element_nodes(space)[elements]
         arc_length, facing = np.full(space.n_dofs // 2, np.inf), np.full(space.n_dofs // 2, -1.0)
-        np.minimum.at(arc_length, dofs, begin[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0))
+        np.minimum.at(arc_length, dofs, begin[:, None] + 0.5 * lengths[:, None] * (places + 1.0))
         towards = np.zeros((space.n_dofs // 2, 2))
         towards[nodes] = directions
-        np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, space.local_nodes) * towards[dofs], axis=2))
+        np.maximum.at(facing, dofs, np.sum(mesh.normals_at(elements, places) * towards[dofs], axis=2))
         weights = dof_weights(space, elements)[nodes]
         return cls(nodes, directions, weights, arc_length[nodes], gap, facing[nodes], points)
 

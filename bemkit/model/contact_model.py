@@ -8,18 +8,17 @@ it is. A scene without contact is a contact problem without nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody, hierarchical_body
 from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.contact.problem import ContactProblem
+from bemkit.geometry.local_values import element_degrees, from_own_nodes
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import dof_points
@@ -29,18 +28,21 @@ from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared, Units, parts_on
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.half_plane.elasticity import HalfPlaneElasticity
-from bemkit.operators.half_plane.periodic import PeriodicElasticity
+from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 
-ContactBody: TypeAlias = CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody
+if TYPE_CHECKING:
+    from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
+    from bemkit.contact.periodic_body import PeriodicBody
+
+ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +111,9 @@ class Model:
         elastic = self.elastic
         if isinstance(elastic, HeavyElasticity) and prepared.inside is not None:
             elastic = replace(elastic, inside=prepared.inside)
-        is_driven_alike = True
-        if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity) and prepared.drive != elastic.drive:
-            elastic, is_driven_alike = elastic.driven_by(prepared.drive), False
+        is_driven_alike = prepared.drive == self.prepared.drive
+        if not is_driven_alike:
+            elastic = _driven_by(elastic, prepared.drive)
         if is_driven_alike and stays.has_same_directions(self.contact) and not is_new_friction.any():
             body = self.body.under(prepared.conditions.displacement, prepared.force, prepared.inside)
             # a node that has lost its friction stays what it is in the condensed body
@@ -128,10 +130,10 @@ class Model:
         displacement = blended(one.conditions.displacement, two.conditions.displacement, share)
         force = blended(one.force, two.force, share)
         inside = two.inside if one.inside is None or two.inside is None else one.inside.blended(two.inside, share)
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity) and one.drive != two.drive:
+        if one.drive != two.drive:
             drive, conditions = one.drive.blended(two.drive, share), replace(two.conditions, displacement=displacement)
             prepared = replace(two, drive=drive, conditions=conditions, force=force)
-            body = contact_body(self.elastic.driven_by(drive), prepared)
+            body = contact_body(_driven_by(self.elastic, drive), prepared)
         else:
             body = self.body.under(displacement, force, inside)
         return replace(self.problem, body=body, gap=blended(before.problem.gap, self.problem.gap, share))
@@ -142,8 +144,9 @@ class Model:
         On a half-plane also the forces that balance all others from far away, on its motion there.
         """
         displacement, force = self.body.recover(state)
-        acting = supporting_forces(self.prepared.conditions, self.prepared.force, force)
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+        of_contact = self.nodes.forces(state.traction, len(force))
+        acting = supporting_forces(self.prepared.conditions, self.prepared.force, force - of_contact)
+        if isinstance(self.elastic, SurfaceElasticity):
             motion = displacement - self.elastic.strain_displacement(force)
             acting = np.concatenate([acting, -force.ravel()])
             displacement = np.concatenate([displacement, motion])
@@ -202,7 +205,7 @@ class Model:
 
     def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
-        if isinstance(self.elastic, HalfPlaneElasticity | PeriodicElasticity):
+        if isinstance(self.elastic, SurfaceElasticity):
             return self.elastic.strain_displacement(force), force
         inside = self.prepared.inside
         return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
@@ -217,6 +220,7 @@ class Model:
         for part, elements, _ in parts_on(self.scene, self.mesh):
             if isinstance(part.condition, Contact):
                 at_nodes = tractions[self._rows_of(part.name, elements)]
+                at_nodes = from_own_nodes(space, at_nodes, elements)
                 traction[elements] = np.einsum("pl,epc->elc", projection, at_nodes)
 
     def _rows_of(self, part: str, elements: IntArray) -> IntArray:
@@ -230,8 +234,9 @@ class Model:
         for rows in (np.flatnonzero(~own), np.flatnonzero(own)):
             row[self.nodes.nodes[rows]] = rows
         found = row[self.prepared.space.element_dofs[elements]]
-        for end, following in ((0, 1), (-1, -2)) if self.prepared.space.degree else ():
-            there, beside = found[:, end], found[:, following]
+        everywhere, last = np.arange(elements.size), element_degrees(self.prepared.space)[elements] - 1
+        for end, following in ((0, 1), (-1, last)) if self.prepared.space.degree else ():
+            there, beside = found[:, end], found[everywhere, following]
             turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
             found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
         return found
@@ -250,14 +255,8 @@ def build_model(prepared: Prepared) -> Model:
         If the supports do not hold the body even with all contact nodes sticking.
     """
     discretisation, mesh = prepared.scene.discretisation, prepared.mesh.unit
-    chosen = prepared.linear_solver
-    elastic = (
-        discretisation.elastic_map(mesh, prepared.material, chosen.solver)
-        if chosen.hierarchical is None
-        else discretisation.hierarchical_map(mesh, prepared.material, chosen.hierarchical)
-    )
-    if isinstance(elastic, HalfPlaneElasticity | PeriodicElasticity):
-        elastic = elastic.driven_by(prepared.drive)
+    elastic = discretisation.chosen_map(mesh, prepared.material, prepared.linear_solver)
+    elastic = _driven_by(elastic, prepared.drive)
     if prepared.inside is not None:
         elastic = HeavyElasticity(elastic, prepared.inside)
     body = contact_body(elastic, prepared)
@@ -266,15 +265,30 @@ def build_model(prepared: Prepared) -> Model:
 
 def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
     """Return a body as contact sees it: condensed onto its contact nodes or compressed, if there are any."""
-    if isinstance(elastic, PeriodicElasticity):
+    if prepared.mesh.surface is not None and prepared.mesh.surface.is_periodic:
+        from bemkit.contact.periodic_body import PeriodicBody
+        from bemkit.operators.half_plane.periodic import PeriodicElasticity
+
+        assert isinstance(elastic, PeriodicElasticity)
         return PeriodicBody(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
     if prepared.scene.contact_parts:
-        if isinstance(elastic, HierarchicalCollocation):
-            return hierarchical_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
-        return condensed_body(elastic, prepared.conditions, prepared.contact.nodes, prepared.force)
+        given = prepared.conditions, prepared.contact.nodes, prepared.force
+        if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:
+            from bemkit.contact.condensation.hierarchical_body import hierarchical_body
+            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
+            weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
+            assert isinstance(weightless, HierarchicalCollocation)
+            return hierarchical_body(weightless, *given, prepared.inside)
+        return condensed_body(elastic, *given)
     check_held(prepared)
     condensed = elastic.condense(prepared.conditions, prepared.force)
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)
+
+
+def _driven_by(elastic: SteklovPoincare, drive: FarDrive) -> SteklovPoincare:
+    """Return a half-plane that moves otherwise far away; a body that ends somewhere stays as it is."""
+    return elastic.driven_by(drive) if isinstance(elastic, SurfaceElasticity) else elastic
 
 
 def _problem(prepared: Prepared, body: ContactBody) -> ContactProblem:

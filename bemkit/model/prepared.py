@@ -18,7 +18,7 @@ from bemkit.contact.condensation.nodes import contact_conditions, free_motions
 from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.model.particular import particular_solution, stress_of
@@ -30,7 +30,6 @@ from bemkit.operators.linear.solvers import (
     ChosenLinearSolver,
     DenseCholesky,
     Krylov,
-    LinearSolverChoice,
 )
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
@@ -165,7 +164,7 @@ def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundaryS
         condition = part.condition
         axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
         if isinstance(condition, Roller):
-            normals = mesh.normals_at(elements, space.local_nodes)
+            normals = mesh.normals_at(elements, element_nodes(space)[elements])
             result.append(Support(part.name, elements, normals[:, :, None, :]))
         elif isinstance(condition, Clamped):
             result.append(Support(part.name, elements, axes))
@@ -276,22 +275,24 @@ class Prepared:
         """The linear solver that a symmetric map follows, and why it is taken."""
         scene, requested = self.scene, self.scene.linear_solver
         if not scene.discretisation.is_symmetric:
-            return self._collocation_solver(requested)
+            body = self.mesh, self.material, self.conditions, (self.map_data,)
+            case, hindrance = BodyCase(*body, is_condensed=self.is_condensed), scene.discretisation.why_dense(self.mesh)
+            return choose_collocation_solver(requested, case, physical_memory(), hindrance)
         if isinstance(requested, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
             requested = DenseCholesky()  # iteration would be too inexact
         n_retained = int(np.count_nonzero(self.conditions.is_retained))
         return choose_linear_solver(requested, self.space.n_dofs, n_retained, physical_memory())
 
-    def _collocation_solver(self, requested: LinearSolverChoice) -> ChosenLinearSolver:
-        direct = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
-        case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), direct)
-        hindrance = self.scene.discretisation.why_dense(self.mesh)
-        if self.inside is not None:
-            hindrance = "forces act inside the body"
-        turning = np.ptp(free_modes(self.space, self.conditions), axis=1).max(initial=0.0)
-        if not self.scene.discretisation.keeps_rotations and turning > _LEAST_TURN:
-            hindrance = "no support holds its rotation, and only dense equations tell what constant elements make of it"
-        return choose_collocation_solver(requested, case, hindrance, physical_memory())
+    @cached_property
+    def is_condensed(self) -> bool:
+        """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
+
+        Only a stiffness tells whether the energy of elements that are too long can be negative, and what displacements
+        without slopes make of a rotation that no support holds.
+        """
+        discretisation, motions = self.scene.discretisation, free_modes(self.space, self.conditions)
+        turns_freely = not discretisation.keeps_rotations and np.ptp(motions, axis=1).max(initial=0.0) > _LEAST_TURN
+        return not discretisation.is_symmetric and bool(turns_freely or discretisation.may_be_negative(self.mesh))
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from threading import Lock
 from typing import TypeAlias
 
@@ -21,6 +22,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
@@ -146,26 +148,45 @@ def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]
         msg = "the operators live on different meshes: assemble those of one mesh at a time"
         raise GeometryError(msg)
     everything = np.arange(mesh.n_elements)
-    targets, n_pairs = _filled(forms, everything, everything)
-    return [target.dofs_matrix() for target in targets], n_pairs
+    found = list(_filled_by_degree(forms, everything, everything))
+    n_pairs = sum(n_own for _, n_own in found)
+    if len(found) == 1:
+        return [target.dofs_matrix() for target in found[0][0]], n_pairs
+    matrices = [np.zeros((form.test.n_dofs, form.trial.n_dofs)) for form in forms]
+    for targets, _ in found:
+        for matrix, target in zip(matrices, targets, strict=True):
+            target.add_to(matrix)
+    return matrices, n_pairs
 
 
 @assembling()
 def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatArray:
     """Return some rows and columns (vector dofs) of the matrix of a form, from the elements that they belong to."""
-    if not (rows.size and columns.size):
-        return np.zeros((rows.size, columns.size))
+    block = np.zeros((rows.size, columns.size))
+    if not block.size:
+        return block
     elements = [
         np.flatnonzero(np.isin(space.element_dofs, dofs // 2).any(axis=1))
         for space, dofs in ((form.test, rows), (form.trial, columns))
     ]
-    ((target,), _) = _filled([form], elements[0], elements[1])
-    places = (
-        2 * np.searchsorted(nodes, dofs // 2) + dofs % 2
-        for nodes, dofs in ((target.test_nodes, rows), (target.trial_nodes, columns))
-    )
-    block: FloatArray = target.dofs_matrix()[np.ix_(*places)]
+    for (target,), _ in _filled_by_degree([form], elements[0], elements[1]):
+        wanted, places = [], []
+        for dofs, own in zip((rows, columns), target.vector_dofs, strict=True):
+            wanted.append(np.flatnonzero(np.isin(dofs, own)))
+            places.append(np.searchsorted(own, dofs[wanted[-1]]))
+        block[np.ix_(*wanted)] += target.dofs_matrix()[np.ix_(*places)]
     return block
+
+
+def _filled_by_degree(
+    forms: Sequence[PairForm], test_elements: IntArray, trial_elements: IntArray
+) -> Iterator[tuple[list[_Target], int]]:
+    """Sweep over the pairs of elements of any two degrees; see `_filled`."""
+    spaces = [space for form in forms for space in (form.test, form.trial)]
+    kinds = [list(of_one_degree(spaces, elements)) for elements in (test_elements, trial_elements)]
+    for (tests, seen_by_test), (trials, seen_by_trial) in product(*kinds):
+        seen = zip(forms, seen_by_test[::2], seen_by_trial[1::2], strict=True)
+        yield _filled([replace(form, test=test, trial=trial) for form, test, trial in seen], tests, trials)
 
 
 def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: IntArray) -> tuple[list[_Target], int]:
@@ -219,6 +240,22 @@ class _Target:
         ]
         self.matrix = np.zeros((self.test_nodes.size, 2, self.trial_nodes.size, 2))
 
+    @property
+    def vector_dofs(self) -> tuple[IntArray, IntArray]:
+        """Return what rows and columns of `dofs_matrix` stand for."""
+        components = np.arange(2)
+        return (2 * self.test_nodes[:, None] + components).ravel(), (2 * self.trial_nodes[:, None] + components).ravel()
+
+    def add_to(self, matrix: FloatArray) -> None:
+        """Add the matrix to its places in the one of all dofs."""
+        own = self.dofs_matrix()
+        rows, columns = (_end_and_inner(dofs) for dofs in self.vector_dofs)
+        for (own_rows, to_rows), (own_columns, to_columns) in product(rows, columns):
+            if isinstance(to_rows, np.ndarray) and isinstance(to_columns, np.ndarray):
+                matrix[np.ix_(to_rows, to_columns)] += own[own_rows, own_columns]
+            else:
+                matrix[to_rows, to_columns] += own[own_rows, own_columns]
+
     def dofs_matrix(self) -> FloatArray:
         """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
         if self._form.test.mesh.symmetry is not None:
@@ -252,6 +289,15 @@ class _Target:
         for values, dofs in zip(gathered, self.test_dofs[rows].T, strict=True):
             for positions, nodes in consecutive_runs(dofs):
                 self.matrix[nodes] += values[positions]
+
+
+def _end_and_inner(dofs: IntArray) -> list[tuple[slice, slice | IntArray]]:
+    """Split ascending dofs into some and the last ones, which follow each other: positions and dofs.
+
+    In a space of several degrees the inner dofs of elements of one degree do, and slices need no index for each entry.
+    """
+    first = int(np.max(np.flatnonzero(np.diff(dofs) != 1), initial=-1)) + 1
+    return [(slice(first), dofs[:first]), (slice(first, None), slice(int(dofs[first]), int(dofs[-1]) + 1))]
 
 
 def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
@@ -160,14 +161,18 @@ def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
 def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the entries of the identity <u, q> with their rows and columns, (n,) each; entries at one place add up."""
     require_one_mesh(trial, test)
-    points, weights = gauss_legendre(test.degree + trial.degree + 1)
-    local = (test.basis(points) * weights) @ trial.basis(points).T
-    values = (0.5 * test.mesh.lengths)[:, None, None, None] * local[:, :, None] * np.ones(2)
-    component = np.arange(2)
-    rows = 2 * test.element_dofs[:, :, None, None] + component + np.zeros_like(values, np.intp)
-    columns = 2 * trial.element_dofs[:, None, :, None] + component + np.zeros_like(values, np.intp)
-    values[antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns]] = 0.0
-    return values.ravel(), rows.ravel(), columns.ravel()
+    found = []
+    for elements, (own_test, own_trial) in of_one_degree([test, trial], np.arange(test.mesh.n_elements)):
+        points, weights = gauss_legendre(own_test.degree + own_trial.degree + 1)
+        local = (own_test.basis(points) * weights) @ own_trial.basis(points).T
+        values = (0.5 * test.mesh.lengths[elements])[:, None, None, None] * local[:, :, None] * np.ones(2)
+        component = np.arange(2)
+        rows = 2 * own_test.element_dofs[elements][:, :, None, None] + component + np.zeros_like(values, np.intp)
+        columns = 2 * own_trial.element_dofs[elements][:, None, :, None] + component + np.zeros_like(values, np.intp)
+        values[antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns]] = 0.0
+        found.append((values.ravel(), rows.ravel(), columns.ravel()))
+    values, rows, columns = (np.concatenate(each) for each in zip(*found, strict=True))
+    return values, rows, columns
 
 
 def mass_product(trial: BoundarySpace, test: BoundarySpace, functions: FloatArray) -> FloatArray:

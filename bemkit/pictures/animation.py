@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 from tempfile import TemporaryDirectory
 
 from bemkit.atomic_files import OutputFileError, check_target, replacing
@@ -32,7 +35,7 @@ def save_animation(
     Parameters
     ----------
     path : str or Path
-        Ends in ``.gif``, or in ``.mp4`` where the encoder ffmpeg is installed.
+        Ends in ``.gif``, or in ``.mp4`` where the encoder ffmpeg is installed, or the package imageio-ffmpeg with one.
     steps : sequence of Solution or AssemblySolution
         As `bemkit.run_history` and `bemkit.run_assembly_history` return them.
     units : UnitNames, optional
@@ -51,6 +54,7 @@ def save_animation(
     if not 1 <= steps_per_second <= 60:
         raise InputError(f"steps_per_second is {steps_per_second}: give a whole number from 1 to 60")
     target = check_animation(path)
+    from matplotlib import rc_context
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     writer = (PillowWriter if target.suffix == GIF else FFMpegWriter)(fps=steps_per_second)
@@ -59,7 +63,8 @@ def save_animation(
     loops = [loop for scene in scenes for body in scene.bodies for loop in body.outlines(factor)]
     frame = joined_frame(scenes[0].frame.T, *loops)
     figure = new_figure(6.4, 5.6)
-    with TemporaryDirectory() as folder, replacing(target) as temporary:
+    encoder = rc_context({"animation.ffmpeg_path": _encoder() or ""})
+    with TemporaryDirectory() as folder, replacing(target) as temporary, encoder:
         film = Path(folder) / target.name
         with writer.saving(figure, str(film), dpi=_DOTS_PER_INCH):
             for number, step in enumerate(steps, start=1):
@@ -77,10 +82,20 @@ def check_animation(path: str | Path) -> Path:
     target = Path(path)
     if target.suffix not in (GIF, MP4):
         raise OutputFileError(f"{target}: unknown ending of a moving picture: choose .gif or .mp4")
-    if target.suffix == MP4:
-        from matplotlib.animation import FFMpegWriter
-
-        if not FFMpegWriter.isAvailable():
-            raise OutputFileError(f"{target}: .mp4 needs the encoder ffmpeg, which is not installed: choose .gif")
+    if target.suffix == MP4 and _encoder() is None:
+        raise OutputFileError(f'{target}: .mp4 needs an encoder: pip install "bemkit[movie]", or choose .gif')
     starts = {GIF: "GIF8", MP4: "\x00\x00\x00"}
     return check_target(target, "moving picture", lambda existing: begins_with(existing, starts[target.suffix]))
+
+
+def _encoder() -> str | None:
+    """Return the program ffmpeg of the system, or else that of the package imageio-ffmpeg; None without both."""
+    from matplotlib import rcParams
+
+    found = which(str(rcParams["animation.ffmpeg_path"]))
+    if found is None and find_spec("imageio_ffmpeg") is not None:
+        import imageio_ffmpeg
+
+        with suppress(RuntimeError):  # a package for a system without one of its own
+            found = str(imageio_ffmpeg.get_ffmpeg_exe())
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.obstacle import DirectedObstacle, Gap
+from bemkit.pictures.overlap import drawn_overlap
 from bemkit.pictures.shown import Shown
 from bemkit.results.contact_table import ContactTable
 from bemkit.scene.conditions import Contact
@@ -32,8 +33,8 @@ def magnification(shown: Shown, size: float | None = None) -> float:
     Returns
     -------
     float
-        1, 2 or 5 times a power of ten: the largest displacement is seen, no contact node is drawn beyond its partner
-        and none that touches apart from it, by more than a line is thick. 1 if that is impossible, or if nothing
+        1, 2 or 5 times a power of ten: the largest displacement is seen, nothing is drawn inside its partner and no
+        node that touches apart from it, by more than a line is thick. 1 if that is impossible, or if nothing
         moves.
     """
     size = shown.size if size is None else size
@@ -70,7 +71,8 @@ def _rounded(wanted: float) -> float:
 
 
 def _sinks(shown: Shown, factor: float, tolerance: float) -> bool:
-    return any(float(depth.max(initial=-np.inf)) > tolerance for depth in drawn_depths(shown, factor))
+    depths = (float(depth.max(initial=-np.inf)) for depth in drawn_depths(shown, factor))
+    return any(depth > tolerance for depth in depths) or drawn_overlap(shown, factor) > tolerance
 
 
 def drawn_depths(shown: Shown, factor: float) -> Iterator[FloatArray]:

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
@@ -62,7 +63,7 @@ class ShownBody:
         """Return the displacement (m, q, 2) [m] on (m,) elements at (q,) or (m, q) local coordinates."""
         xi = np.broadcast_to(xi, (elements.size, xi.shape[-1]))
         if self.space.is_continuous:
-            at_nodes = self.displacement[self.space.element_dofs[elements]]
+            at_nodes = values_on_elements(self.space, self.displacement, elements)
             basis = self.space.basis(xi.ravel()).reshape(-1, *xi.shape)
         else:  # constant elements move like a polygon through their ends
             at_nodes = at_mesh_nodes(self.space, self.displacement)[self.mesh.elements[elements]]
@@ -148,7 +149,8 @@ def _body_of(body: BodyResult) -> ShownBody:
 
 
 def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:
-    space, half = (scene.discretisation.displacement_space(each) for each in (mesh.whole, mesh))
+    whole = scene.discretisation.of_images(mesh.whole.n_elements // mesh.n_elements)
+    space, half = whole.displacement_space(mesh.whole), scene.discretisation.displacement_space(mesh)
     if displacement is None:
         displacement = np.zeros((half.n_dofs // 2, 2))
     return ShownBody(load_steps(scene)[-1], mesh.whole, space, reflected_to_whole(half, space, displacement))
@@ -157,7 +159,7 @@ def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = No
 def at_mesh_nodes(space: BoundarySpace, displacement: FloatArray) -> FloatArray:
     """Return displacements (n_scalar, 2) at the nodes of the mesh, between the two elements where they differ."""
     mesh = space.mesh
-    at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+    at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), values_on_elements(space, displacement))
     before, after = mesh.node_elements.T
     share = (mesh.lengths[after] / (mesh.lengths[before] + mesh.lengths[after]))[:, None]
     return np.asarray(share * at_ends[before, 1] + (1.0 - share) * at_ends[after, 0])

@@ -59,8 +59,8 @@ STRESSES: Mapping[str, StressMeasure] = MappingProxyType(
 _ACROSS = 48
 """Points of the picture far from the boundary, along its longer side."""
 _LEVELS = 18
-_SHOWN = 99.5
-"""Percentile of the stresses at which colours end: corners of supports have infinite ones."""
+_SHOWN = 0.995
+"""Share of the picture whose stresses have colours of their own: corners of supports have infinite ones."""
 _FLAT = 1e-6
 """Variation of stresses, relative to the largest, that is drawn as none."""
 
@@ -83,7 +83,7 @@ def draw_stress(
     Returns
     -------
     Axes
-        Colours end where only half a per cent of the points have more; the title tells the largest drawn stress.
+        Colours end where only half a per cent of the picture has more; the title tells the largest drawn stress.
 
     Raises
     ------
@@ -101,7 +101,8 @@ def draw_stress(
     extreme = float(every[np.argmax(np.abs(every))])
     title = f"{chosen.symbol}, up to {amount(extreme, 'stress', units)}\n{scene.title}"
     axes = plane_axes(axes, scene.frame, title[0].upper() + title[1:], units)
-    levels = _levels(every, chosen.is_positive)
+    largest = largest_shown(np.concatenate([each.points for each in found]), every, spacing)
+    levels = _levels(largest, chosen.is_positive)
     for body, points, value in zip(scene.bodies, found, values, strict=True):
         outline = inside(body, body.outlines(0.0), scene.frame)
         _draw_contours(axes, points, value, levels, chosen, outline)
@@ -113,11 +114,21 @@ def draw_stress(
     return axes
 
 
-def _levels(values: FloatArray, is_positive: bool) -> FloatArray:
+def largest_shown(points: FloatArray, values: FloatArray, spacing: float) -> float:
+    """Return the size that so many of the values (n,) do not exceed, squares of the picture counting alike.
+
+    Points (n, 2) [m] crowd in corners, where stresses are largest.
+    """
+    _, square, count = np.unique(np.floor(points / spacing), axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(np.abs(values))
+    share = np.cumsum(1.0 / count[square.ravel()[order]]) / count.size
+    return float(np.abs(values)[order[np.searchsorted(share, _SHOWN)]]) or float(np.abs(values).max()) or 1.0
+
+
+def _levels(largest: float, is_positive: bool) -> FloatArray:
     """Return where colours change, round numbers: from zero of what is positive, else as far below zero as above."""
     from matplotlib.ticker import MaxNLocator
 
-    largest = float(np.percentile(np.abs(values), _SHOWN)) or float(np.abs(values).max()) or 1.0
     return np.asarray(MaxNLocator(_LEVELS, steps=[1, 2, 5, 10]).tick_values(0.0 if is_positive else -largest, largest))
 
 

@@ -13,12 +13,12 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from bemkit.arrays import FloatArray
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.reflection import reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
-from bemkit.results.interior import interior_fields
+from bemkit.results.interior import interior_fields, whole_boundary
 from bemkit.results.solved_body import SolvedBody
 
 _STEP = 0.7
@@ -51,7 +51,7 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> Stress
         Where points are wanted, of bodies without an end.
     """
     mesh = body.mesh.whole
-    space, displacement, tractions, traction = _whole_data(body)
+    space, displacement, tractions, traction = whole_boundary(body)
     n = 1 if space.degree <= 1 else _PER_ELEMENT
     xi = (2.0 * np.arange(n) + 1.0) / n - 1.0
     elements = np.arange(mesh.n_elements)
@@ -71,19 +71,6 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> Stress
     )
 
 
-def _whole_data(body: SolvedBody) -> tuple[BoundarySpace, FloatArray, ElementwiseSpace, FloatArray]:
-    """Return displacements and tractions on the whole boundary, less the particular solution of body forces."""
-    mesh, discretisation, boundary = body.mesh, body.scene.discretisation, body.map_boundary
-    space, half = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
-    displacement = reflected_to_whole(half, space, boundary.displacement)
-    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
-    tractions, half_tractions = (
-        ElementwiseSpace(discretisation.traction_space(each) if has_dofs else ConstantSpace(each))
-        for each in (mesh.whole, mesh)
-    )
-    return space, displacement, tractions, reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
-
-
 def _on_boundary(
     mesh: BoundaryMesh,
     material: Material,
@@ -99,7 +86,9 @@ def _on_boundary(
     tangents = -turned_right(normals)
     if space.is_continuous:
         ahead, behind = (space.basis(np.clip(xi + step, -1.0, 1.0)) for step in (_DIFFERENCE, -_DIFFERENCE))
-        slopes = np.einsum("pq,epc->eqc", (ahead - behind) / (2.0 * _DIFFERENCE), displacement[space.element_dofs])
+        slopes = np.einsum(
+            "pq,epc->eqc", (ahead - behind) / (2.0 * _DIFFERENCE), values_on_elements(space, displacement)
+        )
         derivative = slopes / mesh.jacobian(elements, xi)[..., None]
     else:
         derivative = np.repeat(_slopes(mesh, space, displacement)[:, None], xi.size, axis=1)

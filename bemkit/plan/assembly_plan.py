@@ -57,6 +57,7 @@ def plan_assembly(steps: Sequence[PreparedAssembly]) -> Plan:
     largest = max(range(len(first.bodies)), key=lambda number: first.bodies[number].space.n_dofs)
     return Plan(
         linear_solver=linear_solver(first, largest).solver,
+        is_compressed=linear_solver(first, largest).hierarchical is not None,
         sizes=sizes,
         work=sum((each.work for each in needs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
         memory=int(kept + max(contact, *(each.memory - each.kept for each in needs))),
@@ -71,7 +72,7 @@ def _needs(steps: Sequence[PreparedAssembly], number: int) -> BodyNeeds:
     body, conditions = first.bodies[number], first.conditions[number]
     loads = tuple(step.map_data(number) for step in steps)
     material = body.material.scaled(first.units.modulus)
-    case = BodyCase(body.own_mesh, material, conditions, loads, linear_solver(first, number))
+    case = BodyCase(body.own_mesh, material, conditions, loads, linear_solver(first, number), is_condensed=True)
     return body.scene.discretisation.needs(case)
 
 

@@ -268,7 +268,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     first = steps[0]
     sizes = find_sizes(first)
     loads = tuple(step.map_data for step in steps)
-    case = BodyCase(first.mesh, first.material, first.conditions, loads, first.linear_solver)
+    case = BodyCase(first.mesh, first.material, first.conditions, loads, first.linear_solver, first.is_condensed)
     needs = first.scene.discretisation.needs(case)
     return Plan(
         linear_solver=first.linear_solver.solver,

@@ -14,8 +14,10 @@ import numpy as np
 from bemkit.arrays import FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic
+from bemkit.geometry.local_values import from_own_nodes
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
 from bemkit.scene.discretisation import HpGalerkin, QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -258,10 +260,10 @@ def _along(solution: Solution, places: Places) -> FloatArray:
     ends = np.cumsum(lengths)
     own = np.clip(np.searchsorted(ends, places.s), 0, elements.size - 1)
     basis = space.basis(np.clip(2.0 * (places.s - ends[own]) / lengths[own] + 1.0, -1.0, 1.0))
-    at_dofs = (ends - lengths)[:, None] + 0.5 * lengths[:, None] * (space.local_nodes + 1.0)
+    at_dofs = (ends - lengths)[:, None] + 0.5 * lengths[:, None] * (element_nodes(space)[elements] + 1.0)
     rows = table.rows(places.part)
-    columns = [np.interp(at_dofs, table.s[rows], getattr(table, name)[rows])[own] for name in COLUMNS]
-    return np.asarray(np.einsum("pn,cnp->cn", basis, np.stack(columns)))
+    columns = np.stack([np.interp(at_dofs, table.s[rows], getattr(table, name)[rows]) for name in COLUMNS], axis=2)
+    return np.asarray(np.einsum("pn,npc->cn", basis, from_own_nodes(space, columns, elements)[own]))
 
 
 def _gauss_places(solution: Solution, part: str) -> Places:

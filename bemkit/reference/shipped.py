@@ -56,11 +56,11 @@ def _problem(scene: Scene) -> Scene:
 
 
 def _uniform_slip(scene: Scene) -> Reference:
-    """Return the linear field of the shipped scene; its strains are 0.1, -11/14 and 0.78 (engineering shear)."""
+    """Return the linear field of the shipped scene; a thousand times its strains are 0.1, -11/14 and 0.78 (shear)."""
     s, weight = places_along(2.0, ())
     one = np.ones_like(s)
-    energy = 0.5 * 2.0 * (-29.0 / 91.0 * 0.1 + 11.0 / 14.0 + 0.3 * 0.78)
-    answer = Answer(0.0 * one, 0.1 * s + 0.2, -one, -0.3 * one, energy, 2.0, -0.6, ())
+    energy = 0.5 * 2.0 * (-29.0 / 91.0 * 0.1 + 11.0 / 14.0 + 0.3 * 0.78) / 1000.0
+    answer = Answer(0.0 * one, (0.1 * s + 0.2) / 1000.0, -one, -0.3 * one, energy, 2.0, -0.6, ())
     return Reference("a linear field", (Places("floor", s, weight),), answer)
 
 

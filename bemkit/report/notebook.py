@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from bemkit.errors import BemkitError
+from bemkit.pictures.catalogue import find_picture
 from bemkit.pictures.deformation import draw_deformation, draw_scene
+from bemkit.pictures.load_history import draw_friction_loop
 from bemkit.pictures.shown import Result
 from bemkit.plan import Plan
-from bemkit.report.html import Element, element, facts, image, render
+from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, headline_rows, plan_section
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
+from bemkit.results.solved_steps import SolvedSteps
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 
@@ -22,15 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _DOTS_PER_INCH = 72
+_MOST_STEPS = 12
+"""That a table lists."""
 
 
 def notebook_html(value: object) -> str:
     """Return what a notebook shows of a value, its `repr` if nothing better is known."""
     match value:
+        case SolvedSteps():
+            return _with_pictures(_steps(value), _pictures_of(value[-1]), value[-1].title)
         case Solution() | AssemblySolution():
-            return _with_picture(_result(value), lambda: draw_deformation(value), value.title)
+            return _with_pictures(_result(value), _pictures_of(value), value.title)
         case Scene() | Assembly():
-            return _with_picture(facts(_scene_rows(value), "Scene"), lambda: draw_scene(value), value.title)
+            return _with_pictures(facts(_scene_rows(value), "Scene"), [lambda: draw_scene(value)], value.title)
         case Plan():
             return render(element("div", *plan_section(value)))
     return render(element("pre", repr(value)))
@@ -40,6 +47,33 @@ def _result(result: Result) -> Element:
     warnings = [element("li", warning) for warning in result.warnings]
     doubts = [element("ul", *warnings)] if warnings else []
     return element("div", element("p", badge(result)), facts(headline_rows(result), "Result"), *doubts)
+
+
+def _pictures_of(result: Result) -> list[Callable[[], Axes]]:
+    """Return how to draw the bodies, and the friction loop of a load history."""
+    loop = find_picture("friction-loop")
+    draws = [lambda: draw_deformation(result)]
+    return draws if loop.why_not(result) else [*draws, lambda: draw_friction_loop(result)]
+
+
+def _steps(steps: SolvedSteps[Any]) -> Element:
+    """Return a table of the first and last steps."""
+    numbers = [number for number in range(len(steps)) if min(number, len(steps) - 1 - number) < _MOST_STEPS // 2]
+    rows = []
+    for number in numbers:
+        step = steps[number]
+        words = step.contact.status_words()
+        rows.append(
+            {
+                "step": number + 1,
+                "status": step.status.name.lower().replace("_", " "),
+                "normal force": step.force_normal,
+                "friction force": step.force_tangential,
+                **{word: words.count(word) for word in ("separated", "slip", "stick")},
+            }
+        )
+    caption = "Load steps" if len(rows) == len(steps) else f"The first and the last of {len(steps)} load steps"
+    return element("div", element("p", badge(steps[-1])), table(rows, caption))
 
 
 def _scene_rows(scene: Scene | Assembly) -> Iterable[tuple[str, str]]:
@@ -58,14 +92,15 @@ def _scene_rows(scene: Scene | Assembly) -> Iterable[tuple[str, str]]:
     yield "mesh", f"accuracy {accuracy:g}" if accuracy is not None else f"{elements or 'default'} elements"
 
 
-def _with_picture(table: Element, draw: Callable[[], Axes], title: str) -> str:
-    """Put a picture beside a table, or why there is none."""
-    content = [element("p", element("strong", title)), table]
-    if has_pictures():
-        try:
-            figure = draw().get_figure(root=True)
-            content.append(image(figure, f"Picture of {title}", _DOTS_PER_INCH))  # type: ignore[arg-type]
-        except BemkitError as error:  # a scene that cannot be divided, say
-            content.append(element("p", f"No picture: {error}"))
+def _with_pictures(content: Element, draw: Sequence[Callable[[], Axes]], title: str) -> str:
+    """Put pictures beside a table, or why there is none."""
+    pictures = []
+    try:
+        for each in draw if has_pictures() else ():
+            figure = each().get_figure(root=True)
+            pictures.append(image(figure, f"Picture of {title}", _DOTS_PER_INCH))  # type: ignore[arg-type]
+    except BemkitError as error:  # a scene that cannot be divided, say
+        pictures.append(element("p", f"No picture: {error}"))
     style = "display: flex; flex-wrap: wrap; gap: 1em; align-items: flex-start;"
-    return render(element("div", element("div", *content[:2]), *content[2:], style=style))
+    words = element("div", element("p", element("strong", title)), content)
+    return render(element("div", words, *pictures, style=style))

@@ -16,7 +16,7 @@ from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.load_history import LoadHistory, step_rows
+from bemkit.results.load_history import LoadHistory, at_step, step_rows
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
@@ -130,6 +130,10 @@ class AssemblySolution(ShownInNotebooks):
     def stated(self) -> Assembly:
         """What was asked: the assembly, with all its load steps."""
         return self.assembly if self.loading is None else cast(Assembly, self.loading.asked)
+
+    def at_step(self, number: int) -> AssemblySolution:
+        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
+        return at_step(self, number)
 
     @property
     def units(self) -> UnitNames | None:

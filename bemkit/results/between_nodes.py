@@ -12,6 +12,7 @@ from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.slip_history import SlipHistory
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.results.contact_table import ContactTable
@@ -154,7 +155,7 @@ def _values(
     xi = _points_between(displacements.degree)
     points = mesh.points(elements, xi).reshape(-1, 2)
     gap, directions = measure_contact(obstacle, points, mesh.normals_at(elements, xi).reshape(-1, 2))
-    at_nodes = displacement[displacements.element_dofs[elements]]
+    at_nodes = values_on_elements(displacements, displacement, elements)
     motion = np.einsum("pq,epc->eqc", displacements.basis(xi), at_nodes).reshape(-1, 2)
     at_dofs = traction_dofs.reshape(mesh.n_elements, -1, 2)[elements]
     traction = np.einsum("lq,elc->eqc", tractions.basis(xi), at_dofs).reshape(-1, 2)

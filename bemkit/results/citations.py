@@ -149,7 +149,10 @@ def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
     if isinstance(stated, Scene) and not stated.contact_parts:
         return
     yield Method("contact and friction as projection equations", ("Paper", "AlartCurnier1991", "QiSun1993"))
-    own = stated.laws.values() if isinstance(stated, Scene) else [pair.law for pair in stated.contacts if pair.law]
+    if isinstance(stated, Scene):
+        own = list(stated.laws.values())
+    else:
+        own = [each.law for each in (*stated.contacts, stated.touching) if each is not None and each.law is not None]
     for law in (stated.law, *own):
         if keys := LAW_WORKS.get(LAWS.word_of(law)):
             yield Method(f"law {LAWS.word_of(law)}", keys)

@@ -8,12 +8,13 @@ that elements at corners, where fields are singular and one-sided, are judged li
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import element_degrees, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
@@ -23,6 +24,8 @@ ENERGY_CALIBRATION = 0.08
 shipped scenes with a reference the square root of the sum then lies between 0.5 and 2 times the error."""
 SLOWEST = 0.95
 """Ratio of successive coefficients beyond which the sum of all that are missing is not told by the first of them."""
+FASTEST = 0.05
+"""Smallest factor that a further degree is trusted to bring."""
 _MORE_POINTS = 2
 
 
@@ -36,13 +39,21 @@ class CoefficientErrors:
         Squared errors in the energy norm.
     traction : (n_elements,) array [Pa^2 m]
         Squared errors of the tractions in L2.
-    decay : (n_elements,) array
-        By how much a degree more would divide the slower of the two errors; 1 where the field is singular.
+    energy_decay, traction_decay : (n_elements,) arrays
+        By which factor a degree more would multiply their roots; 1 where the field is singular.
     """
 
     energy: FloatArray
     traction: FloatArray
-    decay: FloatArray
+    energy_decay: FloatArray
+    traction_decay: FloatArray
+
+    def at_higher_degrees(self, rise: IntArray) -> CoefficientErrors:
+        """Return what the errors would be with so many (n_elements,) degrees more."""
+        energy, traction = (
+            np.clip(decay, FASTEST, 1.0) ** (2 * rise) for decay in (self.energy_decay, self.traction_decay)
+        )
+        return replace(self, energy=self.energy * energy, traction=self.traction * traction)
 
 
 def coefficient_errors(
@@ -57,24 +68,32 @@ def coefficient_errors(
     Parameters
     ----------
     displacement_space, traction_space : BoundarySpace
-        Continuous of degree p, and of degree p - 1, p at least 3.
+        Continuous of degree p, and of degree p - 1, p at least 2 on each element, and 3 on one.
     displacement : (n_scalar, 2) array [m]
     traction : (n_elements, p, 2) array [Pa]
         At the local nodes of the traction space, element by element.
     plane_modulus : float [Pa]
         E'.
     """
-    mesh, degree = displacement_space.mesh, displacement_space.degree
+    mesh, degree = displacement_space.mesh, element_degrees(displacement_space)
     strained = without_motion(mesh, dof_points(displacement_space), displacement)
-    slopes = plane_modulus * _slope_coefficients(displacement_space, strained[displacement_space.element_dofs])
+    slopes = plane_modulus * _slope_coefficients(displacement_space, values_on_elements(displacement_space, strained))
     tractions = np.einsum("lk,elc->ekc", local_coefficients(traction_space), traction)
-    of_slopes, slope_decay = _missing(np.linalg.norm(slopes, axis=2))
-    of_tractions, traction_decay = _missing(np.linalg.norm(tractions, axis=2))
+    of_slopes, slope_decay, of_tractions, traction_decay = np.empty((4, degree.size))
+    for own in np.unique(degree).tolist():
+        chosen = degree == own
+        for fields, missing, decay in ((slopes, of_slopes, slope_decay), (tractions, of_tractions, traction_decay)):
+            missing[chosen], decay[chosen] = _missing(np.linalg.norm(fields[chosen, :own], axis=2))
     scale = ENERGY_CALIBRATION / (plane_modulus * (degree + 1) * (2 * degree + 1))
     return CoefficientErrors(
         energy=scale * mesh.lengths**2 * (of_slopes + of_tractions),
         traction=mesh.lengths / (2 * degree + 1) * of_tractions,
-        decay=np.maximum(slope_decay, traction_decay),
+        # of what has an error: the coefficients of tractions that vanish are round-off, which does not fall
+        energy_decay=np.sqrt(
+            (of_slopes * slope_decay**2 + of_tractions * traction_decay**2)
+            / np.maximum(of_slopes + of_tractions, np.finfo(float).tiny)
+        ),
+        traction_decay=traction_decay,
     )
 
 
@@ -98,7 +117,7 @@ def _missing(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     n_known = sizes.shape[1]
     bounds = np.maximum.accumulate(sizes[:, ::-1], axis=1)[:, ::-1]
-    n_fitted = min(n_known - 1, max(2, n_known // 2 + 1))
+    n_fitted = max(2, min(n_known - 1, n_known // 2 + 1))
     k = np.arange(n_fitted) - 0.5 * (n_fitted - 1)
     logarithms = np.log(np.maximum(bounds[:, n_known - n_fitted :], np.finfo(float).tiny))
     ratio = np.exp(np.minimum(logarithms @ k / (k @ k), 0.0))

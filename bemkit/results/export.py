@@ -1,10 +1,9 @@
-"""Results in the format that the ending of a file name asks for: .h5, .json, .csv, .npz, .vtu."""
+"""Results in the format that the ending of a file name asks for: .h5, .json, .csv, .npz, .vtu, .vtp."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +16,7 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.outputs import JSON_START, STDOUT, begins_with, write_text
 from bemkit.results.solution import Solution
 from bemkit.results.tables import CSV_STARTS, to_csv, to_json
-from bemkit.results.vtu import bodies_of, write_vtu
+from bemkit.results.vtk import bodies_of, write_vtk
 
 MOST_ACROSS = 1000
 """Points across a body at most, a million in all."""
@@ -64,7 +63,7 @@ def format_of(path: str | Path, inside: int = 0) -> Format:
         raise OutputFileError(f"{path}: the ending {ending!r} names no format of results: give one of {known}")
     chosen = FORMATS[ending]
     if inside and chosen.write_inside is None:
-        raise OutputFileError(f"{path}: {ending} holds no fields inside the body: give .vtu, or leave inside out")
+        raise OutputFileError(f"{path}: {ending} holds no fields inside the body: give .vtu or .vtp, or no inside")
     if inside and not 2 <= inside <= MOST_ACROSS:
         raise OutputFileError(f"{path}: inside is {inside}: give from 2 to {MOST_ACROSS} points across the body")
     return chosen
@@ -77,18 +76,17 @@ def export_result(path: str | Path, solution: Solution | AssemblySolution, *, in
     ----------
     path : str or Path
         ``.h5`` or ``.hdf5``: everything, see `bemkit.results.result_file`; ``.json``: the summary; ``.csv``: the
-        contact table; ``.npz``: contact table and fields on boundaries as numpy arrays; ``.vtu``: boundaries as lines
-        with displacement and traction, contact nodes as vertices, for ParaView and the like (needs meshio).
+        contact table; ``.npz``: contact table and fields on boundaries as numpy arrays; ``.vtu`` and ``.vtp``:
+        boundaries as lines with displacement and traction, contact nodes as vertices, for ParaView and the like.
     solution : Solution or AssemblySolution
     inside : int
-        Points across each body, along its longer extent, on which a .vtu holds displacement and stress inside; 0 for
+        Points across each body, along its longer extent, on which they hold displacement and stress inside; 0 for
         none.
 
     Raises
     ------
     OutputFileError
-        If the ending is unknown, a package is missing, the file cannot be written, or one of another kind stands in
-        the way.
+        If the ending is unknown, the file cannot be written, or one of another kind stands in the way.
     """
     chosen = format_of(path, inside)
     target = chosen.check(Path(path))
@@ -116,12 +114,6 @@ def _write_npz(path: Path, solution: Solution | AssemblySolution) -> None:
         np.savez_compressed(stream, **boundary_arrays(solution))  # type: ignore[arg-type]  # names of arrays
 
 
-def _check_vtu(path: Path) -> Path:
-    if find_spec("meshio") is None:
-        raise OutputFileError(f'{path}: .vtu files need meshio: pip install "bemkit[mesh]"')
-    return check_target(path, "VTU file", lambda existing: begins_with(existing, "<"))
-
-
 def _check_hdf5(path: Path) -> Path:
     from bemkit.results.result_file import check_result_target
 
@@ -141,6 +133,9 @@ def _text(kind: str, start: str, text: Callable[[Solution | AssemblySolution], s
     return Format(check, lambda path, solution: write_text(str(path), text(solution)))
 
 
+_VTK = Format(
+    lambda path: check_target(path, "VTK file", lambda existing: begins_with(existing, "<")), write_vtk, write_vtk
+)
 _HDF5 = Format(_check_hdf5, _write_hdf5)
 FORMATS: Mapping[str, Format] = MappingProxyType(
     {
@@ -149,7 +144,8 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
         ".json": _text("JSON file", JSON_START, lambda each: to_json(each) + "\n"),
         ".csv": _text("CSV file of the contact table", CSV_STARTS["contact"], lambda each: to_csv(each, "contact")),
         ".npz": Format(lambda path: check_target(path, "NPZ file", lambda old: begins_with(old, "PK")), _write_npz),
-        ".vtu": Format(_check_vtu, write_vtu, write_vtu),
+        ".vtu": _VTK,
+        ".vtp": _VTK,
     }
 )
 """By ending."""

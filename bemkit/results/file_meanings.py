@@ -54,10 +54,12 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
         },
         "steps": {
             "time": ("", "time at the end of the step"),
+            "time_step": ("", "length in time of its last increment"),
             "external_work": ("energy", "work of loads, moving supports and obstacles in the step"),
             "elastic_energy": ("energy", "elastic energy at the end of the step"),
             "dissipation": ("energy", "work that friction takes up in the step"),
             "increment_work": ("energy", "work of tractions on clearances that open or close within increments"),
+            "friction_gain": ("energy", "work that friction gives where it acts along slip"),
             "n_increments": ("", "increments in which the step was gone"),
             "linear_solves": ("", "linear systems solved in the step"),
             "slip": ("length", "length of the path that each contact node has slipped"),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.geometry.reflection import reflected_to_whole
-from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, ElementwiseSpace
 from bemkit.operators.somigliana.fields import InteriorFields
 from bemkit.results.solved_body import SolvedBody
 
@@ -40,14 +41,22 @@ def interior_fields(solution: SolvedBody) -> InteriorFields:
     """
     if solution.mesh.surface is not None:
         raise InputError("the body is a half-plane, of which only the surface is known: take a block for fields inside")
-    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
-    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
-    space, half_space = (discretisation.displacement_space(each) for each in (mesh.whole, mesh))
-    displacement = reflected_to_whole(half_space, space, boundary.displacement)
-    tractions, half_tractions = (
-        ElementwiseSpace(discretisation.traction_space(each) if has_dofs else ConstantSpace(each))
-        for each in (mesh.whole, mesh)
-    )
-    traction = reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)
     material, background = solution.scene.material, solution.particular
-    return InteriorFields(mesh.whole, material, space, displacement, tractions, traction, background)
+    return InteriorFields(solution.mesh.whole, material, *whole_boundary(solution), background)
+
+
+def whole_boundary(solution: SolvedBody) -> tuple[BoundarySpace, FloatArray, ElementwiseSpace, FloatArray]:
+    """Return displacements and tractions on the whole boundary, less the particular solution of body forces.
+
+    Each as its space and the dofs (n_scalar, 2) there [m], [Pa].
+    """
+    mesh, discretisation, boundary = solution.mesh, solution.scene.discretisation, solution.map_boundary
+    of_whole = discretisation.of_images(mesh.whole.n_elements // mesh.n_elements)
+    space, half_space = of_whole.displacement_space(mesh.whole), discretisation.displacement_space(mesh)
+    displacement = reflected_to_whole(half_space, space, boundary.displacement)
+    has_dofs = len(boundary.traction_dofs) > mesh.n_elements
+    tractions, half_tractions = (
+        ElementwiseSpace(own.traction_space(each) if has_dofs else ConstantSpace(each))
+        for own, each in ((of_whole, mesh.whole), (discretisation, mesh))
+    )
+    return space, displacement, tractions, reflected_to_whole(half_tractions, tractions, boundary.traction_dofs)

@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.slip_history import SlipHistory
+from bemkit.errors import InputError
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
     from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
+
+
+class StepEnd(Protocol):
+    """What a step needs of the solution at its end: `Solution` and `AssemblySolution` are some."""
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy [J/m]."""
+
+    @property
+    def contact(self) -> ContactTable:
+        """What every contact node carries."""
+
+    @property
+    def loading(self) -> LoadHistory | None:
+        """The steps up to this one."""
+
+
+AnySolution = TypeVar("AnySolution", bound=StepEnd)
 
 
 @dataclass(frozen=True)
@@ -27,22 +47,26 @@ class StepWork:
         Of loads, of the reactions of moving supports, and of obstacles that move towards the body. With body forces or
         heat it is what the other entries leave.
     dissipation : float [J/m]
-        What friction takes up at nodes that are closed at both ends of an increment; never negative.
+        What friction takes up at nodes that are closed at both ends of an increment; never negative: what it would give
+        by the trapezoidal rule counts as `increment_work`.
     increment_work : float [J/m]
         What the size of the increments leaves: the work of tractions where clearances open or close within one, or slip
         turns back under a falling friction bound by so much that friction would seem to give work. It vanishes as
         increments become smaller.
+    friction_gain : float [J/m]
+        What friction gives where it acts along the slip of an increment at its end; zero but for round-off wherever
+        friction opposes slip, and a part of no balance.
 
     Notes
     -----
     All by the trapezoidal rule on each increment, with which, for a body with a symmetric stiffness, ``external_work =
-    change of elastic energy + dissipation + increment_work`` but for round-off; where a support that moves holds a node
-    of a contact part obliquely to its obstacle, but for the work of contact there.
+    change of elastic energy + dissipation + increment_work`` but for round-off.
     """
 
     external_work: float = 0.0
     dissipation: float = 0.0
     increment_work: float = 0.0
+    friction_gain: float = 0.0
 
     def __add__(self, other: StepWork) -> StepWork:
         """Return the work in both."""
@@ -50,6 +74,7 @@ class StepWork:
             self.external_work + other.external_work,
             self.dissipation + other.dissipation,
             self.increment_work + other.increment_work,
+            self.friction_gain + other.friction_gain,
         )
 
 
@@ -59,27 +84,45 @@ class LoadStep:
 
     Parameters
     ----------
-    time : float [s]
-        At its end.
     work : StepWork
         In this step.
-    elastic_energy : float [J/m]
-        At its end.
     n_increments : int
         One, or the increments in which the step was gone because one jump failed.
     linear_solves : int
-    contact : ContactTable
-    slip : (n_contact,) array [m]
-        Length of the path that each node has slipped so far.
+    end : Solution or AssemblySolution
+        All fields at its end; see `at_step`.
+    state : ContactState
+        Dimensionless, at its end.
+    motion : SlipHistory
+        At the end of its last increment.
     """
 
-    time: float
     work: StepWork
-    elastic_energy: float
     n_increments: int
     linear_solves: int
-    contact: ContactTable
-    slip: FloatArray
+    end: StepEnd = field(repr=False)
+    state: ContactState = field(repr=False)
+    motion: SlipHistory = field(repr=False)
+
+    @property
+    def time(self) -> float:
+        """At its end [s]."""
+        return self.motion.time
+
+    @property
+    def elastic_energy(self) -> float:
+        """At its end [J/m]."""
+        return self.end.energy
+
+    @property
+    def contact(self) -> ContactTable:
+        """At its end."""
+        return self.end.contact
+
+    @property
+    def slip(self) -> FloatArray:
+        """(n_contact,) array [m]: length of the path that each node has slipped so far."""
+        return self.motion.slip
 
     @property
     def force_normal(self) -> float:
@@ -106,6 +149,7 @@ class LoadStep:
             "elastic_energy": self.elastic_energy,
             "dissipation": self.work.dissipation,
             "increment_work": self.work.increment_work,
+            "friction_gain": self.work.friction_gain,
             "force_normal": self.force_normal,
             "force_tangential": self.force_tangential,
             "mean_displacement": self.mean_displacement,
@@ -126,17 +170,20 @@ class LoadHistory:
     n_steps : int
         As many as there are to be.
     steps : tuple of LoadStep
-    state : ContactState
-        Dimensionless, at the end of the last one.
-    motion : SlipHistory
-        At the end of the last increment.
     """
 
     asked: Scene | Assembly
     n_steps: int
     steps: tuple[LoadStep, ...]
-    state: ContactState
-    motion: SlipHistory
+
+    @property
+    def motion(self) -> SlipHistory:
+        """At the end of the last increment."""
+        return self.steps[-1].motion
+
+    def __repr__(self) -> str:
+        """Return one line; the steps hold thousands of numbers."""
+        return f"LoadHistory({self.where()})"
 
     @property
     def is_complete(self) -> bool:
@@ -160,3 +207,32 @@ class LoadHistory:
 def step_rows(loading: LoadHistory | None) -> list[dict[str, float | int]]:
     """Return the numbers of each step; none without a load history."""
     return [] if loading is None else [step.as_dict() for step in loading.steps]
+
+
+def at_step(solution: AnySolution, number: int) -> AnySolution:
+    """Return the solution at the end of an earlier step of its load history.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+    number : int
+        Of the step, counted from 1.
+
+    Returns
+    -------
+    Solution or AssemblySolution
+        Its `loading` ends there, too. If it comes from a file, linear solves, history, timings and warnings are those
+        of the whole run.
+
+    Raises
+    ------
+    InputError
+        If there is no such step.
+    """
+    loading = solution.loading
+    if loading is None:
+        raise InputError("the result has no load history: give [[steps]] or load_factors")
+    if not 1 <= number <= len(loading.steps):
+        raise InputError(f"step {number} is none of the finished ones: give a number from 1 to {len(loading.steps)}")
+    end = cast(Any, loading.steps[number - 1].end)
+    return cast(AnySolution, replace(end, loading=replace(loading, steps=loading.steps[:number])))

@@ -1,15 +1,17 @@
-"""Records of a study in an HDF5 file that is complete after every record, so that a stopped study can go on."""
+"""Records of a study in an HDF5 file and its journal, complete after every record: a stopped study can go on."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, get_type_hints
 
 import numpy as np
 
-from bemkit.hdf5 import FileFormat, ResultFileError, rows_of, write_table, write_text
+from bemkit.hdf5 import FileFormat, ResultFileError, checksum_in, rows_of, write_table, write_text
+from bemkit.results.row_journal import RowJournal
 
 _MAX_LABEL = 1_000_000
 
@@ -73,21 +75,25 @@ class RecordFile(Generic[R]):
             write_table(file.create_group("rows"), columns)
 
     def read(self, path: str | Path) -> tuple[dict[str, str], tuple[R, ...]]:
-        """Read labels and records.
+        """Read labels and records, those in the journal beside the file too.
 
         Raises
         ------
         ResultFileError
             If the file is not a complete file of this kind and version.
         """
+        checksum, journal = RowJournal(Path(path)).read()  # first: it never holds rows that a newer file lacks
         with self.format.opened(path) as reader:
             labels = {name: reader.text(name, _MAX_LABEL) for name in self.labels}
             types = self._types
             texts, integers = ([name for name in types if types[name] is kind] for kind in (str, int))
             floats = [name for name in types if types[name] not in (str, int)]
             rows = rows_of(reader.table("rows", texts=texts, floats=floats, integers=integers))
-            records = tuple(self.record(**row) for row in rows)
-        return labels, records
+            if checksum and checksum == checksum_in(Path(path)):
+                if any(not isinstance(row, list) or len(row) != len(types) for row in journal):
+                    raise reader.error(f"a row in .{Path(path).name[:100]}.rows is damaged: delete that file")
+                rows += [dict(zip(types, row, strict=True)) for row in journal]
+        return labels, tuple(self.record(**row) for row in rows)
 
     def finished(self, path: str | Path | None, labels: Mapping[str, str]) -> dict[Hashable, R]:
         """Return the records of an earlier study under the same labels by their keys, nothing if there is no file.
@@ -111,14 +117,48 @@ class RecordFile(Generic[R]):
     def keep(
         self, path: str | Path | None, records: Iterator[R], finished: dict[Hashable, R], labels: Mapping[str, str]
     ) -> Iterator[R]:
-        """Hand records on after those that are new were added to the finished ones and written to the file, if any."""
-        for record in records:
-            if record.key not in finished:
-                finished[record.key] = record
-                if path is not None:
-                    self.write(path, labels, list(finished.values()))
-            yield record
+        """Hand records on after those that are new were added to the finished ones and to the file, if any."""
+        with nullcontext(_drop) if path is None else self._added(Path(path), labels, finished) as add:
+            for record in records:
+                if record.key not in finished:
+                    finished[record.key] = record
+                    add(record)
+                yield record
+
+    @contextmanager
+    def _added(
+        self, path: Path, labels: Mapping[str, str], finished: Mapping[Hashable, R]
+    ) -> Iterator[Callable[[R], None]]:
+        """Give what adds a record, already among the finished ones, to the file.
+
+        The first is written with all others. Further ones go to the journal, at the same cost however many there are,
+        and into the file at the end, or when a study goes on whose process was killed.
+        """
+        journal, n_added = RowJournal(path), 0
+        checksum, left = journal.read()
+        if left and checksum == checksum_in(path):
+            self.write(path, labels, list(finished.values()))
+
+        def add(record: R) -> None:
+            nonlocal n_added
+            if n_added:
+                journal.add([getattr(record, name) for name in self._types])
+            else:
+                self.write(path, labels, list(finished.values()))
+                journal.begin()
+            n_added += 1
+
+        try:
+            yield add
+        finally:
+            if n_added > 1:
+                self.write(path, labels, list(finished.values()))
+            journal.end()
 
     @property
     def _types(self) -> dict[str, Any]:
         return get_type_hints(self.record)
+
+
+def _drop(record: object) -> None:
+    """Add a record to no file."""

@@ -115,7 +115,7 @@ def read_result(path: str | Path) -> Solution | AssemblySolution:
             raise reader.error(str(error)) from error
         try:
             solution = read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
-            return replace(solution, loading=read_history(reader, solution.contact))
+            return replace(solution, loading=read_history(reader, solution))
         except (ValueError, KeyError, OverflowError, RecursionError) as error:
             raise reader.error(f"inconsistent content ({error})") from error
 

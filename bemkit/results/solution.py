@@ -6,7 +6,8 @@ anticlockwise boundary, traction = stress @ n; a pressed contact has sigma_n <= 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,7 +25,7 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at
-from bemkit.results.load_history import LoadHistory, step_rows
+from bemkit.results.load_history import LoadHistory, at_step, step_rows
 from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
@@ -128,8 +129,12 @@ class Solution(ShownInNotebooks, SolvedBody):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions in L2, relative to them.
 
-        None without an estimate and without contact tractions.
+        Of a half-plane that of all tractions but loads, in the mean. None without an estimate and without such
+        tractions.
         """
+        if self.mean_traction_errors is not None:
+            size = self.mean_traction_size
+            return float(self.mean_traction_errors.sum()) / size if size > 0.0 else None
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
         from bemkit.results.error_indicators import contact_errors, place_errors
@@ -146,6 +151,10 @@ class Solution(ShownInNotebooks, SolvedBody):
     def stated(self) -> Scene:
         """What was asked: the scene, with all its load steps."""
         return self.scene if self.loading is None else cast(Scene, self.loading.asked)
+
+    def at_step(self, number: int) -> Solution:
+        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
+        return at_step(self, number)
 
     @property
     def units(self) -> UnitNames | None:
@@ -265,10 +274,17 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
             total = spent + record.linear_solves
             records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
     return replace(
-        result,
+        with_times(result, solutions),
         history=tuple(records),
         linear_solves=sum(solution.linear_solves for solution in solutions),
         outer_steps=sum(solution.outer_steps for solution in solutions),
+    )
+
+
+def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolution:
+    """Return a solution with the times and the memory of all that led to it."""
+    return replace(
+        result,
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
         memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
     )
@@ -278,6 +294,8 @@ def following(
     so_far: AnySolution | None, solution: AnySolution, asked: Scene | Assembly, number: int, n_steps: int
 ) -> AnySolution:
     """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
+
+    Of warnings that differ in numbers alone the last one stands for all; `at_step` keeps those of a step.
 
     Parameters
     ----------
@@ -295,8 +313,17 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = dict.fromkeys((*solution.warnings, *(text for each in before for text in each.warnings)))
+    warnings = unlike((*solution.warnings, *(text for each in before for text in each.warnings)))
     loading = None if solution.loading is None else replace(solution.loading, asked=asked)
     message = f"{name}: {solution.message}"
-    whole: AnySolution = replace(total, message=message, warnings=tuple(warnings), loading=loading)
+    whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
     return whole
+
+
+def unlike(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return the first of all sentences that differ in numbers, and in what else these count, alone."""
+    first: dict[str, str] = {}
+    for text in texts:
+        kind = re.sub(r", and \d+ more [a-z]+ like it|(?<=node)s|\d+(\.\d+)?(e[-+]?\d+)?", "", text)
+        first.setdefault(kind, text)
+    return tuple(first.values())

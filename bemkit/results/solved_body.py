@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.model.particular import ParticularFields
 from bemkit.results.part_forces import PartForce, part_force
+from bemkit.scene.conditions import Pressure, Traction
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -135,6 +136,31 @@ class SolvedBody:
         make_space = discretisation.displacement_space
         fields = self.map_boundary
         return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
+
+    @cached_property
+    def mean_traction_errors(self) -> FloatArray | None:
+        """(n_elements,) array [N/m]: estimated errors of the tractions of a half-plane; None of another body.
+
+        They are zero where loads give the tractions.
+        """
+        if self.mesh.surface is None:
+            return None
+        from bemkit.results.error_indicators import mean_traction_errors
+
+        return np.where(self._is_loaded, 0.0, mean_traction_errors(self.mesh, self.boundary.traction))
+
+    @cached_property
+    def mean_traction_size(self) -> float:
+        """What they are measured by [N/m]: the integral of the sizes of all tractions but loads."""
+        sizes = np.linalg.norm(self.boundary.traction, axis=1)
+        return float(self.mesh.lengths @ np.where(self._is_loaded, 0.0, sizes))
+
+    @property
+    def _is_loaded(self) -> BoolArray:
+        loaded = np.zeros(self.mesh.n_elements, dtype=bool)
+        for part in self.scene.parts:
+            loaded[self.mesh.part(part.name)] = isinstance(part.condition, Traction | Pressure)
+        return loaded
 
     @cached_property
     def part_forces(self) -> tuple[PartForce, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.load_history import step_rows
 from bemkit.results.outputs import csv_text
@@ -78,7 +79,7 @@ def element_displacement(solution: Solution | BodyResult) -> FloatArray:
     """Return the displacement at the element centres, (n_elements, 2) array [m], interpolated if need be."""
     space = solution.scene.discretisation.displacement_space(solution.mesh)
     at_centre = space.basis(np.zeros(1))[:, 0]
-    return np.asarray(np.einsum("p,epc->ec", at_centre, solution.boundary.displacement[space.element_dofs]))
+    return np.asarray(np.einsum("p,epc->ec", at_centre, values_on_elements(space, solution.boundary.displacement)))
 
 
 def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any]:

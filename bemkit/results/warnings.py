@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import break_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.assembly_solution import AssemblySolution
@@ -50,7 +51,7 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
         return solution.plan.warnings
     laws = solution.scene.laws
     smooth = {part for part, law in laws.items() if law.is_frictionless}
-    narrow = _narrow_zones(solution.contact, smooth)
+    narrow = _narrow_zones(solution.contact, smooth, _remedy((solution,)))
     doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
     return (*solution.plan.warnings, *chain(*doubts))
 
@@ -60,11 +61,12 @@ def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
     if not solution.is_certified:
         return solution.plan.warnings
     smooth = {pair.name for pair in solution.assembly.contacts if solution.assembly.law_of(pair).is_frictionless}
+    remedy = _remedy(solution.bodies.values())
     doubts = [
-        _large(solution.estimated_error),
+        _large(solution.estimated_error, remedy),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
-        _narrow_zones(solution.contact, smooth),
+        _narrow_zones(solution.contact, smooth, remedy),
     ]
     return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
 
@@ -75,9 +77,18 @@ def _first(doubts: list[str]) -> list[str]:
     return doubts if n_more <= 0 else [*doubts[:_MOST_ALIKE], f"There are {n_more} more doubts like the last one."]
 
 
-def _large(error: float | None) -> Iterator[str]:
+def _remedy(bodies: Iterable[SolvedBody]) -> str:
+    """Say what makes a solution better; meshes follow an accuracy only where errors are estimated and may be graded."""
+    for body in bodies:
+        is_periodic = body.mesh.surface is not None and body.mesh.surface.is_periodic
+        if is_periodic or not body.scene.discretisation.estimates_error:
+            return "use more elements"
+    return "use more elements, or give an accuracy"
+
+
+def _large(error: float | None, remedy: str) -> Iterator[str]:
     if error is not None and error > LARGEST_ERROR:
-        yield f"The estimated error is {100.0 * error:.2g} %: use more elements, or give an accuracy."
+        yield f"The estimated error is {100.0 * error:.2g} %: {remedy}."
 
 
 def _error(solution: Solution) -> Iterator[str]:
@@ -89,7 +100,7 @@ def _error(solution: Solution) -> Iterator[str]:
     if error is None:
         energy = f"the elastic energy, {amount(solution.energy, 'energy', solution.units, 2)}, is not positive"
         yield f"No error could be estimated, because {energy}: use more elements, or bring body and obstacle together."
-    yield from _large(error)
+    yield from _large(error, _remedy((solution,)))
     if solution.coefficient_errors is not None:
         return  # elements of high degree are judged by themselves
     # elements without a neighbour on their piece: their strains meet no others
@@ -152,7 +163,7 @@ def boundary_gradients(body: SolvedBody) -> tuple[FloatArray, FloatArray]:
     mesh, displacement = body.mesh, body.boundary.displacement
     space = body.scene.discretisation.displacement_space(mesh)
     if space.degree > 0:
-        at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), displacement[space.element_dofs])
+        at_ends = np.einsum("pq,epc->eqc", space.basis(np.array([-1.0, 1.0])), values_on_elements(space, displacement))
         return norms(at_ends[:, 1] - at_ends[:, 0]) / mesh.lengths, mesh.lengths
     before, after = mesh.node_elements[(mesh.node_elements >= 0).all(axis=1)].T
     lengths = 0.5 * (mesh.lengths[before] + mesh.lengths[after])
@@ -175,7 +186,7 @@ def _coarse_curves(mesh: BoundaryMesh) -> Iterator[str]:
         )
 
 
-def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[str]:
+def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -> Iterator[str]:
     """Doubt zones of contact, stick and slip of few nodes; of smooth parts, without friction, of contact alone."""
     words = np.array(contact.status_words(), dtype=object)
     # friction that acts across a gap sticks or slips without contact
@@ -194,7 +205,7 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str]) -> Iterator[st
             narrow = [zone for zone in narrow if not reported[zone].all()]
             if narrow:
                 reported[np.concatenate(narrow)] = True
-                yield _narrow(part, kind, [contact.s[zone] for zone in narrow])
+                yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
 
 
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
@@ -204,11 +215,9 @@ def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
 
 
-def _narrow(part: str, kind: str, zones: Sequence[FloatArray]) -> str:
+def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> str:
     nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
     n_more, middle = len(zones) - 1, float(zones[0].mean())
     more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
-    return (
-        f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: use more elements there, or give "
-        "an accuracy."
-    )
+    there = remedy.replace("more elements", "more elements there")
+    return f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {there}."

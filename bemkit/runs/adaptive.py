@@ -19,7 +19,13 @@ from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
 
-def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None = None) -> tuple[Solution, ...]:
+def run_adaptive(
+    scene: Scene,
+    *,
+    callback: Callable[[StepRecord], None] | None = None,
+    done: Solution | None = None,
+    finished: Callable[[Solution], None] | None = None,
+) -> tuple[Solution, ...]:
     """Solve a scene on a sequence of meshes until the estimated error is below the accuracy of the scene.
 
     A load history is solved as a whole on each mesh, which follows the largest errors of all its steps, relative to the
@@ -35,6 +41,8 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
         With `MeshOptions.accuracy`.
     callback : callable, optional
         Receives a record of every step on every mesh.
+    done, finished : optional
+        Of a load history; see `HistoryRefinement`.
 
     Returns
     -------
@@ -61,7 +69,10 @@ def run_adaptive(scene: Scene, *, callback: Callable[[StepRecord], None] | None 
             )
         single = _SceneRefinement(DensityMeshes(accuracy), callback)
         whole = HistoryRefinement(
-            single, lambda level: solved_history([level.scene], level.partition.mesh, None, callback)
+            single,
+            lambda level, *known: solved_history([level.scene], level.partition.mesh, None, callback, *known),
+            done,
+            finished,
         )
         return refined(Level(scene, first), whole, scene.mesh)
     sequence = LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes

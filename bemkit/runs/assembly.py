@@ -27,6 +27,7 @@ from bemkit.results.contact_table import ContactTable, bound_at, find_transition
 from bemkit.results.part_forces import contact_forces, nodal_resultants
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solution import BoundaryFields
+from bemkit.results.solved_steps import SolvedSteps
 from bemkit.results.warnings import find_assembly_warnings
 from bemkit.runs.steps import History, Kind, joined, solve_steps
 from bemkit.runs.timing import Stage, StageClock
@@ -71,7 +72,7 @@ def run_assembly_history(
     *,
     meshes: Mapping[str, BoundaryMesh] | None = None,
     callback: Callable[[StepRecord], None] | None = None,
-) -> tuple[AssemblySolution, ...]:
+) -> SolvedSteps[AssemblySolution]:
     """Solve assemblies that follow each other in time, slip counting from the end of the step before.
 
     Every body is factored once for all steps. Where the jump to a load stalls, it is gone in halves; see
@@ -87,16 +88,17 @@ def run_assembly_history(
 
     Returns
     -------
-    tuple of AssemblySolution
-        One for each step, up to the first that does not converge. If that is not the first one, its fields are those
-        of the step before, the last state that is certified; status, message and history are its own.
+    SolvedSteps
+        A tuple of solutions, one for each step, up to the first that does not converge. If that is not the first one,
+        its fields are those of the step before, the last state that is certified; status, message and history are its
+        own.
 
     Raises
     ------
     UnsolvableSceneError
         If no contact tractions can balance the first load.
     """
-    return solved_assemblies(assemblies, meshes, callback)[1]
+    return SolvedSteps(solved_assemblies(assemblies, meshes, callback)[1])
 
 
 def solved_assemblies(

@@ -15,7 +15,7 @@ from bemkit.geometry.vectors import norms
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import resolved_transitions
 from bemkit.runs.assembly import run_assembly, solved_assemblies
-from bemkit.runs.density import error_rate, is_enough, next_size, target_density
+from bemkit.runs.density import SAFETY, error_rate, is_enough, needed_elements, next_size
 from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.mesh_sequence import ZoneEnd, zone_cuts
 from bemkit.runs.refinement import refined, required_accuracy
@@ -24,7 +24,11 @@ from bemkit.solvers.base import StepRecord
 
 
 def run_assembly_adaptive(
-    assembly: Assembly, *, callback: Callable[[StepRecord], None] | None = None
+    assembly: Assembly,
+    *,
+    callback: Callable[[StepRecord], None] | None = None,
+    done: AssemblySolution | None = None,
+    finished: Callable[[AssemblySolution], None] | None = None,
 ) -> tuple[AssemblySolution, ...]:
     """Solve an assembly on a sequence of meshes until the estimated error is below its accuracy.
 
@@ -37,6 +41,8 @@ def run_assembly_adaptive(
         With `MeshOptions.accuracy`.
     callback : callable, optional
         Receives a record of every step on every mesh.
+    done, finished : optional
+        Of a load history; see `HistoryRefinement`.
 
     Returns
     -------
@@ -50,7 +56,12 @@ def run_assembly_adaptive(
     """
     refinement = _AssemblyRefinement(required_accuracy(assembly.mesh), callback)
     if assembly.n_steps > 1:
-        whole = HistoryRefinement(refinement, lambda level: solved_assemblies([level.assembly], level.meshes, callback))
+        whole = HistoryRefinement(
+            refinement,
+            lambda level, *known: solved_assemblies([level.assembly], level.meshes, callback, *known),
+            done,
+            finished,
+        )
         return refined(_Level.first(assembly), whole, assembly.mesh)
     return refined(_Level.first(assembly), refinement, assembly.mesh)
 
@@ -125,12 +136,19 @@ class _Level:
         rate = error_rate(
             min(body.scene.discretisation.displacement_space(body.mesh).degree for body in results.values())
         )
-        densities: dict[int, FloatArray] = {}
+        worst: dict[int, FloatArray] = {}
         for name, key in self.keys.items():
-            own = target_density(_errors(results[name]), rate)
-            densities[key] = np.maximum(densities.get(key, own), own)
-        total = sum(float(densities[key].sum()) for key in self.keys.values())
-        n_elements = next_size(solution, total, rate, accuracy, spread=SPREAD)
+            own = _errors(results[name])
+            worst[key] = np.maximum(worst.get(key, own), own)
+        errors = [worst[key] for key in self.keys.values()]
+        allowed = (SAFETY * accuracy) ** 2 * solution.error_unit
+        needed = needed_elements(np.concatenate(errors), rate, allowed)
+        ends_of_bodies = np.cumsum([len(own) for own in errors])[:-1]
+        densities = dict(zip(self.keys.values(), np.split(needed, ends_of_bodies), strict=True))
+        total = float(needed.sum())
+        error = solution.estimated_error
+        is_accurate = error is not None and error <= accuracy
+        n_elements = next_size(solution.n_elements, total / (1.0 - SPREAD), is_accurate=is_accurate)
         ends = zone_ends(solution)
         better = {}
         for key, partition in self.partitions.items():
@@ -154,7 +172,8 @@ def zone_ends(solution: AssemblySolution) -> list[ZoneEnd]:
         for side in sides.get(transition.part, (transition.part,)):
             body, part = side.split(".", 1)
             mesh = solution.bodies[body].mesh
-            found.append(ZoneEnd(mesh, part, *_nearest(mesh, mesh.part(part), point), body))
+            elements = mesh.part(part)
+            found.append(ZoneEnd(mesh, float(mesh.lengths[elements].sum()), *_nearest(mesh, elements, point), body))
     return found
 
 

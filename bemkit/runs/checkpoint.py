@@ -9,7 +9,9 @@ from typing import overload
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import check_result_target, read_result, write_result
 from bemkit.results.solution import Solution
+from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.assembly import solved_assemblies
+from bemkit.runs.assembly_adaptive import run_assembly_adaptive
 from bemkit.runs.history import solved_history
 from bemkit.runs.steps import joined
 from bemkit.scene.assembly import Assembly
@@ -32,12 +34,13 @@ def run_to_file(
     """Solve a load history into a result file that holds the steps so far as soon as each of them is finished.
 
     A file that holds the beginning of the same history, because a run was killed, is continued; the numbers are those
-    of a run without interruption, to the last bit, but for times.
+    of a run without interruption, to the last bit, but for times. With an accuracy the file holds the steps so far on
+    the mesh at hand; a run that goes on solves the coarser meshes again, and of this mesh what is missing.
 
     Parameters
     ----------
     scene : Scene or Assembly
-        On one mesh. It is compared with that in the file by what a scene file says.
+        It is compared with that in the file by what a scene file says.
     path : str or Path
         The result file, ``.h5``. Until the last step is there its status is UNFINISHED.
     callback : callable, optional
@@ -68,9 +71,15 @@ def run_to_file(
     solution: Solution | AssemblySolution
     if isinstance(scene, Assembly):
         begun = done if isinstance(done, AssemblySolution) else None
-        solution = joined(*solved_assemblies([scene], None, callback, begun, write))
+        if scene.mesh.accuracy is None:
+            solution = joined(*solved_assemblies([scene], None, callback, begun, write))
+        else:
+            solution = run_assembly_adaptive(scene, callback=callback, done=begun, finished=write)[-1]
     else:
         begun_one = done if isinstance(done, Solution) else None
-        solution = joined(*solved_history([scene], None, None, callback, begun_one, write))
+        if scene.mesh.accuracy is None:
+            solution = joined(*solved_history([scene], None, None, callback, begun_one, write))
+        else:
+            solution = run_adaptive(scene, callback=callback, done=begun_one, finished=write)[-1]
     write_result(target, solution)
     return solution

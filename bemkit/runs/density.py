@@ -10,7 +10,6 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.partition import SPREAD, better_partition
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.mesh_sequence import Level, ZoneEnd, zone_cuts, zone_ends
 
@@ -19,11 +18,13 @@ LARGEST_GROWTH = 2.5
 SMALLEST_GROWTH = 1.1
 """A mesh that is hardly larger would hardly be better."""
 TRANSITION = 3.0
-"""Length of the element in which the status changes, in units of the accuracy times the length of the part."""
+"""Length of the element in which the status changes, in units of the accuracy times the length of the zone."""
 MOST_FOR_TRANSITIONS = 2
 """Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
 SAFETY = 0.8
 """The next mesh is planned for this part of the error asked for."""
+MEAN_RATE = 2
+"""Power of element lengths in the mean error of the tractions at the centres of elements on a half-plane."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +38,18 @@ class DensityMeshes:
     Parameters
     ----------
     accuracy : float
-        Largest error in the energy norm, relative to the solution.
+        Largest error in the energy norm, relative to the solution; of half-planes also that of the tractions at the
+        centres of elements, in the mean.
     """
 
     accuracy: float
 
     def error(self, solution: Solution) -> float:
-        """Return the estimated error in the energy norm."""
-        return float("inf") if solution.estimated_error is None else solution.estimated_error
+        """Return the estimated error in the energy norm, of a half-plane that of its tractions if it is larger."""
+        energy, tractions = solution.estimated_error, solution.estimated_traction_error
+        if energy is None:
+            return float("inf")
+        return energy if solution.mean_traction_errors is None or tractions is None else max(energy, tractions)
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Tell whether the estimated error is small enough, and the elements in which the status changes short."""
@@ -55,11 +60,15 @@ class DensityMeshes:
         solution = solutions[-1]
         if solution.element_errors is None:
             raise InputError("collocation has no error estimate: choose a Galerkin discretisation")
-        rate = error_rate(solution.scene.discretisation.displacement_space(solution.mesh).degree)
-        density = target_density(solution.element_errors, rate)
+        rate, goal = error_rate(solution.scene.discretisation.displacement_space(solution.mesh).degree), self.accuracy
+        density = needed_elements(solution.element_errors, rate, (SAFETY * goal) ** 2 * solution.error_unit)
+        if solution.mean_traction_errors is not None:
+            allowed = SAFETY * goal * solution.mean_traction_size
+            density = np.maximum(density, needed_elements(solution.mean_traction_errors, MEAN_RATE, allowed))
         parts = [part.name for part in solution.scene.contact_parts]
         spread = SPREAD if parts else 0.0
-        n_elements = int(next_size(solution, float(density.sum()), rate, self.accuracy, spread=spread))
+        is_accurate = self.error(solution) <= goal
+        n_elements = int(next_size(solution.n_elements, float(density.sum()) / (1.0 - spread), is_accurate=is_accurate))
         cuts = zone_cuts(level.partition, zone_ends(solution))
         partition = better_partition(level.partition, density, n_elements, cuts=cuts, spread_over=parts)
         return replace(level, partition=partition)
@@ -69,15 +78,13 @@ def is_enough(errors: Sequence[float], ends: Iterable[ZoneEnd], accuracy: float)
     """Tell whether the estimated errors have become small enough, and the elements in which the status changes short.
 
     Tractions there behave like square roots; an element of length h leaves a relative error of about h / (3 l) in a
-    contact part of length l. The energy hardly notices.
+    contact zone of length l. The energy hardly notices.
     """
     n_accurate = sum(error <= accuracy for error in errors)
     if n_accurate == 0 or n_accurate > MOST_FOR_TRANSITIONS:
         return n_accurate > 0
     longest = TRANSITION * accuracy
-    return all(
-        end.mesh.lengths[end.element] <= longest * end.mesh.lengths[end.mesh.part(end.part)].sum() for end in ends
-    )
+    return all(end.mesh.lengths[end.element] <= longest * end.zone_length for end in ends)
 
 
 def error_rate(degree: int) -> int:
@@ -88,33 +95,26 @@ def error_rate(degree: int) -> int:
     return 2 * max(degree, 1) + 1
 
 
-def target_density(element_errors: FloatArray, rate: int) -> FloatArray:
-    """Return how many elements should replace each one.
+def needed_elements(errors: FloatArray, rate: int, allowed: float) -> FloatArray:
+    """Return how many elements should replace each one, so that the fewest leave a sum of errors that is allowed.
 
-    The squared error of an element cut into m falls like m**-rate; for the smallest sum over a given number of elements
-    m is proportional to the squared error to the power of 1 / (rate + 1).
+    An error on an element cut into m falls like m**-rate; the smallest sum over a given number of elements has m
+    proportional to the error to the power of 1 / (rate + 1).
     """
-    return np.asarray(element_errors ** (1.0 / (rate + 1)))
+    density = np.asarray(errors ** (1.0 / (rate + 1)))
+    return density * (float(density.sum()) / allowed) ** (1.0 / rate) if allowed > 0.0 else density
 
 
-def next_size(
-    solution: Solution | AssemblySolution, total_density: float, rate: int, accuracy: float, *, spread: float
-) -> float:
-    """Return the number of elements that the accuracy needs, or a step towards it.
+def next_size(n_elements: int, needed: float, *, is_accurate: bool) -> float:
+    """Return the number of elements of the next mesh: those needed, or a step towards them.
 
     Parameters
     ----------
-    solution : Solution or AssemblySolution
+    n_elements : int
         Of the last mesh.
-    total_density : float
-        The sum of `target_density`.
-    rate : int
-    accuracy : float
-    spread : float
-        Share of the elements that lie evenly on contact parts.
+    needed : float
+    is_accurate : bool
+        Whether the last mesh is fine enough but where the status changes.
     """
-    allowed = (SAFETY * accuracy) ** 2 * solution.error_unit
-    needed = (total_density / allowed) ** (1.0 / rate) * total_density / (1.0 - spread) if allowed > 0.0 else 0.0
-    error = solution.estimated_error
-    smallest = SMALLEST_GROWTH if error is None or error > accuracy else 1.0
-    return float(np.clip(needed, smallest * solution.n_elements, LARGEST_GROWTH * solution.n_elements))
+    smallest = 1.0 if is_accurate else SMALLEST_GROWTH
+    return float(np.clip(needed, smallest * n_elements, LARGEST_GROWTH * n_elements))

@@ -25,6 +25,7 @@ from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions
 from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.solved_steps import SolvedSteps
 from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import History, Kind, joined, solve_steps
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
@@ -41,7 +42,7 @@ def run_history(
     mesh: BoundaryMesh | None = None,
     start: Solution | None = None,
     callback: Callable[[StepRecord], None] | None = None,
-) -> tuple[Solution, ...]:
+) -> SolvedSteps[Solution]:
     """Solve scenes that follow each other in time, slip counting from the end of the step before.
 
     The body is factored once for all steps. Where the jump to a load fails, it is gone in halves; see
@@ -56,16 +57,17 @@ def run_history(
 
     Returns
     -------
-    tuple of Solution
-        One for each step, up to the first that does not converge. If that is not the first one, its fields are those of
-        the step before, the last state that is certified; status, message and history are its own.
+    SolvedSteps
+        A tuple of solutions, one for each step, up to the first that does not converge. If that is not the first one,
+        its fields are those of the step before, the last state that is certified; status, message and history are its
+        own.
 
     Raises
     ------
     UnsolvableSceneError, ValueError
         As for `run`, also if the scenes differ by more than numbers.
     """
-    return solved_history(scenes, mesh, start, callback)[1]
+    return SolvedSteps(solved_history(scenes, mesh, start, callback)[1])
 
 
 def solved_history(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import numpy as np
 
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.solution import Solution
 from bemkit.runs.refinement import AnyLevel, Refinement
@@ -16,28 +17,47 @@ from bemkit.runs.steps import History, joined
 
 AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
 
+_SAME = 1e-9
+"""Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
 
-@dataclass(frozen=True)
+
+@dataclass
 class HistoryRefinement(Generic[AnyLevel, AnySolution]):
-    """A refinement of single loads, made one of load histories, whose memory belongs to one mesh.
+    """A refinement of single loads, made one of load histories.
 
     Parameters
     ----------
     single : Refinement
     solve : callable
-        Level -> the history and its steps, from the first one on.
+        Level, what is done on its mesh, who hears of finished steps -> the history, and the steps solved now.
+    done : Solution or AssemblySolution, optional
+        Some steps on one of the meshes, from an earlier run; meshes before that one are solved again, unheard.
+    finished : callable, optional
+        Receives the result of all steps so far on a mesh after each of them but the last.
     """
 
     single: Refinement[AnyLevel, AnySolution]
-    solve: Callable[[AnyLevel], tuple[History[AnySolution], tuple[AnySolution, ...]]]
+    solve: Callable[
+        [AnyLevel, AnySolution | None, Callable[[AnySolution], None] | None],
+        tuple[History[AnySolution], tuple[AnySolution, ...]],
+    ]
+    done: AnySolution | None = None
+    finished: Callable[[AnySolution], None] | None = None
     guides: dict[int, AnySolution] = field(default_factory=dict, init=False)
     """By the identity of the last step on a mesh, what the next mesh follows."""
 
     def solved(self, level: AnyLevel, start: AnySolution | None) -> AnySolution:
-        """Solve all steps."""
-        history, steps = self.solve(level)
+        """Solve all steps that are not done."""
+        done, finished = None, self.finished
+        if self.done is not None and _has_meshes(self.done, level.meshes):
+            done, self.done = self.done, None
+        elif self.done is not None and level.n_elements < self.done.n_elements:
+            finished = None
+        else:
+            self.done = None
+        history, steps = self.solve(level, done, finished)
         solution = joined(history, steps)
-        self.guides[id(solution)] = worst_of(steps)
+        self.guides[id(solution)] = worst_of(_ends(solution) or steps)
         return solution
 
     def error(self, solution: AnySolution) -> float:
@@ -68,7 +88,8 @@ class HistoryRefinement(Generic[AnyLevel, AnySolution]):
 def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
     """Return the step with the largest estimated error, with the largest error of all steps on each element.
 
-    The step with the largest energy measures all errors, so that those of an unloaded body are not measured by nothing.
+    The step with the largest energy measures all errors, so that those of an unloaded body are not measured by nothing;
+    on half-planes that with the largest tractions measures those of tractions.
     """
     unit = max(step.error_unit for step in steps)
     errors = [[body.element_errors for body in _bodies(step)] for step in steps]
@@ -85,7 +106,25 @@ def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
     for body, own in zip(_bodies(worst), largest, strict=True):
         vars(body)["element_errors"] = own * share
     vars(worst)["estimated_error"] = float(np.sqrt(sum(float(own.sum()) for own in largest) / unit))
+    of_tractions = [body.mean_traction_errors for step in steps for body in _bodies(step)]
+    known_tractions = [own for own in of_tractions if own is not None]
+    if isinstance(worst, Solution) and known_tractions:
+        vars(worst)["mean_traction_errors"] = np.max(known_tractions, axis=0)
+        vars(worst)["mean_traction_size"] = max(body.mean_traction_size for step in steps for body in _bodies(step))
+        vars(worst).pop("estimated_traction_error", None)
     return worst
+
+
+def _ends(solution: AnySolution) -> list[AnySolution]:
+    """Return the ends of all finished steps."""
+    return [] if solution.loading is None else [step.end for step in solution.loading.steps]  # type: ignore[misc]
+
+
+def _has_meshes(solution: Solution | AssemblySolution, meshes: Mapping[str, BoundaryMesh]) -> bool:
+    """Tell whether a solution is one on these meshes, wherever its bodies lie."""
+    own = {"": solution.mesh} if isinstance(solution, Solution) else {k: v.mesh for k, v in solution.bodies.items()}
+    pairs = [(own[name].lengths, mesh.lengths) for name, mesh in meshes.items()]
+    return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)
 
 
 def _bodies(solution: Solution | AssemblySolution) -> list[Solution | BodyResult]:

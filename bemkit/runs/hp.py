@@ -12,11 +12,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
-from bemkit.geometry.meshing.layers import has_same_pieces, is_at_end, layered_partition, refined_partition
+from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import element_degrees
+from bemkit.geometry.meshing.layers import (
+    FACTOR,
+    SHORTEST,
+    has_same_pieces,
+    is_at_end,
+    layered_partition,
+    origins,
+    refined_partition,
+)
+from bemkit.geometry.meshing.partition import Partition
+from bemkit.results.coefficient_decay import CoefficientErrors
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
+from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
 from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
 
 SAFETY = 0.4
@@ -29,8 +42,6 @@ LARGEST_RISE = 2
 """Degrees from mesh to mesh: the places where the status changes must keep up."""
 MOST_LOOKS = 3
 """Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
-FASTEST = 0.05
-"""Smallest factor that a further degree is trusted to bring."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +76,26 @@ class LayeredMeshes:
         errors = [self.error(solution) for solution in solutions if solution.coefficient_errors is not None]
         return len(errors) > FEWEST_LEVELS and min(errors[-2:]) > 0.5 * min(errors[:-2])
 
+    def _check_lengths(self, solution: Solution) -> None:
+        """Raise an error that names the place if the largest error is that of an element as short as can be."""
+        errors, mesh = solution.coefficient_errors, solution.mesh
+        if errors is None:
+            return
+        worst = int(np.argmax(self._share(solution, errors)))
+        if mesh.lengths[worst] < 2.0 / FACTOR * SHORTEST * mesh.lengths.sum():
+            x, y = mesh.centres[worst]
+            raise GeometryError(
+                f"the largest error stands at ({x:.6g}, {y:.6g}), where an element of the length "
+                f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
+            )
+
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
         """Return a mesh of the next degree, with more layers where that is not enough."""
         solution, partition = solutions[-1], level.partition
-        if self._is_stuck(solutions) or (level.number > 0 and solution.estimated_error is None):
+        if level.number > 0 and solution.estimated_error is None:
+            return None
+        if self._is_stuck(solutions):
+            self._check_lengths(solution)
             return None
         ends = zone_ends(solution)
         if level.number == 0 and len(solutions) < MOST_LOOKS and len(ends) < len(solution.transitions):
@@ -77,13 +104,41 @@ class LayeredMeshes:
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
             return Level(level.asked, fresh, 1)
-        rise = self._rise(solution, ~is_at_end(partition)) if has_same_pieces(partition, fresh) else 0
+        has_moved = has_same_pieces(partition, fresh)
+        rise = self._rise(solution, ~is_at_end(partition)) if has_moved else 0
         following = Level(level.asked, fresh, level.number + rise)
-        degree, next_degree = (
-            each.discretisation.displacement_space(solution.mesh).degree for each in (level.scene, following.scene)
-        )
-        excess = self._excess(solution, next_degree - degree)
-        return replace(following, partition=refined_partition(partition, excess, cuts))
+        old_degrees = element_degrees(level.scene.discretisation.displacement_space(solution.mesh))
+        degree = following.scene.discretisation.displacement_space(solution.mesh).degree
+        refined = refined_partition(partition, self._excess(solution, degree - old_degrees), cuts, self.accuracy)
+        degrees: tuple[int, ...] = ()
+        if has_moved and level.asked.discretisation.needs_accuracy:
+            degrees = self._degrees(solution, partition, refined, old_degrees, degree)
+        return replace(following, partition=refined, degrees=degrees)
+
+    def _degrees(
+        self, solution: Solution, old: Partition, new: Partition, old_degrees: IntArray, largest: int
+    ) -> tuple[int, ...]:
+        """Return the degrees of new elements that come from those of a solution."""
+        errors = solution.coefficient_errors
+        if errors is None:
+            return ()
+        elements, layers = origins(old, new)
+        is_cut = np.bincount(elements, minlength=old_degrees.size)[elements] > 1
+
+        def excess(degrees: IntArray) -> FloatArray:
+            return self._share(solution, errors.at_higher_degrees(degrees - old_degrees))
+
+        kept = sufficient_degrees(excess, old_degrees.size, largest)[elements]
+        return tuple(few_kinds(below_layers(np.where(is_cut, largest, kept), layers)).tolist())
+
+    def _share(self, solution: Solution, errors: CoefficientErrors) -> FloatArray:
+        """Return by which factor (n_elements,) errors are above equal shares of half of what is allowed."""
+        elements, size = solution.contact_elements, solution.contact_traction_size
+        allowed = 0.5 * (SAFETY * self.accuracy) ** 2 / errors.energy.size
+        excess = np.sqrt(errors.energy / (allowed * solution.error_unit))
+        if size > 0.0:
+            excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / (allowed * size**2)))
+        return excess
 
     def _rise(self, solution: Solution, inner: BoolArray) -> int:
         """Return how many degrees the errors of the inner elements need, one for those at the ends, none for places."""
@@ -101,19 +156,19 @@ class LayeredMeshes:
         tractions = float(errors.traction[contact[chosen[contact]]].sum()) / size**2 if size > 0.0 else 0.0
         return float(np.sqrt(max(energy, tractions)))
 
-    def _excess(self, solution: Solution, rise: int) -> FloatArray:
-        """Return by which factor (n_elements,) the errors at a higher degree would be above what is allowed to each."""
+    def _excess(self, solution: Solution, rise: IntArray) -> FloatArray:
+        """Return by which factor (n_elements,) the errors at higher degrees would be above what is allowed to each."""
         errors = solution.coefficient_errors
         if errors is None:
             raise InputError(
                 f"{solution.scene.discretisation.method} has no error estimate: take another discretisation"
             )
         goal = max(SAFETY * self.accuracy, self.error(solution) / GAIN**LARGEST_RISE)
-        falling = np.clip(errors.decay, FASTEST, 1.0) ** (2 * rise)
-        excess = _excess_of(errors.energy * falling, solution.error_unit * goal**2)
+        errors = errors.at_higher_degrees(rise)
+        excess = _excess_of(errors.energy, solution.error_unit * goal**2)
         elements, size = solution.contact_elements, solution.contact_traction_size
         if size > 0.0:
-            of_tractions = _excess_of((errors.traction * falling)[elements], (size * goal) ** 2)
+            of_tractions = _excess_of(errors.traction[elements], (size * goal) ** 2)
             excess[elements] = np.maximum(excess[elements], of_tractions)
         return excess
 

@@ -100,11 +100,13 @@ class Standing:
         is_held = (before.state.traction != 0.0).any(axis=1) & (self.state.traction != 0.0).any(axis=1)
         of_friction = -sigma[:, 1] * moved[:, 1]
         taken = max(float(of_friction[is_held].sum()), 0.0)
+        along_slip = 2.0 * weights * self.state.traction[:, 1] * moved[:, 1]
         of_forces = 0.5 * float((before.forces + self.forces) @ (self.displacements - before.displacements))
         return StepWork(
             external_work=of_forces + float(sigma[:, 0] @ approached),
             dissipation=taken,
             increment_work=float(sigma[:, 0] @ (approached - moved[:, 0])) + float(of_friction.sum()) - taken,
+            friction_gain=float(np.maximum(along_slip, 0.0).sum()),
         )
 
 

@@ -15,6 +15,7 @@ from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.contact_table import resolved_transitions
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Scene
+from bemkit.solvers.active_sets import NodeStatus
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,21 +28,30 @@ class Level:
     partition : Partition
     number : int
         Which of the discretisations that follow each other; see `Discretisation.at_level`.
+    degrees : tuple of int
+        Of each element, where they are lower than those of that discretisation.
     """
 
     asked: Scene
     partition: Partition
     number: int = 0
+    degrees: tuple[int, ...] = ()
 
     @cached_property
     def scene(self) -> Scene:
         """The scene with the discretisation of this level."""
-        return replace(self.asked, discretisation=self.asked.discretisation.at_level(self.number))
+        discretisation = self.asked.discretisation.at_level(self.number)
+        return replace(self.asked, discretisation=discretisation.with_degrees(self.degrees))
 
     @property
     def n_elements(self) -> int:
         """Number of elements."""
         return self.partition.mesh.n_elements
+
+    @property
+    def meshes(self) -> dict[str, BoundaryMesh]:
+        """The mesh, without a name."""
+        return {"": self.partition.mesh}
 
 
 class MeshSequence(Protocol):
@@ -64,25 +74,35 @@ class MeshSequence(Protocol):
 
 
 class ZoneEnd(NamedTuple):
-    """Where zones of one status end: in which element of which part, and at which fraction of its length."""
+    """Where zones of one status end: in which element, and at which fraction of its length.
+
+    The zone length says what the element is short or long compared with [m].
+    """
 
     mesh: BoundaryMesh
-    part: str
+    zone_length: float
     element: int
     fraction: float
     body: str = ""
 
 
 def zone_ends(solution: Solution) -> list[ZoneEnd]:
-    """Return where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
-    mesh = solution.mesh
+    """Return where zones of one status end, as far as they are resolved; see `resolved_transitions`.
+
+    Zones are as long as their part; on a half-plane, of which a part may be any strip, as half of what touches there.
+    """
+    mesh, table = solution.mesh, solution.contact
     found = []
     for transition in resolved_transitions(solution.contact, solution.transitions):
         elements = along_boundary(mesh, mesh.part(transition.part))
         ends = np.cumsum(mesh.lengths[elements])
         k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
         fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
-        found.append(ZoneEnd(mesh, transition.part, int(elements[k]), fraction))
+        zone_length = float(ends[-1])
+        if mesh.surface is not None:
+            touches = table.rows(transition.part) & (table.status != NodeStatus.SEPARATED)
+            zone_length = 0.5 * float(table.weight[touches].sum())
+        found.append(ZoneEnd(mesh, zone_length, int(elements[k]), fraction))
     return found
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
 from bemkit.errors import BemkitError, InputError
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.solution import AnySolution, with_totals
 from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
 from bemkit.solvers.base import Status
@@ -19,6 +20,11 @@ class SizedLevel(Protocol):
     @property
     def n_elements(self) -> int:
         """Number of elements, of all bodies."""
+        ...
+
+    @property
+    def meshes(self) -> Mapping[str, BoundaryMesh]:
+        """The mesh of each body by its name, which is empty if there is only one."""
         ...
 
 
@@ -95,7 +101,8 @@ def refined(
         solutions.append(solution)
         now = time.perf_counter()
         if not solution.is_converged:
-            obstacle = f"the solve on {solution.n_elements} elements failed"
+            worst, word = solution.certificate.worst, solution.status.name.lower().replace("_", " ")
+            obstacle = f"the solve on {solution.n_elements} elements ended {word} (certificate {worst:.1e})"
         elif refinement.is_enough(solutions):
             break
         else:

@@ -14,7 +14,7 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import make_plan
-from bemkit.results.solution import Solution
+from bemkit.results.solution import Solution, with_times
 from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
 from bemkit.runs.timing import Stage
@@ -92,7 +92,8 @@ def run(
     if mesh is None and start is None and (ratio := _gain_by_cascade(scene)):
         from bemkit.runs.nested import run_cascade
 
-        return run_cascade(scene, coarsest=_COARSEST, ratio=ratio, callback=callback)[-1]
+        meshes = run_cascade(scene, coarsest=_COARSEST, ratio=ratio, callback=callback)
+        return with_times(meshes[-1], meshes)
     return run_on_mesh(scene, mesh, start, callback)
 
 
@@ -110,7 +111,7 @@ def _gain_by_cascade(scene: Scene) -> int:
     if n_elements < _LARGE or surface is not None:
         return 0
     smaller = replace(scene, mesh=replace(scene.mesh, elements=_LARGE))
-    return 4 if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
+    return 16 if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
 
 
 def _run_assembly(

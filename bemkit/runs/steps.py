@@ -139,7 +139,7 @@ def solve_steps(
         if number:
             before, model = model, model.under(step)
         if done is not None and number < n_done:  # in an earlier run: only the model goes the same way again
-            end = Standing.under(model, done.state, done.motion) if number == n_done - 1 else end
+            end = Standing.under(model, done.steps[-1].state, done.motion) if number == n_done - 1 else end
             continue
         clock = clock.closed(Stage.CONDENSE)
         reached = reach(_path(model, before, end, history.times[number]), guess, callback)
@@ -210,16 +210,14 @@ def _loading(
         change = solution.energy - (steps[-1].elastic_energy if steps else 0.0)
         work = replace(work, external_work=change + work.dissipation + work.increment_work)
     step = LoadStep(
-        time=end.motion.time,
         work=work,
-        elastic_energy=solution.energy,
         n_increments=reached.n_increments,
         linear_solves=solution.linear_solves,
-        contact=solution.contact,
-        slip=end.motion.slip,
+        end=solution,
+        state=end.state,
+        motion=end.motion,
     )
-    finished: tuple[LoadStep, ...] = (*steps, step)
-    return LoadHistory(history.asked, len(history.times), finished, end.state, end.motion)
+    return LoadHistory(history.asked, len(history.times), (*steps, step))
 
 
 def _not_reached(before: AnySolution | None, result: ContactSolution, clock: StageClock) -> AnySolution:

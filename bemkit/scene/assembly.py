@@ -16,7 +16,7 @@ from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Free, Part
-from bemkit.scene.discretisation import Discretisation, LinearGalerkin
+from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene
@@ -208,7 +208,12 @@ class Assembly(ShownInNotebooks):
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         for body in self.placed_bodies:
-            _ = self.scene_of(body)  # parts and sides are checked
+            scene = self.scene_of(body)  # parts and sides are checked
+            if isinstance(scene.discretisation, Galerkin) and isinstance(scene.discretisation.degree, tuple):
+                raise InputError(
+                    f"degree is a list, of body {body.name!r}: elements have several degrees in scenes of one body "
+                    "alone: give one degree"
+                )
 
     def _check_accuracy(self, accuracy: float) -> None:
         for body in self.bodies:

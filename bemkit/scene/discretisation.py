@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import (
-    LARGEST_DEGREE,
-    BoundarySpace,
-    ConstantSpace,
-    LagrangeSpace,
-    break_nodes,
-    check_degree,
-)
-from bemkit.operators.half_plane import half_plane_map, half_plane_needs
-from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical, LinearSolver
+from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
-from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 from bemkit.scene.thinness import thinness_warnings
 
@@ -65,11 +61,19 @@ class Discretisation(Protocol):
         """Whether it makes no sense without meshes that follow an accuracy."""
         return False
 
+    def of_images(self, n_images: int) -> Discretisation:
+        """Return what it is on the whole body, of which a mesh with a symmetry is one of so many images."""
+        return self
+
     def at_level(self, number: int) -> Discretisation:
         """Return what to use on a mesh of those that follow an accuracy; the first one has the `number` 0.
 
         Where the number may be skipped, the discretisations should be ever better ones.
         """
+        return self
+
+    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
+        """Return it with the degrees of each element that a mesh has; itself unless they may differ."""
         return self
 
     @abstractmethod
@@ -96,9 +100,19 @@ class Discretisation(Protocol):
         """Say why the equations on a mesh cannot be compressed over a tree; empty if `hierarchical_map` makes them."""
         return f"{self.method} has no such equations"
 
+    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
+        """Whether the elastic energy may be negative on a mesh, so that the stiffness has to be examined."""
+        return False
+
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
         """Return the map with its equations compressed over a tree, the usual one unless `why_dense` is empty."""
         return self.elastic_map(mesh, material, DenseCholesky())
+
+    def chosen_map(self, mesh: BoundaryMesh, material: Material, chosen: ChosenLinearSolver) -> SteklovPoincare:
+        """Return the map with the linear solver that was chosen for it."""
+        if chosen.hierarchical is None:
+            return self.elastic_map(mesh, material, chosen.solver)
+        return self.hierarchical_map(mesh, material, chosen.hierarchical)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Foresee what the map takes; nothing is foreseen unless this is written."""
@@ -124,6 +138,8 @@ class SymmetricGalerkin(Discretisation, Protocol):
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the Galerkin map of the two spaces; of a half-plane the one of its surface."""
         if mesh.surface is not None:
+            from bemkit.operators.half_plane.maps import half_plane_map
+
             return half_plane_map(mesh, material)
         displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
         return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
@@ -131,6 +147,8 @@ class SymmetricGalerkin(Discretisation, Protocol):
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what the Galerkin map takes."""
         if case.mesh.surface is not None:
+            from bemkit.operators.half_plane.maps import half_plane_needs
+
             return half_plane_needs(case)
         degree = self.displacement_space(case.mesh).degree
         return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
@@ -146,35 +164,57 @@ class Galerkin(SymmetricGalerkin):
 
     Parameters
     ----------
-    degree : int
-        p, from 1 to 12. High degrees pay on smooth fields, and on meshes whose elements become shorter towards corners
-        and towards places where contact changes, which an accuracy makes.
+    degree : int or sequence of int
+        p, from 1 to 12, of all elements or of each one. High degrees pay on smooth fields, and on meshes whose elements
+        become shorter towards corners and towards places where contact changes, which an accuracy makes. Where degrees
+        differ, elements share the node between them, and tractions are of degree 1 where displacements are.
 
     Raises
     ------
     GeometryError
-        If the degree is no whole number from 1 to 12.
+        If a degree is no whole number from 1 to 12; on a mesh, if there is not one for each element.
     """
 
-    degree: int
+    degree: int | tuple[int, ...]
 
     def __post_init__(self) -> None:
-        check_degree(self.degree)
+        if isinstance(self.degree, Sequence) and not isinstance(self.degree, str):
+            if not self.degree:
+                raise GeometryError("degree has no entries: give one whole number, or one for each element")
+            object.__setattr__(self, "degree", tuple(self.degree))
+        for degree in self._degrees:
+            check_degree(degree)
+
+    @property
+    def _degrees(self) -> tuple[int, ...]:
+        """The degrees given."""
+        return self.degree if isinstance(self.degree, tuple) else (self.degree,)
+
+    @property
+    def largest_degree(self) -> int:
+        """The largest degree of an element."""
+        return max(self._degrees)
 
     @property
     def method(self) -> str:
         """Galerkin, and from degree 3 on which."""
-        return "Galerkin" if self.degree <= 2 else f"Galerkin of degree {self.degree}"
+        if min(self._degrees) < self.largest_degree:
+            return f"Galerkin of degrees {min(self._degrees)} to {self.largest_degree}"
+        return "Galerkin" if self.largest_degree <= 2 else f"Galerkin of degree {self.largest_degree}"
 
     @property
     def estimates_error(self) -> bool:
-        """True."""
-        return True
+        """True but for elements of degree 1 among others, on which nothing tells it."""
+        return len(set(self._degrees)) == 1 or min(self._degrees) > 1
 
     @property
     def takes_layers(self) -> bool:
         """From degree 3 on."""
-        return self.degree > 2
+        return self.largest_degree > 2
+
+    def of_images(self, n_images: int) -> Discretisation:
+        """Return the degrees of all elements, if there is one for each."""
+        return replace(self, degree=self.degree * n_images) if isinstance(self.degree, tuple) else self
 
     def at_level(self, number: int) -> Discretisation:
         """Return quadratic elements for the first look of a higher degree, later itself."""
@@ -187,13 +227,27 @@ class Galerkin(SymmetricGalerkin):
         """
         if mesh.surface is not None:
             return ConstantSpace(mesh)
-        return LagrangeSpace(mesh, degree=self.degree)
+        return LagrangeSpace(mesh, degree=self.largest_degree, element_degrees=self._on(mesh))
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
-        if self.degree == 1:
+        if self.largest_degree == 1:
             return ConstantSpace(mesh)
-        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.degree - 1)
+        degrees = self._on(mesh)
+        own = None if degrees is None else np.maximum(degrees - 1, 1)
+        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.largest_degree - 1, element_degrees=own)
+
+    def _on(self, mesh: BoundaryMesh) -> IntArray | None:
+        """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""
+        if not isinstance(self.degree, tuple):
+            return None
+        degrees, n_own = np.array(self.degree), mesh.n_elements
+        if degrees.size != n_own:
+            raise GeometryError(
+                f"degree has {degrees.size} entries, but the mesh has {n_own} elements: give one degree for each "
+                "element, or a single one"
+            )
+        return None if (degrees == degrees[0]).all() else degrees
 
 
 @dataclass(frozen=True)
@@ -225,7 +279,7 @@ class HpGalerkin(Galerkin):
         If the degree is no whole number from 1 to 12.
     """
 
-    degree: int = field(default=2, repr=False)
+    degree: int | tuple[int, ...] = field(default=2, repr=False)
 
     @property
     def takes_layers(self) -> bool:
@@ -240,6 +294,10 @@ class HpGalerkin(Galerkin):
     def at_level(self, number: int) -> Discretisation:
         """Return the degree 2 for the first look, and a degree more for each number."""
         return HpGalerkin(min(2 + number, LARGEST_DEGREE))
+
+    def with_degrees(self, degrees: tuple[int, ...]) -> Discretisation:
+        """Return the degrees themselves, if there are any."""
+        return HpGalerkin(degrees) if degrees else self
 
 
 @dataclass(frozen=True)
@@ -279,15 +337,25 @@ class ConstantCollocation(Discretisation):
         return CollocationElasticity(mesh, material, slopes=self.slopes)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
-        """Name thinness: only a dense stiffness tells whether elements that are too long make the energy negative."""
-        return "elements are too long for the thickness of the body" if thinness_warnings(mesh) else ""
+        """Nothing."""
+        return ""
+
+    def may_be_negative(self, mesh: BoundaryMesh) -> bool:
+        """Whether elements are too long for the thickness of the body."""
+        return bool(thinness_warnings(mesh))
 
     def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
-        """Return the compressed map of a body of straight elements without symmetry."""
+        """Return the compressed map."""
+        from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+
         return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
 
     def needs(self, case: BodyCase) -> BodyNeeds:
         """Return what collocation takes, and warn of bodies that are thin for their elements."""
-        find = collocation_needs if case.linear_solver.hierarchical is None else hierarchical_needs
-        needs = find(case, takes_slopes=self.slopes)
+        if case.linear_solver.hierarchical is None:
+            needs = collocation_needs(case, takes_slopes=self.slopes)
+        else:
+            from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
+
+            needs = hierarchical_needs(case, takes_slopes=self.slopes)
         return replace(needs, warnings=thinness_warnings(case.mesh))

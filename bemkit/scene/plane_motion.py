@@ -65,5 +65,11 @@ class PlaneMotion:
 
     def scaled(self, factor: float) -> Self:
         """Return the same with its given motions and loads multiplied by a number."""
-        given = {key: getattr(self, key) for pair in COMPONENTS for key in pair}
-        return replace(self, **{key: factor * value for key, value in given.items() if value is not None})
+        return self.multiplied(np.full(3, factor), np.full(3, factor))
+
+    def multiplied(self, motions: FloatArray, loads: FloatArray) -> Self:
+        """Return the same with its given motions and loads multiplied by numbers (3,) each."""
+        keys = [key for pair in COMPONENTS for key in pair]
+        factors = dict(zip(keys, np.column_stack([motions, loads]).ravel().tolist(), strict=True))
+        given = {key: getattr(self, key) for key in keys}
+        return replace(self, **{key: factors[key] * value for key, value in given.items() if value is not None})

@@ -14,8 +14,7 @@ from enum import Enum
 from functools import partial
 from typing import Any, cast, get_args, get_origin, get_type_hints
 
-import numpy as np
-
+from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
@@ -27,12 +26,13 @@ from bemkit.scene.serialisation import NAMED, options_of, registry_of, unstructu
 DRAFT = "http://json-schema.org/draft-07/schema#"
 Schema = dict[str, Any]
 
-_PLAIN: tuple[tuple[type, Schema], ...] = (
+_PLAIN: tuple[tuple[Any, Schema], ...] = (
     (bool, {"type": "boolean"}),
     (int, {"type": "integer"}),
     (float, {"type": "number"}),
     (str, {"type": "string"}),
     (Expression, {"type": "string"}),
+    (FloatArray, {"type": "array", "items": {"type": ["number", "array"]}}),
 )
 
 
@@ -88,13 +88,11 @@ class _Definitions:
 
     def _of_one(self, declared: Any) -> Schema:
         for plain, schema in _PLAIN:
-            if declared is plain:
+            if declared == plain:
                 return dict(schema)
         if declared is Any:
             return {}
         origin, inner = get_origin(declared), get_args(declared)
-        if origin is np.ndarray:
-            return {"type": "array", "items": {"type": ["number", "array"]}}
         if origin is tuple and inner[1:] == (Ellipsis,):
             return {"type": "array", "items": self.of_type(inner[0])}
         if origin is tuple:

@@ -203,7 +203,7 @@ def _converter() -> Converter:
     converter.register_structure_hook(int, lambda value, _: _integer(value))
     converter.register_structure_hook(bool, lambda value, _: _exactly(value, bool, "true or false"))
     converter.register_structure_hook(str, lambda value, _: _exactly(value, str, "a text in quotation marks"))
-    add(lambda wanted: get_origin(wanted) is np.ndarray, lambda value, _: _array(value))
+    add(lambda wanted: wanted == FloatArray, lambda value, _: _array(value))
     add(lambda wanted: get_origin(wanted) is tuple, lambda value, wanted: _tuple(converter, value, wanted))
     add(lambda wanted: get_origin(wanted) is Mapping, lambda value, wanted: _mapping(converter, value, wanted))
     add(lambda wanted: _is_class(wanted, Enum), lambda value, wanted: _enum(value, wanted))
@@ -297,6 +297,10 @@ def _is_callable(wanted: Any) -> bool:
     return get_origin(wanted) is Callable
 
 
+def _is_list(wanted: Any) -> bool:
+    return get_origin(wanted) is tuple or wanted == FloatArray  # whose origin depends on the version of numpy
+
+
 def _one_of(converter: Converter, value: object, wanted: Any) -> Any:
     options = options_of(wanted)
     for option in options:
@@ -315,7 +319,7 @@ def _fits(value: object, option: Any) -> bool:
         case str():
             return option is str or option is Expression or _is_class(option, Enum) or registry_of(option) is not None
         case list():
-            return get_origin(option) in (tuple, np.ndarray)
+            return _is_list(option)
         case dict():
             return is_dataclass(option) or registry_of(option) is not None
     return False
@@ -326,7 +330,7 @@ def _name(option: Any) -> str:
     registry = registry_of(option)
     if registry is not None:
         return f"a {registry.role}"
-    return names.get(option, "a list" if get_origin(option) in (tuple, np.ndarray) else "a table")
+    return names.get(option, "a list" if _is_list(option) else "a table")
 
 
 def _table_hook(converter: Converter, wanted: Any) -> Callable[[object, Any], Any]:
@@ -352,7 +356,8 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
 
 def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
     found: list[Any] = []
-    for name, options in _exactly(value, dict, f"a table of {heading}: write [{heading}.NAME]").items():
+    written = f"[{heading}.NAME]" + (", in one of several bodies [bodies.BODY.parts.NAME]" if wanted is Part else "")
+    for name, options in _exactly(value, dict, f"a table of {heading}: write {written}").items():
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")
             if "name" in table:

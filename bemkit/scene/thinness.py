@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,10 +17,11 @@ power of the length."""
 _SHARE = 0.25
 """Of the boundary: more than what is thin in the tip of a wedge or between a hole and a side."""
 _FACING = -0.5
-_ROWS = 256
-"""Elements whose neighbours are found at a time; meshes of no more need no tree."""
+_ROWS, _FEW = 4096, 256
+"""Elements whose neighbours are found at a time; meshes of few need no tree."""
 
 
+@lru_cache(maxsize=4)  # the plan and the choice of a linear solver ask for it, and it takes a while on large meshes
 def thinness_warnings(mesh: BoundaryMesh) -> tuple[str, ...]:
     """Warn in one sentence if elements of collocation are too long for the thickness of the body."""
     if mesh.is_exterior:
@@ -54,12 +57,13 @@ def thicknesses(mesh: BoundaryMesh, reach: FloatArray | float = np.inf) -> Float
 def _near_pairs(mesh: BoundaryMesh, farthest: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Yield elements and those of the whole body that may be as near; on small meshes all are."""
     whole, elements = mesh.whole, np.arange(mesh.n_elements)
-    if whole.n_elements <= _ROWS:
+    if whole.n_elements <= _FEW:
         yield np.repeat(elements, whole.n_elements), np.tile(np.arange(whole.n_elements), mesh.n_elements)
         return
     from scipy.spatial import KDTree
 
     tree = KDTree(whole.centres)
     for rows in np.split(elements, range(_ROWS, mesh.n_elements, _ROWS)):
-        near = tree.query_ball_point(mesh.centres[rows], farthest[rows])
-        yield np.repeat(rows, [len(each) for each in near]), np.concatenate(near).astype(np.intp)
+        near = tree.query_ball_point(mesh.centres[rows], farthest[rows], return_sorted=False)
+        counts = np.fromiter(map(len, near), np.intp, len(near))
+        yield np.repeat(rows, counts), np.fromiter(itertools.chain.from_iterable(near), np.intp, counts.sum())

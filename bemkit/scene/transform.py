@@ -17,6 +17,7 @@ from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
+from bemkit.scene.far_field import FarField
 from bemkit.scene.scene import Scene
 
 
@@ -153,9 +154,10 @@ def transformed_scene(
     scene : Scene
     affine : AffineMap
     stress : float
-        Factor of all loads, of the stresses of body forces, and of those in the friction law.
+        Factor of all loads, of the stresses of body forces, of those that act far away, and of those in the friction
+        law.
     displacement : float, optional
-        Factor of gaps and prescribed displacements; the first factor of the map if left out.
+        Factor of gaps and prescribed displacements, also far away; the first factor of the map if left out.
     modulus : float
         Factor of Young's modulus.
 
@@ -178,6 +180,7 @@ def transformed_scene(
         law=law,
         symmetry=symmetry,
         body_forces=forces,
+        far=None if scene.far is None else _transformed_far(scene.far, affine, stress, factor),
     )
 
 
@@ -194,7 +197,10 @@ def with_gap_offset(scene: Scene, offset: float) -> Scene:
 
 
 def with_turned_loads(scene: Scene, angle: float) -> Scene:
-    """Return a scene whose tractions, pressures and weight are turned anticlockwise by an angle [rad]."""
+    """Return a scene whose tractions, pressures and weight are turned anticlockwise by an angle [rad].
+
+    So are forces far away, of which motions that are given there hold what is left along them.
+    """
     cosine, sine = float(np.cos(angle)), float(np.sin(angle))
 
     def turned(condition: Condition) -> Condition:
@@ -211,8 +217,13 @@ def with_turned_loads(scene: Scene, angle: float) -> Scene:
         x, y = force.acceleration
         return replace(force, acceleration=(cosine * x - sine * y, sine * x + cosine * y))
 
+    far = scene.far
+    if far is not None:
+        x, y, _ = far.load.tolist()
+        turned_load = {"force_x": cosine * x - sine * y, "force_y": sine * x + cosine * y}
+        far = replace(far, **{key: load for key, load in turned_load.items() if getattr(far, key) is not None})
     forces = tuple(turned_weight(force) for force in scene.body_forces)
-    return replace(with_conditions(scene, turned), body_forces=forces)
+    return replace(with_conditions(scene, turned), body_forces=forces, far=far)
 
 
 def with_conditions(scene: Scene, change: Callable[[Condition], Condition]) -> Scene:
@@ -233,6 +244,13 @@ def _combined(
 def _transformed_part(part: Part, affine: AffineMap, stress: float, displacement: float) -> Part:
     where = None if part.where is None else TransformedRegion(part.where, affine)
     return replace(part, condition=_transformed_condition(part.condition, affine, stress, displacement), where=where)
+
+
+def _transformed_far(far: FarField, affine: AffineMap, stress: float, displacement: float) -> FarField:
+    length = affine.factor[0]
+    of_turn = np.array([1.0, 1.0, length])
+    centre: tuple[float, float] = tuple(affine.forward(np.array([far.centre]))[0].tolist())
+    return replace(far.multiplied(displacement / of_turn, stress * length * of_turn), centre=centre)
 
 
 def _transformed_body_force(force: BodyForce, affine: AffineMap, stress: float, modulus: float) -> BodyForce:

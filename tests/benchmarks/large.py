@@ -2,20 +2,24 @@
 
     python tests/benchmarks/large.py [--dense N] [--without-numba] [N ...]
 
-For each number of elements N (default 1000 2000 5000 10000 20000) it prints the processor seconds of compressing the
-equations, of the first factorisation, of a later contact step and of its certificate; the memory of all arrays that
-stay; the largest rank; and the certificate and transitions of the solution, found from coarser meshes as `bk.run` finds
-it. Growth exponents follow, from the smallest to the largest N and between the last two. Dense equations are solved
-beside up to `--dense` elements (default 2000). Processor seconds of all threads depend less on what else the computer
-does than wall-clock seconds.
+For each number of elements N (default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
+prints what the finest mesh takes of it in processor seconds: compressing the equations, the first factorisation, the
+median of later contact steps that change at most `FEW` leaves, and the median of certificates; the memory of all arrays
+that stay; the largest memory of the process; the largest rank; and the certificate and transitions of the solution.
+Growth exponents follow, from the smallest to the largest N and between the last two. Dense equations are solved beside
+up to `--dense` elements (default 2000). Processor seconds of all threads depend less on what else the computer does
+than wall-clock seconds.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import resource
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -23,15 +27,17 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
-from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.model.contact_model import Model, build_model
-from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.factor import HierarchicalFactor
 from bemkit.runs.history import run_on_mesh
 
 REFERENCE = (0.2575701, 0.4676382)
 """Where separation and slip end, from the source paper's example on other codes."""
+
+
+FEW = 8
+"""Leaves that a later contact step changes."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,7 @@ class Row:
     step: float
     certificate: float
     n_bytes: int
+    peak: int
     rank: int
     whole: float
     n_steps: int
@@ -53,41 +60,63 @@ class Row:
     apart: float = math.nan
 
 
+@dataclass
+class Parts:
+    """Processor seconds of the parts of a run on the mesh that was compressed last."""
+
+    build: float = 0.0
+    n_bytes: int = 0
+    rank: int = 0
+    updates: list[tuple[int, float]] = field(default_factory=list)
+    certificates: list[float] = field(default_factory=list)
+
+    def listen(self) -> None:
+        """Measure whatever is compressed, factored and certified from now on."""
+        compress, update, certify = Compression.of.__func__, HierarchicalFactor.update, HierarchicalBody.imbalance  # type: ignore[attr-defined]
+
+        def timed(work: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+            begin = time.process_time()
+            return work(*arguments), time.process_time() - begin
+
+        def compressed(cls: type, *arguments: Any) -> Compression:
+            result: Compression
+            result, self.build = timed(compress, cls, *arguments)
+            self.rank, self.updates, self.certificates = result.largest_rank, [], []
+            return result
+
+        def updated(factor: HierarchicalFactor, *arguments: Any) -> None:
+            _, seconds = timed(update, factor, *arguments)
+            self.updates.append((factor.n_factored, seconds))
+            self.n_bytes = factor.n_bytes + factor.compression.n_bytes
+
+        def certified(body: HierarchicalBody, *arguments: Any) -> Any:
+            result, seconds = timed(certify, body, *arguments)
+            self.certificates.append(seconds)
+            return result
+
+        Compression.of = classmethod(compressed)  # type: ignore[assignment,method-assign]
+        HierarchicalFactor.update = updated  # type: ignore[method-assign]
+        HierarchicalBody.imbalance = certified  # type: ignore[method-assign]
+
+
 def scene_of(n_elements: int, linear_solver: object) -> bk.Scene:
     """Return Example 1."""
     scene = bk.load_scene("paper-1")
     return replace(scene, mesh=replace(scene.mesh, elements=n_elements), linear_solver=linear_solver)
 
 
-def row_of(n_elements: int, *, with_dense: bool) -> Row:
+def row_of(n_elements: int, parts: Parts, *, with_dense: bool) -> Row:
     """Measure one number of elements."""
-    scene = scene_of(n_elements, bk.Hierarchical())
-    prepared = prepare(scene, scene.build_mesh())
-    with blas_threads_for(1):
-        clock = time.process_time()
-        model = build_model(prepared)
-        build = time.process_time() - clock
-        body, problem = model.body, model.problem
-        assert isinstance(body, HierarchicalBody)
-        clock = time.process_time()
-        state = problem.sticking_state
-        factor = time.process_time() - clock
-        step = _later_step(model)
-        body.respond(_held(model))
-        clock = time.process_time()
-        body.imbalance(state)
-        certificate = time.process_time() - clock
-        system = body.loaded.system
-        n_bytes, rank = system.compression.n_bytes + system.factor.n_bytes, system.compression.largest_rank
-    del model, body, problem, system, state
     clock = time.process_time()
-    solution = bk.run(scene)
+    solution = bk.run(scene_of(n_elements, bk.Hierarchical()))
     whole = time.process_time() - clock
     places = [each.x for each in solution.transitions]
     miss = max(abs(place - known) for place, known in zip(places, REFERENCE, strict=True))
+    steps = [seconds for leaves, seconds in parts.updates if 0 < leaves <= FEW]
     row = Row(
-        n_elements, build, factor, step, certificate, n_bytes, rank, whole,
-        solution.outer_steps, solution.certificate.worst, miss,
+        n_elements, parts.build, parts.updates[0][1], float(np.median(steps or [math.nan])),
+        float(np.median(parts.certificates)), parts.n_bytes, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
+        parts.rank, whole, solution.outer_steps, solution.certificate.worst, miss,
     )  # fmt: skip
     if not with_dense:
         return row
@@ -99,26 +128,24 @@ def row_of(n_elements: int, *, with_dense: bool) -> Row:
     return replace(row, dense=seconds, apart=float(apart))
 
 
-def _held(model: Model) -> LinearConditions:
-    return stick(model.problem.gap, model.problem.slip_origin)
-
-
-def _later_step(model: Model) -> float:
-    """Return the seconds of a response when a node at each of two places has changed, as at two transitions."""
-    problem = model.problem
-    held, changed = _held(model), np.zeros((problem.n_contact, 2), bool)
-    changed[[problem.n_contact // 4, problem.n_contact // 2]] = True
-    problem.body.respond(held)
-    clock = time.process_time()
-    problem.body.respond(held.replaced(changed, separated(problem.n_contact)))
-    return time.process_time() - clock
-
-
 def table_of(rows: list[Row]) -> Table:
     """Return what was measured."""
     table = Table(title=f"Example 1, kernels in {'numpy' if compiled.functions() is None else 'numba'}; CPU seconds")
     for column in (
-        *("N", "build", "factor", "step", "certificate of it", "GB", "rank", "run", "steps", "worst", "transitions"),
+        *(
+            "N",
+            "build",
+            "factor",
+            "step",
+            "certificate",
+            "GB",
+            "peak GB",
+            "rank",
+            "run",
+            "steps",
+            "worst",
+            "transitions",
+        ),
         *("dense run", "tractions apart"),
     ):
         table.add_column(column, justify="right")
@@ -127,6 +154,7 @@ def table_of(rows: list[Row]) -> Table:
             str(row.n_elements),
             *(f"{value:.2f}" for value in (row.build, row.factor, row.step, row.certificate)),
             f"{row.n_bytes / 1e9:.3f}",
+            f"{row.peak / 1e9:.2f}",
             str(row.rank),
             f"{row.whole:.1f}",
             str(row.n_steps),
@@ -151,9 +179,10 @@ def main() -> None:
     if options.without_numba:
         compiled.functions = lambda: None  # type: ignore[assignment]
     compiled.functions()  # compiles now, not within a measurement
-    console, rows = Console(width=160), []
+    console, rows, parts = Console(width=160), [], Parts()
+    parts.listen()
     for number in options.numbers:
-        rows.append(row_of(number, with_dense=number <= options.dense))
+        rows.append(row_of(number, parts, with_dense=number <= options.dense))
         console.print(table_of(rows[-1:]))
     console.print(table_of(rows))
     growth = Table(title="growth exponents")

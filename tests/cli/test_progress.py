@@ -101,6 +101,34 @@ with shown_progress(False):
     assert result.stdout.strip() == "[]"
 
 
+def test_no_command_loads_its_work_before_it_shows_that_it_begins() -> None:
+    code = """
+import sys
+from importlib import import_module
+from bemkit.cli.main import _COMMANDS
+for module, _ in _COMMANDS.values():
+    import_module(f"bemkit.cli.{module}")
+print([name for name in ("numpy", "scipy", "h5py", "cattrs", "matplotlib", "rich.progress") if name in sys.modules])
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("verify", "--quick", "cattaneo-mindlin"),
+        ("sweep", "paper-1", "--vary", "law.friction_coefficient=0.3,0.4", "--elements", "24"),
+        ("stability", "--random", "1", "--jobs", "1"),
+        ("study", "paper-1", "--elements", "40", "--meshes", "uniform", "--discretisation", "constant"),
+    ],
+)
+def test_a_study_shows_that_it_begins_and_then_its_tasks(arguments: tuple[str, ...]) -> None:
+    shown = on_a_terminal(*arguments)
+    assert shown.lstrip().startswith("begin")
+    assert re.search(r"\d+/\d+", shown)
+
+
 def test_nothing_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
     level = PROGRESS.level
     with live_progress(is_live=False) as callback:

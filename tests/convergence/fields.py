@@ -8,7 +8,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
-from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
+from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import SteklovPoincare

@@ -9,17 +9,19 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit import reference
 
 MATERIAL = bk.Material(1.0, 0.3)
 MODULUS = MATERIAL.plane_modulus
 FRICTION = bk.Coulomb(0.3)
 ALONG = bk.FarField(force_y=1.0, x=0.0, turn=0.0)
+ROUNDED = "where(abs(x) > 0.5, (abs(x) - 0.5)**2 / 2, 0 * x)"
 WITHIN = 1e-3
-"""An accuracy of 1e-4 in the energy norm leaves errors from 1e-5 to 8e-4 of the figures below."""
+"""What is asked of the meshes, and what all figures below are met to."""
 
 
 def pressed(gap: str, half_width: float, far: bk.FarField, **changes: object) -> bk.Solution:
-    changes = {"law": bk.Frictionless(), "mesh": bk.MeshOptions(accuracy=1e-4)} | changes
+    changes = {"law": bk.Frictionless(), "mesh": bk.MeshOptions(accuracy=WITHIN)} | changes
     parts = (bk.Part("zone", bk.Contact(bk.Gap(bk.Expression(gap)))),)
     shape = bk.HalfPlaneBody(-half_width, half_width)
     solution = bk.run(bk.Scene(title="indenter", shape=shape, material=MATERIAL, parts=parts, far=far, **changes))  # type: ignore[arg-type]
@@ -28,13 +30,14 @@ def pressed(gap: str, half_width: float, far: bk.FarField, **changes: object) ->
 
 
 def pressure_error(solution: bk.Solution, exact: Callable[[np.ndarray], np.ndarray], inner: float) -> float:
-    """Return the mean error of the pressure for |x| < inner, relative to its mean.
+    """Return the mean error of the pressures of elements with |x| < inner, relative to its mean.
 
-    Where neighbours have different lengths the pressures of single elements are up to 1 per cent off, up and down.
+    They are compared with means over the elements: the pressure under a wedge is infinite at its tip.
     """
     table = solution.contact
     rows = np.abs(table.x) < inner
-    expected = exact(table.x[rows])
+    places, weights = np.polynomial.legendre.leggauss(8)
+    expected = exact(table.x[rows, None] + 0.5 * table.weight[rows, None] * places) @ weights / 2.0
     return float(table.weight[rows] @ np.abs(table.sigma_n[rows] + expected) / (table.weight[rows] @ np.abs(expected)))
 
 
@@ -43,13 +46,41 @@ def zones(solution: bk.Solution) -> list[float]:
     return sorted((place.x for place in solution.transitions if place.x > 0.0), reverse=True)
 
 
+INDENTERS: dict[str, tuple[str, bk.FarField, bk.FrictionLaw, reference.LineContact]] = {
+    "cylinder": ("x**2 / 2", ALONG, bk.Frictionless(), reference.HertzLine(1.0, 1.0, MODULUS)),
+    "wedge": ("0.5 * abs(x)", ALONG, bk.Frictionless(), reference.BluntWedge(1.0, 0.5, MODULUS)),
+    "rounded": (ROUNDED, ALONG, bk.Frictionless(), reference.RoundedPunch(1.0, 0.5, 1.0, MODULUS)),
+    "flat": ("0 * x", ALONG, bk.Frictionless(), reference.FlatPunch(1.0, 1.0, MODULUS)),
+    "tilted": ("0 * x", replace(ALONG, turn=0.9), bk.Frictionless(), reference.FlatPunch(1.0, 1.0, MODULUS, 0.9)),
+    "sliding": ("0 * x", replace(ALONG, x=10.0), FRICTION, reference.SlidingPunch(1.0, 1.0, -0.3, MATERIAL)),
+}
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 3e-4])
+@pytest.mark.parametrize("name", INDENTERS)
+def test_what_is_asked_of_the_pressures_is_what_they_have(name: str, accuracy: float) -> None:
+    gap, far, law, exact = INDENTERS[name]
+    is_smooth = name in ("cylinder", "wedge", "rounded")
+    half_width = exact.half_width if is_smooth else 1.0
+    width = 1.7 * half_width if is_smooth else half_width
+    solution = pressed(gap, width, far, law=law, mesh=bk.MeshOptions(accuracy=accuracy))
+    assert pressure_error(solution, exact.pressure, 0.95 * half_width) < accuracy
+    if is_smooth:
+        assert zones(solution)[0] == pytest.approx(half_width, rel=accuracy)
+    if name == "cylinder":
+        assert -solution.contact.sigma_n.min() == pytest.approx(exact.pressure(np.zeros(1))[0], rel=accuracy)
+    if is_smooth:  # punches, infinite at their edges, are better than they seem
+        assert solution.estimated_traction_error is not None
+        assert solution.estimated_traction_error < 6.0 * pressure_error(solution, exact.pressure, half_width)
+
+
 def test_a_cylinder_as_hertz() -> None:
     a = np.sqrt(4.0 / (np.pi * MODULUS))
     peak = 2.0 / (np.pi * a)
     solution = pressed("x**2 / 2", 2.0 * a, ALONG)
     assert zones(solution)[0] == pytest.approx(a, rel=WITHIN)
     assert -solution.contact.sigma_n.min() == pytest.approx(peak, rel=WITHIN)
-    assert pressure_error(solution, lambda x: peak * np.sqrt(1.0 - (x / a) ** 2), 0.95 * a) < 2.0 * WITHIN
+    assert pressure_error(solution, lambda x: peak * np.sqrt(1.0 - (x / a) ** 2), 0.95 * a) < WITHIN
 
 
 def test_a_flat_punch() -> None:
@@ -70,9 +101,7 @@ def test_a_blunt_wedge() -> None:
     slope = 0.01
     solution = pressed("0.01 * abs(x)", 2.0, bk.FarField(force_y=slope * MODULUS, x=0.0, turn=0.0))
     assert zones(solution)[0] == pytest.approx(1.0, rel=WITHIN)
-    assert (
-        pressure_error(solution, lambda x: MODULUS * slope / np.pi * np.arccosh(1.0 / np.abs(x)), 0.95) < 5.0 * WITHIN
-    )
+    assert pressure_error(solution, lambda x: MODULUS * slope / np.pi * np.arccosh(1.0 / np.abs(x)), 0.95) < WITHIN
 
 
 def test_a_punch_that_slides() -> None:
@@ -97,7 +126,7 @@ def test_a_punch_that_is_bonded() -> None:
         shape=bk.HalfPlaneBody(-1.0, 1.0),
         material=MATERIAL,
         parts=parts,
-        mesh=bk.MeshOptions(accuracy=5e-5),
+        mesh=bk.MeshOptions(accuracy=WITHIN),
     )
     solution = bk.run(scene)
     assert solution.is_converged, solution.message
@@ -117,9 +146,7 @@ def test_a_rounded_punch() -> None:
     b, half_width = 0.5, 1.0
     angle = np.arcsin(b / half_width)
     force = MODULUS * half_width**2 * (np.pi - 2.0 * angle - np.sin(2.0 * angle)) / 4.0
-    solution = pressed(
-        "where(abs(x) > 0.5, (abs(x) - 0.5)**2 / 2, 0 * x)", 1.5, bk.FarField(force_y=force, x=0.0, turn=0.0)
-    )
+    solution = pressed(ROUNDED, 1.5, bk.FarField(force_y=force, x=0.0, turn=0.0))
     assert zones(solution)[0] == pytest.approx(half_width, rel=WITHIN)
 
 

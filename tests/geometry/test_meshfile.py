@@ -109,13 +109,16 @@ def line_mesh(points, lines, cell: str = "line") -> meshio.Mesh:
 
 REFUSED = {
     "branch": (
-        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1], [1, 2], [2, 0], [0, 1]]),
-        r"3 lines of .*body.vtk meet at \(0, 0\): the boundary must be closed and simple",
+        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 1], [1, 2], [2, 0], [0, 3]]),
+        r"body.vtk: 3 lines of its boundary meet at \(0, 0\): the boundary must be closed and simple",
     ),
-    "open": (line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1], [1, 2]]), r"1 lines of .* meet at \(0, 0\)"),
+    "open": (
+        line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1], [1, 2]]),
+        r"1 lines of its boundary meet at \(0, 0\)",
+    ),
     "not plane": (
         line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 2]], closed(3)),
-        r"have z from 0 to 2: give a plane mesh",
+        r"three-dimensional, with z from 0 to 2: .* give a plane mesh",
     ),
     "no lines": (
         line_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], "triangle"),
@@ -123,7 +126,7 @@ REFUSED = {
     ),
     "second order": (
         line_mesh([[0, 0, 0], [1, 0, 0], [0.5, 0, 0]], [[0, 1, 2]], "line3"),
-        r"has cells of type 'line3': write a mesh of first order",
+        r"has curved lines: write a mesh of first order",
     ),
     "two bodies": (
         line_mesh(
@@ -144,7 +147,11 @@ def test_refused(file_mesh: meshio.Mesh, message: str, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("body.msh", None, r"body.msh cannot be read \(ReadError: File .* not found.\): give a mesh file of a format"),
+        (
+            "body.msh",
+            None,
+            r"body.msh: it cannot be read \(ReadError: File .* not found.\): give a mesh file of a format",
+        ),
         ("body.txt", "hello", r"cannot be read \(ReadError: Could not deduce file format"),
         ("body.msh", "hello\n", r"cannot be read \(.*Couldn't read file"),
         ("body.vtk", "# vtk DataFile Version 4.2\n", r"cannot be read"),
@@ -229,11 +236,11 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
         ({"points": np.zeros(4)}, "its points are no finite coordinates"),
         ({"points": np.where(SQUARE > 0.5, np.nan, SQUARE)}, "its points are no finite coordinates"),
         ({"points": [["a", "b"]]}, "its points are no finite coordinates"),
-        ({"lines": np.array([[0, 1], [1, 9]])}, "its lines do not join pairs of its 4 points"),
-        ({"lines": np.array([[0, -1]])}, "its lines do not join pairs"),
-        ({"lines": np.array([0, 1, 2])}, "its lines do not join pairs"),
+        ({"lines": np.array([[0, 1], [1, 9]])}, "its cells do not join its 4 points"),
+        ({"lines": np.array([[0, -1]])}, "its cells do not join"),
+        ({"lines": np.array([0, 1, 2])}, "its cells do not join"),
         ({"cell_sets": {"top\x1b[31m": [[0]]}}, r"the group 'top\\x1b\[31m' has a name that is not printable"),
-        ({"cell_sets": {"top": [[7]]}}, "or lines that do not exist"),
+        ({"cell_sets": {"top": [[7]]}}, "its groups cannot be told"),
         ({"cell_sets": {"top": [["x"]]}}, "its groups cannot be told"),
     ],
 )
@@ -248,7 +255,7 @@ def test_contents_that_make_no_sense_are_named(
         cell_sets=content["cell_sets"],
     )
     monkeypatch.setattr(meshio, "read", lambda path: stored)
-    with pytest.raises(GeometryError, match=rf"x\.msh is damaged: .*{message}.*: write it anew") as caught:
+    with pytest.raises(GeometryError, match=rf"x\.msh: it is damaged: .*{message}.*: write it anew") as caught:
         read_mesh(tmp_path / "x.msh")
     assert str(caught.value).isprintable()
 

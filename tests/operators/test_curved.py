@@ -27,7 +27,7 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.spaces import corner_nodes
+from bemkit.geometry.corners import corner_nodes
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals

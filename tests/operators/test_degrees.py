@@ -11,9 +11,10 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.quadrature import gauss_lobatto
-from bemkit.geometry.spaces import break_nodes, dof_points
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
 

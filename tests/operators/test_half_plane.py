@@ -7,9 +7,9 @@ from mpmath import log, mpf, workdps
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import HalfPlaneBody
 from bemkit.geometry.surface import Surface
-from bemkit.operators.half_plane import half_plane_map
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.flexibility import mean_logarithms, strip_flexibility
+from bemkit.operators.half_plane.maps import half_plane_map
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 

@@ -24,7 +24,8 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, break_nodes
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
 from bemkit.operators.linear.block_cg import NotConvergedError, block_cg
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.multigrid import Multigrid

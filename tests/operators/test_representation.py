@@ -13,16 +13,10 @@ from hypothesis import strategies as st
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, ParametricCurve, Polygon, Rectangle, Ring, discretise
+from bemkit.geometry.corners import corner_nodes
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.spaces import (
-    BoundarySpace,
-    ConstantSpace,
-    LinearSpace,
-    QuadraticSpace,
-    corner_nodes,
-    dof_points,
-)
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.somigliana import moments as inner_moments

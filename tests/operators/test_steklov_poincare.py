@@ -20,7 +20,8 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, corner_nodes, dof_points
+from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.linear.solvers import Automatic
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.rigid_modes import rigid_motions

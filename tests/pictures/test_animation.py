@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
 from itertools import pairwise
 from pathlib import Path
 
@@ -43,13 +44,29 @@ def test_the_animation_has_a_picture_of_each_step(steps: tuple[bk.Solution, ...]
     assert [each.name for each in tmp_path.iterdir()] == ["square.gif"]
 
 
+def test_the_encoder_of_the_package_makes_an_mp4_with_a_picture_of_each_step(
+    steps: tuple[bk.Solution, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    monkeypatch.setattr("bemkit.pictures.animation.which", lambda name: None)  # none of the system
+    path = save_animation(tmp_path / "square.mp4", steps, steps_per_second=5)
+    assert [each.name for each in tmp_path.iterdir()] == ["square.mp4"]
+    decode = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    film = subprocess.run(decode, capture_output=True, check=True)
+    assert b"Video: h264" in film.stderr
+    assert b" 5 fps" in film.stderr
+    pictures = np.frombuffer(film.stdout, np.uint8).reshape(-1, 448, 512).astype(float)
+    assert len(pictures) == len(FACTORS)
+    assert all(np.abs(one - two).max() > 100.0 for one, two in pairwise(pictures))
+
+
 def test_animations_that_cannot_be_written_are_refused(
     steps: tuple[bk.Solution, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    monkeypatch.setattr("bemkit.pictures.animation._encoder", lambda: None)
     for name, message in (
         ("a.avi", "unknown ending of a moving picture: choose .gif or .mp4"),
-        ("a.mp4", r"needs the encoder ffmpeg, which is not installed: choose \.gif"),
+        ("a.mp4", r"\.mp4 needs an encoder: pip install \"bemkit\[movie\]\", or choose \.gif"),
     ):
         with pytest.raises(OutputFileError, match=message):
             save_animation(tmp_path / name, steps)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 import bemkit as bk
 from bemkit.pictures import draw_stress
 from bemkit.pictures.shown import shown
-from bemkit.pictures.stress import STRESSES
+from bemkit.pictures.stress import STRESSES, largest_shown
 from bemkit.pictures.stress_points import StressPoints, stress_points
 
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -125,3 +125,15 @@ def test_several_bodies_share_a_scale_and_the_axes_are_returned() -> None:
 def test_an_unknown_measure_is_refused() -> None:
     with pytest.raises(bk.InputError, match="measure is 'tresca': give one of von-mises"):
         draw_stress(bk.run(bk.load_scene("bending")), measure="tresca")
+
+
+def test_points_that_crowd_in_a_corner_do_not_stretch_the_colours() -> None:
+    """A thousand squares with stresses up to one, and in one more square as many points with a hundred."""
+    grid = np.stack(np.meshgrid(np.arange(40.0), np.arange(25.0)), axis=2).reshape(-1, 2) + 0.5
+    corner = np.array([40.5, 0.5]) + 1e-3 * grid / 40.0
+    values = np.concatenate([np.linspace(-1.0, 1.0, 1000), np.full(1000, 100.0)])
+    points = np.concatenate([grid, corner])
+    assert 0.99 < largest_shown(points, values, 1.0) <= 1.0
+    # where they fill a tenth of the picture they count
+    spread = np.concatenate([grid, 10.0 * (corner - 40.5) + np.arange(1000)[:, None] % 100 + 100.0])
+    assert largest_shown(spread, values, 1.0) == 100.0

@@ -37,6 +37,18 @@ def test_results_scenes_and_plans_show_a_table_and_a_picture() -> None:
     assert not plan.of("img")
 
 
+def test_load_steps_show_a_table_of_the_first_and_last_and_the_friction_loop() -> None:
+    scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
+    steps = bk.run_history([scene])
+    few, many = Page(steps._repr_html_()), Page(type(steps)(steps * 10)._repr_html_())
+    assert "Load steps" in few.texts
+    assert "The first and the last of 20 load steps" in many.texts
+    assert len(few.of("tr")) == 1 + 2
+    assert len(many.of("tr")) == 1 + 12
+    assert len(few.of("img")) == 2
+    assert len(Page(steps[-1]._repr_html_()).of("img")) == 2
+
+
 def test_doubts_are_shown() -> None:
     solution = bk.run(with_overrides(bk.load_scene("paper-1"), elements=24))
     doubted = solution.with_warnings(("Something is doubtful.",))

@@ -86,6 +86,14 @@ def test_a_law_cites_its_work() -> None:
     assert LAW_WORKS.keys() <= LAWS.built_in.keys()
 
 
+def test_the_law_of_contacts_that_are_found_cites_its_work() -> None:
+    law = SlipWeakening(static_friction=0.5, kinetic_friction=0.3, slip_distance=1.0)
+    arch = bk.load_scene("masonry-arch")
+    assert arch.touching is not None
+    assert "Ida1972" in keys(cite(replace(arch, touching=replace(arch.touching, law=law))))
+    assert "Ida1972" not in keys(cite(arch))
+
+
 def test_a_scene_without_contact_cites_nothing_of_contact() -> None:
     assert not keys(cite(bk.load_scene("bending"))) & {"AlartCurnier1991", *DRIVERS["semismooth-newton"]}
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from base64 import b64decode
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -36,8 +38,6 @@ def call(*arguments: str) -> int:
 def test_every_ending_writes_and_replaces_its_own(
     ending: str, name: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    if ending == ".vtu":
-        pytest.importorskip("meshio")
     path = tmp_path / f"r{ending}"
     for _ in range(2):
         bk.export_result(path, request.getfixturevalue(name))
@@ -60,7 +60,7 @@ def test_other_programs_read_the_lines(solution: bk.Solution, tmp_path: Path) ->
     meshio = pytest.importorskip("meshio")
     bk.export_result(tmp_path / "r.vtu", solution)
     mesh = meshio.read(tmp_path / "r.vtu")
-    lines, vertices = mesh.cells
+    vertices, lines = mesh.cells
     assert (lines.type, vertices.type) == ("line", "vertex")
     assert len(vertices.data) == solution.contact.n_contact
     assert len(lines.data) % solution.mesh.n_elements == 0
@@ -69,9 +69,10 @@ def test_other_programs_read_the_lines(solution: bk.Solution, tmp_path: Path) ->
     assert np.hypot(*(ends[:, 1] - ends[:, 0]).T).sum() == pytest.approx(solution.mesh.lengths.sum(), rel=1e-12)
     at_contact = vertices.data.ravel()
     np.testing.assert_array_equal(mesh.point_data["sigma_n"][at_contact], solution.contact.sigma_n)
-    corner = np.argmin(np.hypot(*(mesh.points[:, :2] - solution.mesh.nodes[0]).T))
+    on_lines = np.unique(lines.data)
+    corner = on_lines[np.argmin(np.hypot(*(mesh.points[on_lines, :2] - solution.mesh.nodes[0]).T))]
     np.testing.assert_allclose(mesh.point_data["displacement"][corner, :2], solution.boundary.displacement[0])
-    assert mesh.cell_data["traction"][0].shape == (len(lines.data), 3)
+    assert mesh.cell_data["traction"][1].shape == (len(lines.data), 3)
     slips = mesh.point_data["slip"][at_contact]
     touches = np.array([word != "separated" for word in solution.contact.status_words()])
     np.testing.assert_array_equal(slips, np.where(touches, solution.contact.u_t, np.nan))
@@ -91,7 +92,7 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
     )
     bk.export_result(tmp_path / "r.vtu", bk.run(scene), inside=11)
     mesh = meshio.read(tmp_path / "r.vtu")
-    assert [block.type for block in mesh.cells] == ["line", "vertex", "quad"]
+    assert [block.type for block in mesh.cells] == ["vertex", "line", "quad"]
     squares = mesh.cells[2].data
     assert len(squares) == 8 * 3  # eleven points along 2, the outermost on the boundary
     inner = np.unique(squares)
@@ -106,17 +107,17 @@ def test_stress_inside_goes_with_the_lines(tmp_path: Path) -> None:
     displacement = np.column_stack([0.39 * 1e-4 * x, -0.91 * 1e-4 * y, 0.0 * x])
     np.testing.assert_allclose(mesh.point_data["displacement"][inner], displacement, atol=1e-14)
     np.testing.assert_allclose(mesh.point_data["von_mises"][inner], 1e-3 * np.sqrt(1.0 - 0.3 + 0.09), rtol=1e-9)
-    on_lines = np.unique(mesh.cells[0].data)
+    on_lines = np.unique(mesh.cells[1].data)
     assert np.isnan(mesh.point_data["stress"][on_lines]).all()
 
 
 def test_inside_is_refused_where_it_cannot_be_held(solution: bk.Solution, tmp_path: Path, capsys) -> None:
-    with pytest.raises(OutputFileError, match=r"r.h5: .h5 holds no fields inside the body: give .vtu, or leave"):
+    with pytest.raises(OutputFileError, match=r"r.h5: .h5 holds no fields inside the body: give .vtu or .vtp, or no"):
         bk.export_result(tmp_path / "r.h5", solution, inside=10)
     with pytest.raises(OutputFileError, match=r"r.vtu: inside is 1: give from 2 to 1000 points across the body"):
         bk.export_result(tmp_path / "r.vtu", solution, inside=1)
     assert call("run", "paper-1", "--inside", "10") == 2
-    assert "--inside goes into a file: give -o with a name that ends in .vtu" in capsys.readouterr().err
+    assert "--inside goes into a file: give -o with a name that ends in .vtu or .vtp" in capsys.readouterr().err
 
 
 def test_the_command_line_goes_by_the_ending(
@@ -133,10 +134,44 @@ def test_the_command_line_goes_by_the_ending(
         assert not Path(name).exists()
 
 
-def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, solution: bk.Solution, tmp_path: Path) -> None:
-    monkeypatch.setattr("bemkit.results.export.find_spec", lambda name: None)
-    with pytest.raises(OutputFileError, match=r'need meshio: pip install "bemkit\[mesh\]"'):
-        bk.export_result(tmp_path / "r.vtu", solution)
+@pytest.mark.parametrize("ending", [".vtu", ".vtp"])
+def test_pyvista_reads_named_fields_on_the_same_cells(ending: str, bodies: bk.AssemblySolution, tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    bk.export_result(tmp_path / f"r{ending}", bodies, inside=9)
+    data = pyvista.read(tmp_path / f"r{ending}")
+    n_contact = bodies.contact.n_contact
+    assert data.GetCellType(0) == pyvista.CellType.VERTEX
+    assert data.GetCellType(n_contact) == pyvista.CellType.LINE
+    assert data.GetCellType(data.n_cells - 1) == pyvista.CellType.QUAD
+    of_vertices = [data.get_cell(number).point_ids[0] for number in range(n_contact)]
+    for name in ("sigma_n", "sigma_t", "gap", "status"):
+        np.testing.assert_array_equal(data.point_data[name][of_vertices], getattr(bodies.contact, name))
+    assert set(np.unique(data.cell_data["body"][n_contact:])) == {0.0, 1.0}
+    line = data.get_cell(n_contact)
+    assert np.isfinite(data.point_data["displacement"][line.point_ids]).all()
+    assert np.isfinite(data.cell_data["traction"][n_contact]).all()
+    square = data.get_cell(data.n_cells - 1)
+    assert np.isfinite(data.point_data["von_mises"][square.point_ids]).all()
+
+
+def test_polygonal_data_hold_the_arrays_of_the_grid(bodies: bk.AssemblySolution, tmp_path: Path) -> None:
+    """Read by nothing but the standard library: the number of bytes and the data, in base64."""
+    arrays = []
+    for ending in (".vtu", ".vtp"):
+        bk.export_result(tmp_path / f"r{ending}", bodies)
+        piece = ElementTree.parse(tmp_path / f"r{ending}").find(".//Piece")
+        assert piece is not None
+        fields = [
+            entry for place in ("Points", "PointData", "CellData") for entry in piece.iterfind(f"{place}/DataArray")
+        ]
+        arrays.append({entry.get("Name"): b64decode(entry.text or "") for entry in fields})
+    grid, polygons = arrays
+    assert grid == polygons
+    assert all(int.from_bytes(data[:8], "little") == len(data) - 8 for data in grid.values())
+    counts = {name: int(piece.get(f"NumberOf{name}", "0")) for name in ("Verts", "Lines", "Polys")}
+    assert counts["Verts"] == bodies.contact.n_contact
+    assert counts["Lines"] % bodies.n_elements == 0
+    assert counts["Polys"] == 0
 
 
 def test_bodies_without_end_have_no_fields_inside(tmp_path: Path) -> None:

@@ -23,3 +23,14 @@ def test_without_contact_nothing_is_said_of_it() -> None:
     assert "contact nodes" not in repr(solution)
     assert repr(solution.contact) == "ContactTable(0 nodes)"
     assert repr(bk.discretise(bk.Disk(1.0).outline(), n_elements=8)) == "BoundaryMesh(8 elements)"
+
+
+def test_load_steps_show_themselves_in_a_line_and_are_a_tuple() -> None:
+    scene = dataclasses.replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=40), load_factors=(0.5, 1.0))
+    steps = bk.run_history([scene])
+    title = "Square on a rigid foundation, paper Example 1"
+    assert repr(steps) == f"SolvedSteps('{title}': 2 steps, the last one converged)"
+    assert isinstance(steps, tuple)
+    assert steps == tuple(steps)
+    assert len(repr(steps[-1].loading)) < 80
+    assert len(repr(steps[-1].loading.steps[0])) < 500

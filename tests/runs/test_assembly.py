@@ -429,3 +429,33 @@ def test_a_body_whose_energy_can_be_negative_is_named() -> None:
     )
     assert solution.status is bk.Status.NEGATIVE_ENERGY
     assert "body 'split'" in solution.message
+
+
+def _between_soft_ones(ratio: float) -> bk.AssemblySolution:
+    """Two bodies on each other, so many times stiffer than those below and above them, pressed and sheared."""
+    foot, load = bk.Part("foot", bk.Clamped(), ("bottom",)), bk.Part("top", bk.Traction(x=2e-3, y=-1e-2), ("top",))
+    given = (("a", 1.0, (foot,)), ("b", ratio, ()), ("c", ratio, ()), ("d", 1.0, (load,)))
+    bodies = tuple(
+        bk.Body(
+            name=name,
+            shape=bk.Rectangle(1.0, 0.5),
+            material=bk.Material(modulus, 0.3),
+            parts=parts,
+            placement=bk.Placement((0.0, 0.5 * number)),
+        )
+        for number, (name, modulus, parts) in enumerate(given)
+    )
+    contacts = tuple(bk.ContactPair((f"{low}.top", f"{high}.bottom")) for low, high in ("ab", "bc", "cd"))
+    mesh = bk.MeshOptions(elements=40)
+    return bk.run(bk.Assembly(title="Stiff", bodies=bodies, contacts=contacts, law=bk.Coulomb(0.3), mesh=mesh))
+
+
+def test_stiff_bodies_between_soft_ones_touch_each_other() -> None:
+    """They travel so far with the soft ones that round-off of the way is a force: responses are refined."""
+    stiff, stiffer = _between_soft_ones(1e6), _between_soft_ones(1e8)
+    assert stiff.is_converged, stiff.message
+    assert stiffer.is_converged, stiffer.message
+    # of the soft bodies, which see no difference but 1e-6 of the strains
+    for part in ("a.top / b.bottom", "c.top / d.bottom"):
+        one, other = (each.contact.sigma_n[each.contact.rows(part)] for each in (stiff, stiffer))
+        np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5 * np.abs(one).max())

@@ -77,6 +77,71 @@ def test_a_killed_run_is_continued_to_the_same_bits(
             np.testing.assert_array_equal(one.slip, two.slip)
 
 
+SHORT = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=2)), mesh=bk.MeshOptions(accuracy=0.01))
+CYLINDERS = replace(
+    bk.load_scene("two-cylinders"),
+    mesh=bk.MeshOptions(accuracy=0.1),
+    steps=(bk.Step(1.0, load_factor=0.5), bk.Step(2.0, load_factor=1.0)),
+)
+
+
+@pytest.mark.parametrize("scene", [SHORT, CYLINDERS], ids=["one body", "two bodies"])
+def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(
+    scene: bk.Scene | bk.Assembly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    n_elements: list[int] = []
+
+    def write(path: Path, solution: bk.Solution | bk.AssemblySolution) -> None:
+        bk.write_result(path, solution)
+        n_elements.append(solution.n_elements)
+        if len(n_elements) == n_writes:
+            raise Killed
+
+    n_writes = 0
+    monkeypatch.setattr(checkpoint, "write_result", write)
+    whole = bk.run_to_file(scene, tmp_path / "whole.h5")
+    meshes = sorted(set(n_elements))
+    assert len(meshes) >= 2
+    # each step but the last on each mesh, and the result
+    assert n_elements == [n for n in meshes for _ in range(scene.n_steps - 1)] + [whole.n_elements]
+    n_writes = len(n_elements) - 1  # the last but one step on the last mesh
+    n_elements.clear()
+    with pytest.raises(Killed):
+        bk.run_to_file(scene, tmp_path / "killed.h5")
+    assert len(loading_of(bk.read_result(tmp_path / "killed.h5")).steps) == scene.n_steps - 1
+    n_elements.clear()
+    n_writes, records = 0, []
+    resumed = bk.run_to_file(scene, tmp_path / "killed.h5", callback=lambda record: records.append(record))
+    # coarser meshes are solved again but do not replace what is in the file, and of the last mesh one step is missing
+    assert n_elements == [whole.n_elements]
+    assert len(records) < len(whole.history)
+    for other in (resumed, bk.read_result(tmp_path / "killed.h5")):
+        own, expected = ({**each.summary(), "timings": None} for each in (other, whole))
+        assert own == expected
+        for name, column in whole.contact.columns().items():
+            np.testing.assert_array_equal(other.contact.columns()[name], column)
+
+
+@pytest.mark.parametrize("scene", [LOOP, PUNCH], ids=["one body", "punch"])
+def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
+    whole = bk.run_to_file(scene, tmp_path / "a.h5")
+    read = bk.read_result(tmp_path / "a.h5")
+    of_the_run = {"history", "linear_solves", "outer_steps", "timings", "message", "work", "plan", "memory", "warnings"}
+    for number in range(1, scene.n_steps + 1):
+        one, two = whole.at_step(number).summary(), read.at_step(number).summary()
+        assert {k: v for k, v in one.items() if k not in of_the_run} == {
+            k: v for k, v in two.items() if k not in of_the_run
+        }
+    first, last = read.at_step(1), read.at_step(scene.n_steps)
+    assert first.energy != last.energy
+    assert last.energy == read.energy
+    bk.write_result(tmp_path / "first.h5", first)
+    assert bk.read_result(tmp_path / "first.h5").energy == first.energy
+    for number in (0, scene.n_steps + 1):
+        with pytest.raises(bk.InputError, match=f"step {number} is none of the finished ones: give a number from 1 to"):
+            read.at_step(number)
+
+
 def test_another_scene_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "loop.h5"
     with monkeypatch.context() as patch:
@@ -127,14 +192,24 @@ def test_the_command_line_shows_steps(tmp_path: Path, capsys: pytest.CaptureFixt
             main(["show", str(file), *arguments])
         assert ended.value.code == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("time,external_work,elastic_energy,dissipation,increment_work,force_normal,")
+    assert shown.startswith("time,external_work,elastic_energy,dissipation,increment_work,friction_gain,force_normal,")
     assert "[[steps]]" in shown
     assert "10 of 10 steps, up to t = 6" in shown
+    with pytest.raises(SystemExit) as ended:
+        main(["show", str(file), "--step", "3"])
+    assert ended.value.code == 0
+    assert "3 of 10 steps, up to t = 1.625" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        main(["show", str(file), "--step", "11"])
+    assert ended.value.code == 2
+    assert "step 11 is none of the finished ones: give a number from 1 to 10" in capsys.readouterr().err
     assert {path.name for path in (tmp_path / "figures").iterdir()} > {"friction-loop.png", "work.png"}
 
 
 def test_results_without_steps_say_so() -> None:
     solution = bk.run(replace(LOOP, steps=()))
+    with pytest.raises(bk.InputError, match=r"the result has no load history: give \[\[steps\]\]"):
+        solution.at_step(1)
     from bemkit.results.tables import to_csv
 
     with pytest.raises(bk.InputError, match=r"the result has no load history: give \[\[steps\]\]"):

@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, refined_partition
+from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, origins, refined_partition
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.hp import LayeredMeshes
@@ -111,8 +111,8 @@ def test_pieces_end_where_the_status_changes() -> None:
 def test_later_meshes_start_near_their_solution() -> None:
     *_, before, last = risen("paper-1", 3e-5)
     own_solves = last.linear_solves - sum(each.linear_solves for each in risen("paper-1", 3e-5)[:-1])
-    assert own_solves <= 4
-    assert before.linear_solves <= 4
+    assert own_solves <= 7
+    assert before.linear_solves <= 7
 
 
 def test_a_fixed_degree_takes_layers_alone() -> None:
@@ -161,7 +161,7 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
     old = layered_partition(base, {})
     excess = np.zeros(len(old.sides))
     excess[0], excess[1] = FACTOR**-1.5, 1.5  # two layers more, and a half
-    fine = refined_partition(old, excess, {})
+    fine = refined_partition(old, excess, {}, 1.0)
     start, first = old.parameters[0][:2]
     expected = [start, *(first * FACTOR ** np.array([2.0, 1.0])), first, 0.5 * (first + 0.5)]
     np.testing.assert_allclose(fine.parameters[0][:5], expected, rtol=1e-12)
@@ -173,10 +173,35 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
 def test_pieces_move_with_the_places_of_the_changes() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     old = layered_partition(base, {0: [0.3]})
-    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]})
+    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]}, 1.0)
     np.testing.assert_allclose(moved.parameters[0], old.parameters[0] * 0.35 / 0.3, rtol=1e-12)
-    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]})
+    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]}, 1.0)
     np.testing.assert_allclose(anew.parameters[1], layered_partition(base, {0: [0.35, 0.6]}).parameters[1])
+
+
+def test_layers_follow_places_that_move() -> None:
+    """Down to a tenth of the motion on both sides of the place, and no further than the resolution."""
+    base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
+    old = layered_partition(base, {0: [0.3]})
+    for resolution, longest in ((1e-6, 0.1 * 1e-3), (0.01, 0.01 * 0.7)):
+        moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.301]}, resolution)
+        beside = [moved.parameters[0][-1] - moved.parameters[0][-2], moved.parameters[1][1] - moved.parameters[1][0]]
+        assert max(beside) <= longest
+        assert min(beside) >= FACTOR**2 * longest
+        elements, layers = origins(old, moved)
+        assert elements[len(moved.parameters[0]) - 2] == len(old.parameters[0]) - 2
+        np.testing.assert_allclose(layers[:1], 0.0, atol=1e-12)
+        assert layers.max() > 0.8
+
+
+def test_free_elements_gain_by_degrees() -> None:
+    """Their tractions are round-off, which does not fall, and say nothing of their error."""
+    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) == 5)
+    errors, loaded = solution.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
+    assert errors is not None
+    free = np.setdiff1d(np.arange(solution.mesh.n_elements), loaded)
+    assert free.size > 5
+    assert np.median(errors.energy_decay[free]) < 0.6
 
 
 def test_curves_turn_little_on_an_element() -> None:
@@ -229,11 +254,21 @@ def test_elements_of_high_degree_are_judged_without_neighbours() -> None:
     assert high.estimated_error is not None
 
 
+@pytest.mark.slow
+def test_a_pressure_without_bound_is_named() -> None:
+    """Beside a sheared side pressures grow like a logarithm: its tail in L2 is the root of the length of an element."""
+    *_, last = risen("clamped-angle", 1e-6)
+    assert last.status is bk.Status.ACCURACY_NOT_REACHED
+    assert "the largest error stands at (1, 0), where an element of the length" in last.message
+    assert last.estimated_traction_error is not None
+    assert last.estimated_traction_error <= 2e-5
+
+
 def test_layers_end_where_coordinates_do() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     partition = layered_partition(base, {})
     for _ in range(12):  # 36 layers would be 1e-26 long
-        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {})
+        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {}, 1.0)
         if len(partition.sides) > 2000:
             break
     assert partition.mesh.lengths.min() >= 0.9 * SHORTEST * partition.mesh.lengths.sum()

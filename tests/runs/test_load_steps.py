@@ -41,6 +41,7 @@ def check_balance(loading: LoadHistory, tolerance: float) -> None:
         size = max(abs(value) for value in (step.elastic_energy, *vars(work).values()))
         assert abs(rest) <= tolerance * size
         assert work.dissipation >= 0.0
+        assert 0.0 <= work.friction_gain <= tolerance * size
         energy = step.elastic_energy
 
 
@@ -77,6 +78,37 @@ def test_obstacles_that_move_do_work() -> None:
     assert loading.steps[-1].force_normal == pytest.approx(pressed.steps[-1].force_normal, rel=1e-10)
     assert loading.total().external_work == pytest.approx(pressed.total().external_work, rel=1e-10)
     check_balance(loading, 1e-12)
+
+
+def test_what_contact_exerts_on_a_held_node_is_not_its_reaction() -> None:
+    """A side that is pushed ends in a corner that presses obliquely onto a slope."""
+    slope = bk.Contact(bk.HalfPlane(normal=(0.3, 1.0)))
+    pushed = bk.Part("left", bk.PrescribedDisplacement(x=0.01, y=None), ("left",))
+    top = bk.Part("top", bk.Traction(y=-0.1), ("top",))
+    steps = tuple(
+        bk.Step(t, {"parts.left.condition.x": "0.01*t", "parts.top.condition.y": "-0.1*t"}) for t in (1.0, 2.0)
+    )
+    scene = replace(LOOP, law=bk.Coulomb(0.3), parts=(pushed, bk.Part("foot", slope, ("bottom",)), top), steps=steps)
+    check_balance(solved(scene), 1e-12)
+
+
+def _block(name: str, y: float, given: dict[str, bk.PrescribedDisplacement]) -> bk.Body:
+    parts = tuple(bk.Part(side, condition, (side,)) for side, condition in given.items())
+    shape, placement = bk.Rectangle(1.0, 0.5), bk.Placement((0.0, y))
+    return bk.Body(name=name, shape=shape, material=bk.Material(1.0, 0.3), parts=parts, placement=placement)
+
+
+def test_nor_is_what_a_body_exerts_on_a_held_node_of_its_partner() -> None:
+    """The lower block is pushed along at a side whose corner the upper one rubs, by nodes of its own."""
+    given = {"left": (0.0, None), "bottom": (None, 0.0)}
+    lower = _block("lower", 0.0, {name: bk.PrescribedDisplacement(*xy) for name, xy in given.items()})
+    upper = _block("upper", 0.5, {"top": bk.PrescribedDisplacement(0.0, -0.01)})
+    pair = bk.ContactPair(("upper.bottom", "lower.top"), multipliers_on="upper.bottom")
+    steps = tuple(bk.Step(time, {"bodies.lower.parts.left.condition.x": "0.02*t"}) for time in (1.0, 2.0))
+    assembly = bk.Assembly(title="Rubbed", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.3), steps=steps)
+    loading = solved(assembly)
+    assert loading.total().dissipation > 0.0
+    check_balance(loading, 1e-10)
 
 
 def test_bodies_and_a_punch_balance_too() -> None:

@@ -23,7 +23,7 @@ from bemkit.operators.material import Material
 from bemkit.plan import make_plan
 from bemkit.results import warnings as warnings_module
 from bemkit.results.result_file import read_result, write_result
-from bemkit.results.solution import Solution
+from bemkit.results.solution import Solution, unlike
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_assembly_warnings, find_warnings
 from bemkit.runs.history import run_history
@@ -168,6 +168,17 @@ def test_a_large_estimated_error_is_doubted(solution: Solution) -> None:
     assert not [words for words in find_warnings(fine) if "estimated error" in words]
 
 
+def test_an_accuracy_is_advised_only_where_meshes_can_follow_it() -> None:
+    paper = with_overrides(load_scene("paper-1"), elements=24, discretisation="linear")
+    for scene, is_possible in (
+        (paper, True),
+        (with_overrides(paper, discretisation="constant"), False),
+        (with_overrides(load_scene("rough-surface"), elements=16), False),
+    ):
+        (words,) = {words.split(": ")[-1] for words in run(scene).warnings if " zone of part " in words}
+        assert words == f"use more elements there{', or give an accuracy' if is_possible else ''}."
+
+
 def test_an_estimate_that_cannot_be_made_is_doubted(solution: Solution) -> None:
     lost = dataclasses.replace(solution, energy=-1e-9)
     assert lost.estimated_error is None
@@ -247,3 +258,16 @@ def test_rotation_that_plain_constant_elements_take_for_strain(*, slopes: bool, 
     doubts = [words for words in find_warnings(run(scene)) if "taken for strain" in words]
     assert len(doubts) == warns
     assert not warns or doubts[0].startswith("The body turns by 0.001")
+
+
+def test_of_warnings_of_many_steps_that_differ_in_numbers_one_is_left() -> None:
+    narrow = "A slip zone of part 'a' at s = {} has only {}: use more elements there, or give an accuracy."
+    steps = [
+        narrow.format("3.333e-05", "3 nodes, and 1 more zone like it"),
+        narrow.format("0.25", "1 node"),
+        narrow.replace("'a'", "'b'").format("0.25", "2 nodes"),
+        narrow.replace("slip", "stick").format("0.25", "2 nodes"),
+        "The estimated error is 5.2 %: use more elements, or give an accuracy.",
+        "The estimated error is 7 %: use more elements, or give an accuracy.",
+    ]
+    assert unlike(steps) == (steps[0], *steps[2:5])

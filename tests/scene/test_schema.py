@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 import tomllib
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -127,3 +130,16 @@ ValueError
 
 def test_the_command_prints_it() -> None:
     assert json.loads(CliRunner().invoke(commands, ["schema"]).output) == SCHEMA
+
+
+@pytest.mark.skipif(shutil.which("taplo") is None, reason="taplo, which editors check TOML with, is not installed")
+def test_what_editors_check_with_shows_a_typo(tmp_path: Path) -> None:
+    schema, scene = tmp_path / "scene.schema.json", tmp_path / "scene.toml"
+    schema.write_text(json.dumps(SCHEMA), "utf-8")
+    text = SHIPPED["paper-1"]
+    for content, code in ((text, 0), (text.replace("friction_coefficient", "friction_coeficient"), 1)):
+        scene.write_text(content, "utf-8")
+        command = ["taplo", "lint", "--schema", schema.as_uri(), str(scene)]
+        checked = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+        assert checked.returncode == code
+    assert "'friction_coeficient' was unexpected" in checked.stderr

@@ -265,6 +265,12 @@ def test_a_missing_section_says_what_to_add(section: str) -> None:
         scene_from_toml("\n[".join(kept))
 
 
+def test_parts_in_a_list_are_told_their_headings() -> None:
+    text = BLOCK[: BLOCK.index("[parts")] + "[[parts]]\nname = 'wall'\n"
+    with pytest.raises(SceneError, match=r"write \[parts.NAME\], in one of several bodies \[bodies.BODY.parts.NAME\]"):
+        scene_from_toml(text)
+
+
 def test_outlines_that_are_no_boundary_are_refused() -> None:
     bow_tie = "kind = 'polygon'\nvertices = [[0, 0], [1, 1], [1, 0], [0, 1]]"
     text = BLOCK.replace('kind = "rectangle"\nwidth = 1.0\nheight = 1.0', bow_tie)

@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bemkit.atomic_files import OutputFileError
 from bemkit.hdf5 import FileFormat, ResultFileError
 from bemkit.results.outputs import Outputs, TextFile
 from bemkit.results.record_file import RecordFile
+from bemkit.results.row_journal import RowJournal
 from bemkit.studies.engine import Task, compute, compute_with_progress
 
 
@@ -76,6 +78,55 @@ def test_every_record_is_in_the_file_before_the_next_is_computed(tmp_path: Path)
     assert [record.key for record in FILE.read(path)[1]] == [1, 2, 3]
     with pytest.raises(ResultFileError, match="holds the sweep with title squares, not cubes: choose another name"):
         FILE.finished(path, {"title": "cubes"})
+
+
+def test_the_file_is_written_twice_however_many_records_there_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, written, sizes = tmp_path / "squares.h5", [], []
+    write = RecordFile.write
+    monkeypatch.setattr(RecordFile, "write", lambda *args: (written.append(len(args[3])), write(*args)))
+    for record in FILE.keep(path, compute(tasks(*range(50))), {}, LABELS):
+        assert FILE.read(path)[1][-1] == record
+        sizes.append(path.stat().st_size)
+    assert written == [1, 50]
+    assert len(set(sizes)) == 1  # what was there stays as it was
+    assert [each.name for each in tmp_path.iterdir()] == ["squares.h5"]
+
+
+def test_the_journal_of_a_killed_study_goes_into_the_file_without_its_last_half_line(tmp_path: Path) -> None:
+    path, killed = tmp_path / "squares.h5", tmp_path / "killed.h5"
+    records = FILE.keep(path, compute(tasks(1, 2, 3, 4)), {}, LABELS)
+    for _ in range(4):
+        next(records)
+    killed.write_bytes(path.read_bytes())
+    journal = tmp_path / ".killed.h5.rows"
+    journal.write_bytes((tmp_path / ".squares.h5.rows").read_bytes()[:-3])
+    records.close()
+    finished = FILE.finished(killed, LABELS)
+    assert list(finished) == [1, 2, 3]
+    assert list(FILE.keep(killed, compute(tasks(1, 2), finished=finished), finished, LABELS))
+    assert not journal.exists()
+    assert [record.key for record in FILE.read(killed)[1]] == [1, 2, 3]
+
+
+def test_a_journal_of_another_file_is_passed_over(tmp_path: Path) -> None:
+    path, other = tmp_path / "squares.h5", tmp_path / "other.h5"
+    for name in (path, other):
+        FILE.write(name, LABELS, [square(len(name.name))])
+    journal = RowJournal(other)
+    journal.begin()
+    journal.add([5, 25.0, ""])
+    (tmp_path / ".squares.h5.rows").write_bytes((tmp_path / ".other.h5.rows").read_bytes())
+    assert [record.key for record in FILE.read(path)[1]] == [10]
+    assert [record.key for record in FILE.read(other)[1]] == [8, 5]
+    journal.add([6, 36.0])
+    with pytest.raises(ResultFileError, match=r"other\.h5: a row in \.other\.h5\.rows is damaged: delete that file"):
+        FILE.read(other)
+    (tmp_path / ".other.h5.rows").unlink()
+    (tmp_path / ".other.h5.rows").mkdir()
+    with pytest.raises(OutputFileError, match=r"other\.h5: cannot be written \(Is a directory\): choose another place"):
+        journal.add([6, 36.0, ""])
 
 
 def test_texts_are_written_only_where_they_are_wanted(tmp_path: Path) -> None:

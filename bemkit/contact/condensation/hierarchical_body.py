@@ -9,13 +9,13 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.nodes import ContactNodes, free_motions
+from bemkit.contact.condensation.dense_body import refuse_other_tangents
+from bemkit.contact.condensation.element_conditions import ElementConditions, exactly
+from bemkit.contact.condensation.nodes import ContactNodes, free_motions, held_nodes
 from bemkit.contact.condensation.reduction import NoContactNodesError
 from bemkit.contact.conditions import LinearConditions, stick
-from bemkit.errors import InputError
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
-from bemkit.operators.hierarchy.system import NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -45,21 +45,31 @@ class HierarchicalBody(LinearBody):
         The equations under the given supports and forces.
     nodes : ContactNodes
         Elements that may touch, along whose frames those of the equations stand.
+    conditions : NodalConditions
+        Of the elements.
     force : (n_elements, 2) array [N/m]
         Given nodal forces, in x and y.
+    inside : ForcesInside, optional
+        What acts inside the body; the equations know what its particular solution leaves of everything else.
 
     Notes
     -----
     A response factors the leaves of the tree whose conditions differ from those of the last one, and what lies above
-    them. No tangent is eliminated: frictionless nodes have the condition ``sigma_t = 0`` like any other.
+    them. Tangents are eliminated where supports hold the node alone: other frictionless nodes have the condition
+    ``sigma_t = 0`` like any other.
     """
 
     loaded: LoadedSystem
     nodes: ContactNodes
+    conditions: NodalConditions
     force: FloatArray
-    _responses: list[tuple[ContactState, NodeConditions]] = field(default_factory=list, init=False)
+    inside: ForcesInside | None = None
+    _responses: list[tuple[ContactState, LinearConditions]] = field(default_factory=list, init=False)
     _fields: list[_Fields] = field(default_factory=list, init=False)
     _travelled: list[LoadedSystem] = field(default_factory=list, init=False)
+
+    condensed = None
+    """No stiffness is formed."""
 
     @property
     def weights(self) -> FloatArray:  # type: ignore[override]  # read-only here
@@ -81,15 +91,15 @@ class HierarchicalBody(LinearBody):
         """E' by the median length of a node [Pa/m]."""
         return self.loaded.map.material.plane_modulus / float(np.median(self.weights))
 
-    @property
-    def conditions(self) -> NodalConditions:
-        """Those of the elements."""
-        return self.loaded.conditions
+    @cached_property
+    def is_held(self) -> BoolArray:
+        """(n_contact,) bool array: nodes that a support holds in one direction, which have no friction of their own."""
+        return held_nodes(self.conditions, self.nodes)
 
     @property
-    def is_held(self) -> BoolArray:
-        """(n_contact,) bool array: none; the planner leaves nodes that a support holds to the dense body."""
-        return np.zeros(self.n_contact, bool)
+    def tangent_is_eliminated(self) -> BoolArray:
+        """(n_contact,) bool array: the same."""
+        return self.is_held
 
     @property
     def work(self) -> OperationCounts:
@@ -104,11 +114,11 @@ class HierarchicalBody(LinearBody):
         -----
         Prescribed displacements, zero tractions and slip tractions are met exactly, as by `DenseBody`.
         """
+        refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        at_nodes = NodeConditions(conditions.on_traction, conditions.on_displacement, conditions.value)
-        state = self._solved(at_nodes)
-        self._responses.append((state, at_nodes))
+        state = self._solved(conditions)
+        self._responses.append((state, conditions))
         del self._responses[:-_KEPT]
         return state
 
@@ -118,7 +128,7 @@ class HierarchicalBody(LinearBody):
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the given forces on these motions."""
-        load: FloatArray = np.einsum("ncm,nc->m", self.loaded.motions, self.force)
+        load: FloatArray = np.einsum("ncm,nc->m", self.loaded.motions, self.loaded.force)
         return load
 
     def under(
@@ -126,14 +136,13 @@ class HierarchicalBody(LinearBody):
     ) -> HierarchicalBody:
         """Return the same body under other displacements, in the frames of the elements, and forces in x and y.
 
-        Raises
-        ------
-        InputError
-            If forces act inside the body, which the compressed equations do not know.
+        What acts inside the body stays as it is unless `inside` says otherwise.
         """
-        if inside is not None:
-            raise InputError("forces act inside the body: choose the linear solver 'direct' for it")
-        return replace(self, loaded=self.loaded.under(displacement, force), force=force)
+        inside = self.inside if inside is None else inside
+        conditions = replace(self.conditions, displacement=displacement)
+        left, left_force = _left_of(conditions, force, inside)
+        loaded = self.loaded.under(left.displacement, left_force)
+        return replace(self, loaded=loaded, conditions=conditions, force=force, inside=inside)
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_elements, 2) and total force (n_elements, 2) of the boundary, in x and y.
@@ -152,22 +161,23 @@ class HierarchicalBody(LinearBody):
         motion; and what contact tractions differ from those of the whole boundary, by the largest force.
         """
         fields = self._fields_of(state)
-        loaded, mesh = fields.loaded, self.loaded.map.mesh
+        loaded, mesh, inside = fields.loaded, self.loaded.map.mesh, self.inside
         if not (np.isfinite(fields.displacement).all() and np.isfinite(fields.force).all()):
             return Imbalance(np.nan, np.nan)
-        strained = float(np.abs(without_motion(mesh, mesh.centres, fields.strained)).max())
-        at_nodes = np.einsum("nkc,nc->nk", self.nodes.frame, fields.force[self.nodes.nodes])
+        size = float(np.abs(without_motion(mesh, mesh.centres, fields.displacement - loaded.motion)).max())
+        at_nodes = np.einsum("nkc,nc->nk", self.conditions.frame, fields.force)[self.nodes.nodes]
+        at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
         missing = float(np.abs(self.weights[:, None] * state.traction - at_nodes).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
         terms = loaded.map.material.plane_modulus * float(np.abs(fields.displacement).max())
-        if not self.force.any() and largest <= self.accuracy * terms:
+        if inside is None and not self.force.any() and largest <= self.accuracy * terms:
             return Imbalance(missing / terms, 0.0) if terms else Imbalance(0.0, 0.0)  # it has only been moved
-        result = resultant_imbalance(mesh.centres, fields.force, admissible_modes(mesh), 0.0)
-        noise = NOISE_FACTOR * float(np.finfo(float).eps * np.abs(fields.strained).max())
-        if strained > noise:
-            traction = fields.force / mesh.lengths[:, None]
-            left = loaded.system.residual(self._sampled, traction, fields.strained)
-            result = result.joined(Imbalance(float(np.abs(left).max()) / strained, 0.0, noise / strained))
+        of_inside = () if inside is None else (inside.volume_force, inside.inner_force)
+        result = resultant_imbalance(mesh.centres, fields.force, admissible_modes(mesh), 0.0, *of_inside)
+        noise = NOISE_FACTOR * float(np.finfo(float).eps * np.abs(fields.displacement - loaded.motion).max())
+        if size > noise:
+            left = loaded.system.residual(self._sampled, fields.traction, fields.strained)
+            result = result.joined(Imbalance(float(np.abs(left).max()) / size, 0.0, noise / size))
         return result.joined(Imbalance(missing / largest, 0.0)) if largest else result
 
     def _fields_of(self, state: ContactState) -> _Fields:
@@ -176,13 +186,13 @@ class HierarchicalBody(LinearBody):
             if fields.state is state:
                 return fields
         conditions = next((each for known, each in self._responses if known is state), None)
-        if conditions is None:
-            held = stick(state.u_n, state.u_t)
-            conditions = NodeConditions(held.on_traction, held.on_displacement, held.value)
-        self._solved(conditions)
+        self._solved(stick(state.u_n, state.u_t) if conditions is None else conditions)
         loaded = self._moving
-        strained, force = loaded.everywhere()
-        fields = _Fields(state, loaded, strained, strained + loaded.motion, force)
+        strained, traction = loaded.everywhere()
+        displacement, force = strained + loaded.motion, traction * loaded.map.mesh.lengths[:, None]
+        if self.inside is not None:
+            displacement, force = displacement + self.inside.displacement, force + self.inside.force
+        fields = _Fields(state, loaded, strained, traction, displacement, force)
         self._fields[:] = [fields]
         return fields
 
@@ -204,18 +214,32 @@ class HierarchicalBody(LinearBody):
         """The equations without the rigid motion of the last response."""
         return self._travelled[-1] if self._travelled else self.loaded
 
-    def _solved(self, conditions: NodeConditions) -> ContactState:
+    @cached_property
+    def _elements(self) -> ElementConditions:
+        return ElementConditions.of(self.conditions, self.nodes)
+
+    @cached_property
+    def _of_inside(self) -> tuple[FloatArray, FloatArray]:
+        """Tractions and displacements of the particular solution (n_contact, 2) in the frames of the elements."""
+        nodes, inside = self.nodes.nodes, self.inside
+        if inside is None:
+            return np.zeros((self.n_contact, 2)), np.zeros((self.n_contact, 2))
+        traction = inside.force[nodes] / self.loaded.map.mesh.lengths[nodes, None]
+        frame = self.conditions.frame[nodes]
+        return np.einsum("nkc,nc->nk", frame, traction), np.einsum("nkc,nc->nk", frame, inside.displacement[nodes])
+
+    def _solved(self, conditions: LinearConditions) -> ContactState:
         """Return the response; where the contact nodes move rigidly by far more than they strain, solve without that.
 
         A rigid motion causes no tractions, in the compressed equations none but for their tolerance.
         """
-        nodes, frame = self.nodes.nodes, self.nodes.frame
+        nodes, asked = self.nodes.nodes, self._elements.at_elements(conditions)
+        frame, (traction, displacement) = self.conditions.frame[nodes], self._of_inside
         for _ in range(_MOST_SHIFTS):
             loaded = self._moving
-            motion = np.einsum("nkc,nc->nk", frame, loaded.motion[nodes])
+            moved = displacement + np.einsum("nkc,nc->nk", frame, loaded.motion[nodes])
             try:
-                value = conditions.value - np.einsum("nrk,nk->nr", conditions.on_displacement, motion)
-                state = loaded.system.state(loaded.known, nodes, replace(conditions, value=value))
+                state = loaded.system.state(loaded.known, nodes, asked.beside(traction, moved))
             except SingularMatrixError as error:
                 raise SingularResponse(str(error)) from error
             strained = np.einsum("nkc,nk->nc", frame, state[:, 2:])
@@ -223,27 +247,38 @@ class HierarchicalBody(LinearBody):
             if travel is None:
                 break
             self._travelled[:] = [loaded.moved(travel)]
-        displacement = state[:, 2:] + motion
-        for own in (0, 1):  # what is prescribed is met exactly
-            factor, other = conditions.on_displacement[:, own, own], conditions.on_displacement[:, own, 1 - own]
-            gives = (factor != 0.0) & (other == 0.0) & ~conditions.on_traction[:, own].any(axis=1)
-            displacement[gives, own] = conditions.value[gives, own] / factor[gives]
-        return ContactState(displacement, state[:, :2].copy())
+        response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
+        return exactly(response, conditions, self.is_held)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fields:
-    """Fields (n_elements, 2) in x and y on the whole boundary, with a rigid motion and without."""
+    """Fields (n_elements, 2) in x and y on the whole boundary: what the equations solve for, and all of it.
+
+    The equations know neither a rigid motion of the body nor the particular solution for what acts inside it.
+    """
 
     state: ContactState
     loaded: LoadedSystem
     strained: FloatArray
+    traction: FloatArray
     displacement: FloatArray
     force: FloatArray
 
 
+def _left_of(
+    conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None
+) -> tuple[NodalConditions, FloatArray]:
+    """Return the given displacements and forces less those of a particular solution."""
+    return (conditions, force) if inside is None else inside.left_of(conditions, force)
+
+
 def hierarchical_body(
-    elastic: HierarchicalCollocation, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
+    elastic: HierarchicalCollocation,
+    conditions: NodalConditions,
+    contact: ContactNodes,
+    force: FloatArray,
+    inside: ForcesInside | None = None,
 ) -> HierarchicalBody:
     """Return a compressed body as contact sees it.
 
@@ -252,9 +287,11 @@ def hierarchical_body(
     elastic : HierarchicalCollocation
     conditions : NodalConditions
     contact : ContactNodes
-        Both as `contact_conditions` has found them; no support holds any of the nodes.
+        Both as `contact_conditions` has found them.
     force : (n_elements, 2) array [N/m]
         Given nodal forces, zero at contact nodes.
+    inside : ForcesInside, optional
+        What acts inside the body.
 
     Raises
     ------
@@ -265,4 +302,5 @@ def hierarchical_body(
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    return HierarchicalBody(elastic.loaded(conditions, force), contact, force)
+    loaded = elastic.loaded(*_left_of(conditions, force, inside))
+    return HierarchicalBody(loaded, contact, conditions, force, inside)

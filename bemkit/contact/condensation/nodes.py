@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.spaces import BoundarySpace
+from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
 APPROACH_TOLERANCE = 1e-3
@@ -70,6 +70,12 @@ class ContactNodes:
         """(n_contact,) bool: both rows of nodes that stand in two."""
         return np.isin(self.nodes, self.nodes[self.is_second])
 
+    def forces(self, traction: FloatArray, n_nodes: int) -> FloatArray:
+        """Return the forces (n_nodes, 2) [N/m] of tractions (n_contact, 2) [Pa] in (n, t) components, in x and y."""
+        forces = np.zeros((n_nodes, 2))
+        np.add.at(forces, self.nodes, self.weights[:, None] * np.einsum("nk,nkc->nc", traction, self.frame))
+        return forces
+
     def take(self, rows: IntArray | BoolArray) -> ContactNodes:
         """Return some of the nodes."""
         return ContactNodes(*(column[rows] for column in vars(self).values()))
@@ -87,7 +93,7 @@ def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatA
     """
     dofs = space.element_dofs[elements]
     order = dofs.ravel()[np.sort(np.unique(dofs.ravel(), return_index=True)[1])]
-    local_normals = space.mesh.normals_at(elements, space.local_nodes)
+    local_normals = space.mesh.normals_at(elements, element_nodes(space)[elements])
     normals = np.zeros((space.n_dofs // 2, 2))
     np.add.at(normals, dofs, local_normals * space.mesh.lengths[elements][:, None, None])
     normals /= np.maximum(np.hypot(*normals.T), np.finfo(float).tiny)[:, None]

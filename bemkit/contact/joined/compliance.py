@@ -9,6 +9,7 @@ from scipy import sparse
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.coupled_members import CoupledMembers
+from bemkit.operators.linear.blocks import diagonal_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Compliance:
         for shape in joined.shapes:
             flexibilities.update(dict.fromkeys(shape.rows[:, 0].tolist(), shape.flexibility))
         blocks = [flexibilities[row] for row in sorted(flexibilities)]
-        of_members = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+        of_members = diagonal_blocks(blocks)
         moduli = np.array([member.modulus for member in joined.members])
         return cls(
             sparse.csr_array(joined.relative @ of_members @ joined.relative.T),

@@ -15,6 +15,7 @@ from bemkit.contact.condensation.nodes import retained_tangents
 from bemkit.contact.joined.member import Member, Shape, deformation, shapes_of
 from bemkit.contact.rigid_motions import null_space
 from bemkit.errors import InputError
+from bemkit.operators.linear.blocks import diagonal_blocks
 
 _ROUNDS = 2
 """Times that rigid motions are fitted: the normal equations leave two stiff bodies apart by the digits they lose."""
@@ -119,7 +120,7 @@ class CoupledMembers:
         for shape in self.shapes:
             of_member.update(dict.fromkeys(shape.rows[:, 0].tolist(), shape.motions))
         first = np.cumsum([0, *(member.n_components for member in self.members)])[:-1].tolist()
-        return sparse.csr_array(sparse.block_diag([of_member[number] for number in first], format="csr"))
+        return diagonal_blocks(of_member[number] for number in first)
 
     @cached_property
     def felt_motions(self) -> sparse.csr_array:

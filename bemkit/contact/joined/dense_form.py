@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from bemkit.arrays import FloatArray
@@ -37,12 +39,14 @@ class RelativeStiffness:
         self._is_kept = is_kept.ravel()
         self._coupling = joined.relative[self._is_kept]
         self._followers = joined.relative[~self._is_kept]
+        self._is_eliminated = joined.tangent_is_eliminated
         self._unit_deformation = joined.deformation(self._coupling.T.toarray())
         n_kept, motions = self._coupling.shape[0], (self._coupling @ joined.motions).toarray()
         n_motions = motions.shape[1]
         matrix = np.zeros((n_kept + n_motions, n_kept + n_motions))
         matrix[:n_kept, :n_kept] = joined.modulus * (self._coupling @ self._unit_deformation)
         matrix[:n_kept, n_kept:] = motions
+        self._following_motions = (self._followers @ joined.motions).toarray()
         matrix[n_kept:, :n_kept] = motions.T
         scale = np.append(np.full(n_kept, joined.modulus), np.ones(n_motions))  # of the unknowns: p / E', a
         inverse = scale[:, None] * DenseLU(matrix, _TIED).solve(np.eye(n_kept + n_motions))
@@ -69,12 +73,21 @@ class RelativeStiffness:
         )
 
     def _eliminated(self, joined: CoupledMembers, loaded: FloatArray, at_rest: FloatArray) -> EliminatedTangents | None:
-        if not joined.tangent_is_eliminated.any():
+        if not self._is_eliminated.any():
             return None
         n_kept = self._coupling.shape[0]
-        by_force = self._followers @ self._unit_deformation
-        by_motion = (self._followers @ joined.motions).toarray()
-        response = by_force @ self._stiffness + by_motion @ self._inverse[n_kept:, :n_kept]
         rest = joined.offset[~self._is_kept] + self._followers @ loaded
-        rest = rest + by_force @ at_rest[:n_kept] + by_motion @ at_rest[n_kept:]
-        return EliminatedTangents(np.flatnonzero(joined.tangent_is_eliminated), response, rest)
+        rest = rest + self._by_force @ at_rest[:n_kept] + self._following_motions @ at_rest[n_kept:]
+        return EliminatedTangents(np.flatnonzero(self._is_eliminated), self._following, rest)
+
+    @cached_property
+    def _by_force(self) -> FloatArray:
+        """(n_eliminated, n_kept) array: what unit forces make eliminated tangents follow."""
+        return np.asarray(self._followers @ self._unit_deformation)
+
+    @cached_property
+    def _following(self) -> FloatArray:
+        """(n_eliminated, n_kept) array: how eliminated tangents follow the kept relative displacements."""
+        n_kept = self._coupling.shape[0]
+        by_motions = self._following_motions @ self._inverse[n_kept:, :n_kept]
+        return np.asarray(self._by_force @ self._stiffness + by_motions)

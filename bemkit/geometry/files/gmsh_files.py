@@ -24,6 +24,8 @@ _CALLS = re.compile(
     rb"\b(System|SystemCall|NonBlockingSystemCall|OnelabRun|OnelabRunClient|UnlinkFile|DeleteFile|RenameFile|CreateDir|"
     rb"Merge|MergeFile|MergeWithBoundingBox|Include|ShapeFromFile|Open|Save|Print|Plugin|NonBlocking\w*)\b"
 )
+_NAMES = re.compile(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", re.DOTALL)
+_MOST_HEAD = 1_000_000
 _COMMENTS = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
 
 
@@ -60,7 +62,7 @@ def read_with_gmsh(path: Path) -> PlaneMesh:
         position = np.zeros(int(max(tags)) + 1, np.intp)
         position[tags] = np.arange(len(tags))
         blocks = [block for dimension in (1, 2) for block in _blocks(gmsh, dimension, position)]
-        return PlaneMesh(in_plane(np.asarray(coordinates).reshape(-1, 3)), tuple(blocks))
+        return PlaneMesh(in_plane(np.asarray(coordinates).reshape(-1, 3)), tuple(blocks), _listed_names(path))
 
 
 def _blocks(gmsh: Any, dimension: int, position: Any) -> Iterator[CellBlock]:
@@ -72,6 +74,14 @@ def _blocks(gmsh: Any, dimension: int, position: Any) -> Iterator[CellBlock]:
             cells = position[np.asarray(own_nodes, dtype=np.intp)].reshape(-1, n_nodes)
             curves = np.full(len(own), entity if dimension == 1 else 0, np.intp)
             yield CellBlock(_CORNERS[title.split()[0]], order, cells, (name,) * len(own), curves)
+
+
+def _listed_names(path: Path) -> tuple[str, ...]:
+    """Return the names of groups in the head of a .msh file, where gmsh itself forgets those without cells."""
+    with path.open("rb") as stream:
+        section = _NAMES.search(stream.read(_MOST_HEAD))
+    names = re.findall(rb'"([^"\n]*)"', section[1]) if section else []
+    return tuple(printable(name.decode("utf-8", "replace")) for name in names)
 
 
 def read_geometry(path: Path, only: Sequence[str], corner_angle: float) -> tuple[list[Stroke], list[str]]:

@@ -32,10 +32,9 @@ def read_with_meshio(path: Path) -> PlaneMesh:
     GeometryError
         If meshio is missing, cannot read the file, or the file holds no plane mesh.
     """
-    if importlib.util.find_spec("meshio") is None:
-        raise GeometryError('meshio is not installed: pip install "bemkit[mesh]"')
-    mesh = read_quietly(path)
-    points = in_plane(points_of(mesh))
+    require_meshio()
+    mesh = _read_quietly(path)
+    points = in_plane(_points_of(mesh))
     solid = [block.type for block in mesh.cells if block.type.startswith(("tetra", "hexa", "wedge", "pyramid"))]
     if solid:
         raise GeometryError(f"it has cells of type {solid[0]!r}: bemkit solves plane problems; give a plane mesh")
@@ -45,19 +44,26 @@ def read_with_meshio(path: Path) -> PlaneMesh:
             continue
         if block.type not in _TYPES:
             raise GeometryError(f"it has cells of type {block.type!r}: give lines, triangles and quadrilaterals")
+        n_corners, order = _TYPES[block.type]
         nodes = np.asarray(block.data)
         if (
             nodes.dtype.kind not in "iu"
             or nodes.ndim != 2
+            or nodes.shape[1] < n_corners
             or (nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points))
         ):
             raise GeometryError(f"it is damaged: its cells do not join its {len(points)} points: write it anew")
-        n_corners, order = _TYPES[block.type]
         blocks.append(CellBlock(n_corners, order, nodes.astype(np.intp), _names(mesh, k), _curves(mesh, k)))
-    return PlaneMesh(points, tuple(blocks))
+    return PlaneMesh(points, tuple(blocks), tuple(mesh.field_data))
 
 
-def read_quietly(path: Path) -> Any:
+def require_meshio() -> None:
+    """Refuse with the remedy where meshio is missing."""
+    if importlib.util.find_spec("meshio") is None:
+        raise GeometryError('meshio is not installed: pip install "bemkit[mesh]"')
+
+
+def _read_quietly(path: Path) -> Any:
     """Read a file; meshio prints what it dislikes, and may leave the interpreter."""
     import meshio
 
@@ -70,7 +76,7 @@ def read_quietly(path: Path) -> Any:
         raise GeometryError(f"it cannot be read ({reason}): give a mesh file of a format that meshio knows") from error
 
 
-def points_of(mesh: Any) -> FloatArray:
+def _points_of(mesh: Any) -> FloatArray:
     """Return the (n, 2) or (n, 3) finite coordinates of a file."""
     try:
         points = np.asarray(mesh.points, dtype=float)
@@ -85,6 +91,19 @@ def points_of(mesh: Any) -> FloatArray:
 
 def _names(mesh: Any, number: int) -> tuple[str, ...]:
     """Return the group of each cell of a block: its physical group, or else a cell set."""
+    try:
+        names = _groups(mesh, number)
+    except (IndexError, KeyError, TypeError, ValueError) as error:
+        raise GeometryError(
+            f"it is damaged: its groups cannot be told ({printable(str(error))}): write it anew"
+        ) from error
+    for name in dict.fromkeys(names):
+        if not name.isprintable():
+            raise GeometryError(f"it is damaged: the group {name!r} has a name that is not printable: write it anew")
+    return names
+
+
+def _groups(mesh: Any, number: int) -> tuple[str, ...]:
     n_cells = len(mesh.cells[number].data)
     dimension = 1 if mesh.cells[number].type.startswith("line") else 2
     if "gmsh:physical" in mesh.cell_data:

@@ -60,10 +60,13 @@ class PlaneMesh:
     ----------
     points : (n, 2) array [m]
     blocks : tuple of CellBlock
+    names : tuple of str
+        Of groups, as the file lists them, be there cells in them or not.
     """
 
     points: FloatArray
     blocks: tuple[CellBlock, ...]
+    names: tuple[str, ...] = ()
 
     def surfaces(self) -> tuple[str, ...]:
         """Return the names of surfaces."""
@@ -115,6 +118,11 @@ def boundary_chains(mesh: PlaneMesh, only: Sequence[str] = ()) -> tuple[list[Cho
     """
     lines = [edge for block in mesh.blocks if block.n_corners == 2 for edge in _edges(block)]
     notes = []
+    if mesh.names and not any(name for block in mesh.blocks for name in block.names):
+        notes.append(
+            f"its groups {', '.join(mesh.names)} have no cells, as gmsh writes version 2 with SaveAll: save it as "
+            "version 4, or without SaveAll"
+        )
     if any(block.n_corners > 2 for block in mesh.blocks):
         edges, is_turned = _outer_edges(mesh, only)
         tagged = {frozenset((line.nodes[0], line.nodes[-1])): line for line in lines}

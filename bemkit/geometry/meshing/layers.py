@@ -28,6 +28,8 @@ SHORTEST = 1e-10
 STEEPEST = 7.0
 """Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
 on a short one as a peak of its traction."""
+NEXT_MOTION = 0.1
+"""How far places where the contact status changes move from one mesh to the next, relative to the mesh before."""
 LARGEST_TURN = np.pi / 4.0
 """Angle by which a curve may turn on one element."""
 
@@ -47,7 +49,9 @@ def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]]) -> Pa
     return _balanced(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
 
 
-def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Sequence[float]]) -> Partition:
+def refined_partition(
+    old: Partition, excess: FloatArray, cuts: Mapping[int, Sequence[float]], resolution: float
+) -> Partition:
     """Divide elements whose errors are too large, and move the pieces to where the contact status now changes.
 
     Parameters
@@ -57,6 +61,9 @@ def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Seq
         By which factor the error of each element is above its share; what is below 1 stays.
     cuts : mapping of int to sequence of float
         As for `layered_partition`. Where their number on a piece of the base has changed, that piece begins anew.
+        Layers go down to what places that move are expected to move again, by which their fields stay within them.
+    resolution : float
+        Length, relative to a piece, below which that makes no difference.
 
     Returns
     -------
@@ -79,7 +86,10 @@ def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Seq
     for number in range(len(old.base.pieces)):
         own, new = np.flatnonzero(before == number).tolist(), np.flatnonzero(now == number).tolist()
         if len(own) == len(new):
-            fractions += [refined[k] for k in own]
+            fractions += [
+                _down_to_motion(refined[k], old.division.pieces[k], fresh.division.pieces[n], resolution)
+                for k, n in zip(own, new, strict=True)
+            ]
         else:
             fractions += [_fractions(fresh.division.pieces[k], fresh.parameters[k]) for k in new]
     return _balanced(old.base, fresh.division, fractions)
@@ -88,6 +98,29 @@ def refined_partition(old: Partition, excess: FloatArray, cuts: Mapping[int, Seq
 def has_same_pieces(old: Partition, new: Partition) -> bool:
     """Whether as many pieces lie on each piece of the base."""
     return np.array_equal(_owners(old.base, old.division), _owners(new.base, new.division))
+
+
+def origins(old: Partition, new: Partition) -> tuple[IntArray, FloatArray]:
+    """Return from which elements of a partition with the same pieces new ones come, and how many layers below.
+
+    Returns
+    -------
+    old_elements : (n_elements,) int array
+    layers : (n_elements,) array
+        Logarithm of the length relative to the longest element that comes from the same one, in layers.
+    """
+    first, found, lengths = 0, [], []
+    for old_piece, old_s, piece, s in zip(
+        old.division.pieces, old.parameters, new.division.pieces, new.parameters, strict=True
+    ):
+        before, now = _fractions(old_piece, old_s), _fractions(piece, s)
+        found.append(first + np.searchsorted(before, 0.5 * (now[:-1] + now[1:])) - 1)
+        lengths.append(np.diff(now))
+        first += before.size - 1
+    elements, sizes = np.concatenate(found), np.concatenate(lengths)
+    longest = np.zeros(first)
+    np.maximum.at(longest, elements, sizes)
+    return elements, np.log(sizes / longest[elements]) / np.log(FACTOR)
 
 
 def is_at_end(partition: Partition) -> BoolArray:
@@ -131,6 +164,18 @@ def _refined(fractions: FloatArray, excess: FloatArray, shortest: float, is_star
             inner = np.array([0.5])
         points += [start + (end - start) * inner, np.array([end])]
     return np.concatenate(points)
+
+
+def _down_to_motion(fractions: FloatArray, before: Piece, now: Piece, resolution: float) -> FloatArray:
+    """Add layers at ends of a piece that have moved."""
+    length = abs(now.span[1] - now.span[0])
+    for end in (0, 1):
+        motion = abs(now.span[end] - before.span[end]) / length
+        longest = max(NEXT_MOTION * motion, resolution)
+        while motion > 0.0 and (tip := fractions[1] if end == 0 else 1.0 - fractions[-2]) > longest:
+            tip *= FACTOR
+            fractions = np.insert(fractions, *((1, tip) if end == 0 else (-1, 1.0 - tip)))
+    return fractions
 
 
 def _balanced(base: Division, division: Division, fractions: Sequence[FloatArray]) -> Partition:

@@ -22,6 +22,7 @@ from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.block_cg import NotConvergedError
+from bemkit.operators.linear.blocks import diagonal_blocks
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -112,15 +113,25 @@ class AssembledModel:
         """
         prepared, forces, displacements = self.prepared, [np.zeros(0)], [np.zeros(0)]
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        bodies = zip(prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True)
-        for conditions, given, condensed, own in bodies:
+        bodies = zip(
+            self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed, unknowns, strict=True
+        )
+        for of_contact, conditions, given, condensed, own in bodies:
             displacement, force = condensed.recover(own)
-            forces.append(supporting_forces(conditions, given, force) * prepared.force_unit)
+            forces.append(supporting_forces(conditions, given, force - of_contact) * prepared.force_unit)
             displacements.append(displacement.ravel() * prepared.units.displacement)
         rigid = self.rigid_bodies(state)
         forces += [reaction for _, reaction in rigid]
         displacements += [motion for motion, _ in rigid]
         return np.concatenate(forces), np.concatenate(displacements)
+
+    def _contact_forces(self, state: ContactState) -> list[FloatArray]:
+        """Return the nodal forces (n_nodes, 2) of contact on each body, in its own axes, dimensionless."""
+        bodies = self.prepared.bodies
+        in_place = _coupling(self.prepared).T @ (self.body.weights[:, None] * state.traction).ravel()
+        ends = np.cumsum([body.space.n_dofs for body in bodies])[:-1]
+        each = np.split(in_place, ends)
+        return [body.turn.turned_back(own.reshape(-1, 2)) for body, own in zip(bodies, each, strict=True)]
 
     def boundary_fields(self, state: ContactState) -> list[tuple[FloatArray, FloatArray, float]]:
         """Return the physical fields of a contact state on the boundary of each body.
@@ -204,10 +215,10 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     for group in groups(bodies):
         first = bodies[group[0]]
         material = first.material.scaled(prepared.units.modulus)
-        solver = linear_solver(prepared, int(group[0])).solver
+        chosen = linear_solver(prepared, int(group[0]))
         first_inside = prepared.insides[group[0]]
         try:
-            map_ = first.scene.discretisation.elastic_map(first.own_mesh.unit, material, solver)
+            map_ = first.scene.discretisation.chosen_map(first.own_mesh.unit, material, chosen)
             loaded = map_ if first_inside is None else HeavyElasticity(map_, first_inside)
             base = loaded.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         except (SingularMatrixError, NotConvergedError) as error:
@@ -333,10 +344,10 @@ def _rigid_coupling(prepared: PreparedAssembly) -> sparse.csr_array:
 def _relative(prepared: PreparedAssembly) -> sparse.csr_array:
     """Return how the retained displacements of all bodies move the contact nodes, (2 n_contact, n_retained)."""
     nodal = [_nodal(*pair) for pair in zip(prepared.bodies, prepared.conditions, strict=True)]
-    relative = sparse.csr_array(_coupling(prepared) @ sparse.block_diag(nodal, format="csr"))
+    relative = sparse.csr_array(_coupling(prepared) @ diagonal_blocks(nodal))
     if prepared.assembly.rigid:
         chosen = [rigid_motions(body, prepared.units)[0] for body in prepared.assembly.rigid]
-        driven = _rigid_coupling(prepared) @ sparse.block_diag(chosen, format="csr")
+        driven = _rigid_coupling(prepared) @ diagonal_blocks(chosen)
         relative = sparse.csr_array(sparse.hstack([relative, driven], format="csr"))
     relative.eliminate_zeros()
     return relative

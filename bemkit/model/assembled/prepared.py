@@ -24,8 +24,10 @@ from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
 from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
+from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
+from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
+from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
@@ -319,8 +321,10 @@ def _retained(
 def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver:
     """Return the linear solver that the map of a body takes, and why."""
     body, conditions = prepared.bodies[number], prepared.conditions[number]
-    if not body.scene.discretisation.is_symmetric:
-        return ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
+    requested, discretisation = prepared.assembly.linear_solver, body.scene.discretisation
+    if not discretisation.is_symmetric:
+        material = body.material.scaled(prepared.units.modulus)
+        case = BodyCase(body.own_mesh, material, conditions, (prepared.map_data(number),), is_condensed=True)
+        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(body.own_mesh))
     n_retained = int(np.count_nonzero(conditions.is_retained))
-    requested = prepared.assembly.linear_solver
     return choose_linear_solver(requested, body.space.n_dofs, n_retained, physical_memory())

@@ -53,11 +53,18 @@ class Coefficients:
     on_conjugate_slope: ComplexArray
 
     @classmethod
-    def zeros(cls, shape: tuple[int, int], has_slopes: bool) -> Coefficients:
+    def zeros(cls, shape: tuple[int, ...], has_slopes: bool) -> Coefficients:
         """Return coefficients to be filled."""
-        on_slopes = shape if has_slopes else (0, 0)
+        on_slopes: tuple[int, ...] = shape if has_slopes else (0, 0)
         tractions = np.zeros(shape), np.zeros(shape, complex)
         return cls(*tractions, *(np.empty(each, complex) for each in (shape, shape, on_slopes, on_slopes)))
+
+    @property
+    def stacked(self) -> ComplexArray:
+        """(6, ...) array of the factors of p, conj(p), v, conj(v), s and conj(s)."""
+        on_displacement = self.on_displacement, self.on_conjugate_displacement
+        traction = self.on_traction, self.on_conjugate_traction
+        return np.array([*traction, *on_displacement, self.on_slope, self.on_conjugate_slope])
 
     def add_slopes(self, reconstruction: GradientReconstruction) -> None:
         """Add the slopes that displacements suggest."""
@@ -107,10 +114,15 @@ class _ElementIntegrals:
     moments: tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray] | None
 
     def combine(
-        self, result: Coefficients, where: tuple[slice | IntArray, ...], panels: Panels, material: Material, r0: float
+        self,
+        result: Coefficients,
+        where: tuple[slice | IntArray, ...],
+        columns: slice | IntArray,
+        panels: Panels,
+        material: Material,
+        r0: float,
     ) -> None:
-        """Write the coefficients of the densities where they belong; `where` ends with the elements."""
-        columns = where[-1]
+        """Write the coefficients of the densities on some elements where they belong."""
         nu = material.effective_poisson_ratio
         b = -1.0 / (4.0 * np.pi * (1.0 - nu))
         turned, rates = b * panels.tangent[columns] ** 2, (0.5 / np.pi, b * (1.0 - 2.0 * nu))
@@ -167,12 +179,33 @@ class CollocationPoints:
                     integrals, is_close = _straight_far(self.panels, rows, columns, distance, has_single, has_slopes)
                 else:
                     integrals, is_close = _curved_far(self.panels, rows, columns, has_single, has_slopes)
-                integrals.combine(result, (everywhere, columns), self.panels, self.material, self.r0)
+                integrals.combine(result, (everywhere, columns), columns, self.panels, self.material, self.r0)
             row, column = np.nonzero(is_close)
             if row.size:
-                close = row + rows.start, column + columns.start
-                exact = _listed(self.panels, *close, has_single, has_slopes)
-                exact.combine(result, (row, close[1]), self.panels, self.material, self.r0)
+                point, element = row + rows.start, column + columns.start
+                exact = _listed(
+                    self.panels, self.panels.centre[point], element, point == element, has_single, has_slopes
+                )
+                exact.combine(result, (row, element), element, self.panels, self.material, self.r0)
+        return result
+
+    def at(self, x: ComplexArray, elements: IntArray, is_own: BoolArray) -> Coefficients:
+        """Return the coefficients (n,) of pairs of points anywhere and elements, exactly at any distance.
+
+        Parameters
+        ----------
+        x : (n,) complex array
+        elements : (n,) array
+        is_own : (n,) bool array
+            Where the point is the middle of the element.
+        """
+        result = Coefficients.zeros(elements.shape, True)
+        is_straight = self.panels.is_straight[elements]
+        for chosen in (np.flatnonzero(is_straight), np.flatnonzero(~is_straight)):
+            if chosen.size:
+                own = elements[chosen]
+                exact = _listed(self.panels, x[chosen], own, is_own[chosen], True, True)
+                exact.combine(result, (chosen,), own, self.panels, self.material, self.r0)
         return result
 
 
@@ -248,16 +281,17 @@ def _curved_moments(polynomials: ComplexArray, zeta: ComplexArray) -> tuple[Comp
     return double, log_ratio, quotient_change
 
 
-def _listed(panels: Panels, rows: IntArray, columns: IntArray, has_single: bool, has_slopes: bool) -> _ElementIntegrals:
-    """Evaluate listed pairs, all straight or all curved, exactly at any distance."""
-    from_start, from_end = panels.centre[rows] - panels.start[columns], panels.centre[rows] - panels.end[columns]
+def _listed(
+    panels: Panels, x: ComplexArray, columns: IntArray, same: BoolArray, has_single: bool, has_slopes: bool
+) -> _ElementIntegrals:
+    """Evaluate listed pairs, all straight or all curved, exactly at any distance; `same` where x is the middle."""
+    from_start, from_end = x - panels.start[columns], x - panels.end[columns]
     plus, minus = from_start * panels.to_local[columns], from_end * panels.to_local[columns]
     is_straight = bool(panels.is_straight[columns[0]])
     polynomials = panels.polynomials(columns)[: 2 if is_straight else None]
     highest = len(polynomials) - 1
     degrees = Degrees(log=(0, highest - 1), double=(0, highest)) if has_slopes else DEGREES
     inner = inner_integrals(panels, degrees, columns, from_start, from_end)
-    same = rows == columns
     if same.any():
         store(inner, same, inner_on_element(panels, degrees, columns[same], 0.0))
         if is_straight:

@@ -48,7 +48,7 @@ class Reciprocity:
     fields: FloatArray
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool) -> Reciprocity:
+    def of(cls, mesh: BoundaryMesh, material: Material, *, takes_slopes: bool, has_holes: bool = True) -> Reciprocity:
         """Return the equations of constant tractions, and of displacements with or without slopes.
 
         Parameters
@@ -58,20 +58,28 @@ class Reciprocity:
         material : Material
         takes_slopes : bool
             Whether displacements have slopes; see `bemkit.operators.collocation.gradient_reconstruction`.
+        has_holes : bool
+            Whether those of holes are among them.
         """
         panels = Panels(mesh.whole)
         reconstruction = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
+            if area <= 0.0 and not has_holes:
+                continue
             field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
-            on_displacement = field.displacement[None, :]
+            row = field.displacement[None, :]
             if reconstruction is not None:
                 on_slope = field.gradient / (panels.half * panels.tangent)
-                reconstruction.add_to(on_displacement, on_slope[None, :], is_conjugate=False)
+                reconstruction.add_to(row, on_slope[None, :], is_conjugate=False)
             on_tractions.append(_folded(mesh, field.traction))
-            on_displacements.append(_folded(mesh, on_displacement[0]))
+            on_displacements.append(_folded(mesh, row[0]))
             fields.append(np.stack([field.value.real, field.value.imag], axis=1)[: mesh.n_elements].ravel())
-        return cls(np.array(on_tractions), np.array(on_displacements), np.array(fields).T)
+        shape = -1, 2 * mesh.n_elements
+        on_traction, on_displacement, values = (
+            np.reshape(rows, shape) for rows in (on_tractions, on_displacements, fields)
+        )
+        return cls(on_traction, on_displacement, values.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +98,8 @@ class _Field:
 
 def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
     """Return the field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor."""
-    whole = mesh.whole
-    z, arm, dz = _quadrature(whole)
+    whole, arcs = mesh.whole, Arcs.of(mesh.whole)
+    z, arm, dz = arcs.z, arcs.arm, arcs.dz
     centre, factor = _plane(mesh.centre), 1.0 - 2.0 * material.effective_poisson_ratio
     return _Field(
         (_plane(whole.centres) - centre) / mesh.diameter,
@@ -101,19 +109,49 @@ def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class HoleSource:
+    """The field w = a / conj(z - c) of a source of volume in a hole.
+
+    Parameters
+    ----------
+    centre : complex [m]
+    radius : float [m]
+        a, the distance of the centre from the boundary.
+    """
+
+    centre: complex
+    radius: float
+
+    @classmethod
+    def of(cls, mesh: BoundaryMesh, loop: IntArray) -> HoleSource:
+        """Return the source in the middle of the largest circle within a hole."""
+        (x, y), radius = _largest_circle(mesh, loop)
+        return cls(complex(x, y), radius)
+
+    def value(self, z: ComplexArray) -> ComplexArray:
+        """Return the field at points."""
+        return np.asarray(self.radius / (z - self.centre).conj())
+
+    def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Return the work of tractions, displacements and gradients; see `_Field`."""
+        c, a = self.centre, self.radius
+        return (
+            np.sum(np.abs(arcs.dz) / (arcs.z - c), axis=1) * (a / (2.0 * material.shear_modulus)),
+            1j * a * (arcs.end - arcs.start) / ((arcs.start - c) * (arcs.end - c)),
+            1j * a * np.sum(arcs.arm * arcs.dz / (arcs.z - c) ** 2, axis=1),
+        )
+
+
 def _source(mesh: BoundaryMesh, material: Material, loop: IntArray) -> _Field:
-    """Return the field w = a / conj(z - c) of a source of volume in a hole, and in its images."""
-    z, arm, dz = _quadrature(mesh.whole)
-    start, middle, end = (_plane(points) for points in (mesh.whole.start, mesh.whole.centres, mesh.whole.end))
-    centre, radius = _largest_circle(mesh, loop)
-    images = [centre] if mesh.symmetry is None else [mesh.symmetry.reflected(centre, g) for g in mesh.symmetry.images]
-    value, traction, displacement, gradient = np.zeros((4, len(z)), complex)
-    for c in _plane(np.array(images)):
-        value += radius / (middle - c).conj()
-        traction += np.sum(np.abs(dz) / (z - c), axis=1) * (radius / (2.0 * material.shear_modulus))
-        displacement += 1j * radius * (end - start) / ((start - c) * (end - c))
-        gradient += 1j * radius * np.sum(arm * dz / (z - c) ** 2, axis=1)
-    return _Field(value, traction, displacement, gradient)
+    """Return the field of a source of volume in a hole, and in its images."""
+    arcs, middle, one = Arcs.of(mesh.whole), _plane(mesh.whole.centres), HoleSource.of(mesh, loop)
+    place = np.array([one.centre.real, one.centre.imag])
+    images = [place] if mesh.symmetry is None else [mesh.symmetry.reflected(place, g) for g in mesh.symmetry.images]
+    sources = [HoleSource(complex(*image), one.radius) for image in images]
+    works = [source.work(arcs, material) for source in sources]
+    traction, displacement, gradient = (sum(each) for each in zip(*works, strict=True))
+    return _Field(sum(source.value(middle) for source in sources), traction, displacement, gradient)  # type: ignore[arg-type]  # sums of arrays
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:
@@ -136,12 +174,34 @@ def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, flo
     return whole.centres[touching[largest]] + radius * whole.normals[touching[largest]], radius
 
 
-def _quadrature(whole: BoundaryMesh) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Return Gauss points z, z - x and dz (n_elements, n_points), x the middle of the element."""
-    elements = np.arange(whole.n_elements)
-    xi, weights = gauss_legendre(_POINTS)
-    z, dz = _plane(whole.points(elements, xi)), _plane(whole.derivatives(elements, xi)) * weights
-    return z, z - _plane(whole.centres)[:, None], dz
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """Elements with Gauss points on them.
+
+    Parameters
+    ----------
+    start, end : (n_elements,) complex arrays [m]
+    z, arm, dz : (n_elements, n_points) complex arrays [m]
+        The points, how far they are from the middle of the element, and the weighted steps.
+    """
+
+    start: ComplexArray
+    end: ComplexArray
+    z: ComplexArray
+    arm: ComplexArray
+    dz: ComplexArray
+
+    @classmethod
+    def of(cls, mesh: BoundaryMesh) -> Arcs:
+        """Return all elements of a mesh, images not counted."""
+        elements = np.arange(mesh.n_elements)
+        xi, weights = gauss_legendre(_POINTS)
+        z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
+        return cls(_plane(mesh.start), _plane(mesh.end), z, z - _plane(mesh.centres)[:, None], dz)
+
+    def take(self, elements: IntArray) -> Arcs:
+        """Return some of them."""
+        return Arcs(*(of[elements] for of in (self.start, self.end, self.z, self.arm, self.dz)))
 
 
 def _plane(vectors: FloatArray) -> ComplexArray:

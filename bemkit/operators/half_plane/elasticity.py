@@ -8,58 +8,35 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace, dof_points
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.flexibility import strip_flexibility
-from bemkit.operators.linear.dense import Cholesky
-from bemkit.operators.material import Material
+from bemkit.operators.half_plane.surface import SurfaceElasticity
+from bemkit.operators.linear.dense import Cholesky, SingularMatrixError
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
+_ROUND_OFF = 1e-10
+"""Share of a motion that counts as none."""
+
 
 @dataclass(frozen=True, eq=False)
-class HalfPlaneElasticity:
-    """Elasticity of a half-plane seen from a strip of its surface; fulfils `SteklovPoincare`.
+class HalfPlaneElasticity(SurfaceElasticity):
+    """Elasticity of a half-plane seen from a strip of its surface; see `SurfaceElasticity`.
+
+    Its flexibility, (n_dofs, n_dofs) [1/Pa], takes forces to displacements, in x and y; see `strip_flexibility`.
 
     Parameters
     ----------
-    mesh : BoundaryMesh
-        The strip, in units of its length.
-    material : Material
-    drive : FarDrive
-        How the half-plane moves far away; it rests unless given.
     kept : dict
         The last condensation, to be used again under other loads.
     """
 
-    mesh: BoundaryMesh
-    material: Material
-    drive: FarDrive = field(default_factory=FarDrive)
     kept: dict[str, _Condensation] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def displacement_space(self) -> ConstantSpace:
-        """Means over elements."""
-        return ConstantSpace(self.mesh)
-
-    @property
-    def traction_space(self) -> ConstantSpace:
-        """Constants on elements."""
-        return self.displacement_space
-
-    @cached_property
-    def flexibility(self) -> FloatArray:
-        """(n_dofs, n_dofs) array [1/Pa]: forces to displacements, in x and y; see `strip_flexibility`."""
+    def _flexibility(self) -> FloatArray:
         return strip_flexibility(self.mesh, self.material)
-
-    def driven_by(self, drive: FarDrive) -> HalfPlaneElasticity:
-        """Return the same half-plane under another drive; nothing is integrated or, if it can be, factored again."""
-        other = replace(self, drive=drive)
-        if "flexibility" in self.__dict__:
-            other.__dict__["flexibility"] = self.flexibility
-        return other
 
     def strain_displacement(self, force: FloatArray) -> FloatArray:
         """Return the displacements (n_nodes, 2) that nodal forces (n_nodes, 2) cause, without those of the drive."""
@@ -73,10 +50,6 @@ class HalfPlaneElasticity:
         condensed = replace(condensation, drive=self.drive).under(force, conditions.displacement)
         return replace(condensed, work=half_plane_work(self.mesh.n_elements, condensation.acting.size))
 
-    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
-        return np.asarray(force / self.mesh.lengths[:, None])[:, None, :]
-
 
 def half_plane_work(n_elements: int, n_acting: int) -> OperationCounts:
     """Return what a condensation takes with `n_acting` directions that are retained or fixed."""
@@ -86,6 +59,17 @@ def half_plane_work(n_elements: int, n_acting: int) -> OperationCounts:
         factorisations=(Factorisation(FactorKind.CHOLESKY, n_acting),) if n_acting else (),
         right_hand_sides=n_acting,
     )
+
+
+def _check_resisted(motions: FloatArray, drive: FarDrive) -> None:
+    """Refuse loads far away that drive a motion which no direction (n_acting, 3) resists, and a turn about one node."""
+    driven = motions[:, list(drive.driven)]
+    if np.linalg.matrix_rank(driven, _ROUND_OFF * max(float(np.abs(driven).max(initial=0.0)), 1.0)) < len(drive.driven):
+        loads = " and ".join(f"far.{('force_x', 'force_y', 'moment')[k]}" for k in drive.driven)
+        raise SingularMatrixError(
+            f"{loads} drive the half-plane along a motion that its {len(motions)} directions in contact or held leave "
+            "free: give the motion instead of the load, or more elements in contact"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +108,7 @@ class _Condensation:
         flexibility = rotate_rows(rotate_columns(elastic.flexibility, frame), frame)
         motions = np.einsum("nkc,ncm->nkm", frame, elastic.drive.motions_at(dof_points(elastic.displacement_space)))
         acting = np.flatnonzero(~conditions.is_free)
+        _check_resisted(motions.reshape(-1, 3)[acting], elastic.drive)
         retained = np.flatnonzero(conditions.is_retained.ravel()[acting])
         stiffness = np.zeros((0, 0))
         if acting.size:

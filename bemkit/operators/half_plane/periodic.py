@@ -8,16 +8,14 @@ their means the waves q, q + 2 pi / h, ... look alike, and their shares add up t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import ConstantSpace
-from bemkit.operators.half_plane.far_drive import FarDrive
+from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
@@ -52,26 +50,16 @@ def wave_flexibility(n_elements: int, period: float, material: Material) -> Floa
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicElasticity:
+class PeriodicElasticity(SurfaceElasticity):
     """Elasticity of a periodic half-plane seen from equal elements of its surface; no matrix is ever formed.
 
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-        One period, in units of its length.
-    material : Material
-    drive : FarDrive
-        How the half-plane moves far away.
+    Its flexibility, (n_elements,) [m/Pa], is that of each wave; see `wave_flexibility`.
 
     Raises
     ------
     InputError
         If elements are not of equal lengths.
     """
-
-    mesh: BoundaryMesh
-    material: Material
-    drive: FarDrive = field(default_factory=FarDrive)
 
     def __post_init__(self) -> None:
         lengths = self.mesh.lengths
@@ -81,31 +69,13 @@ class PeriodicElasticity:
                 "period: leave out the grading, and let parts end where equal elements do"
             )
 
-    @cached_property
-    def displacement_space(self) -> ConstantSpace:
-        """Means over elements."""
-        return ConstantSpace(self.mesh)
-
-    @property
-    def traction_space(self) -> ConstantSpace:
-        """Constants on elements."""
-        return self.displacement_space
-
-    @cached_property
-    def flexibility(self) -> FloatArray:
-        """(n_elements,) array [m/Pa]: see `wave_flexibility`."""
+    def _flexibility(self) -> FloatArray:
         return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
 
     @cached_property
     def axes(self) -> ComplexArray:
         """(2,) array: the directions x and y as complex numbers."""
         return np.asarray(self.mesh.tangents[0] + 1j * self.mesh.normals[0])
-
-    def driven_by(self, drive: FarDrive) -> PeriodicElasticity:
-        """Return the same half-plane under another drive."""
-        other = replace(self, drive=drive)
-        other.__dict__["flexibility"] = self.flexibility
-        return other
 
     def displaced(self, traction: ComplexArray) -> ComplexArray:
         """Return the displacements (n_elements,) [m] that tractions (n_elements,) [Pa] cause."""
@@ -134,7 +104,3 @@ class PeriodicElasticity:
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Refuse to form a matrix; see `bemkit.contact.periodic_body`."""
         raise InputError("a periodic half-plane is no body of an assembly: give it a scene of its own")
-
-    def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the tractions (n_elements, 1, 2) [Pa], which are the forces per length."""
-        return np.asarray(force / self.mesh.lengths[:, None])[:, None, :]

@@ -15,7 +15,8 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.gradient_reconstruction import GradientReconstruction
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
+from bemkit.operators.hierarchy.curved_elements import CurvedElements
+from bemkit.operators.hierarchy.element_fields import Constants, element_fields
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
@@ -23,6 +24,7 @@ _PAIRS = 16384
 """Pairs of points and elements that are evaluated at a time, so that they stay in the cache."""
 NOWHERE = -1
 """Element of a point that is the middle of none."""
+_NOTHING = np.zeros((0, 0), complex)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,8 @@ class BoundaryColumns:
         Places of the element before, of the element itself and of the one after it along the boundary.
     slopes, means : (3, n_elements) complex arrays or None
         Weights of the displacements of these three in the slope and in the mean of each element.
+    curved : CurvedElements or None
+        What evaluates the fields where elements are curved; closed forms do if all are straight.
     """
 
     constants: Constants
@@ -51,10 +55,19 @@ class BoundaryColumns:
     neighbours: IntArray
     slopes: ComplexArray | None
     means: ComplexArray | None
+    curved: CurvedElements | None = None
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> BoundaryColumns:
-        """Return the columns of a mesh of straight elements, without symmetry.
+    def of(
+        cls,
+        mesh: BoundaryMesh,
+        material: Material,
+        order: IntArray,
+        *,
+        takes_slopes: bool,
+        log_length: float | None = None,
+    ) -> BoundaryColumns:
+        """Return the columns of a mesh without symmetry.
 
         Parameters
         ----------
@@ -63,7 +76,10 @@ class BoundaryColumns:
         order : (n_elements,) array
             The element at each place.
         takes_slopes : bool
+        log_length : float, optional [m]
+            Unit of length of the logarithm; by default the diameter of the mesh.
         """
+        log_length = mesh.diameter if log_length is None else log_length
         panels = Panels(mesh)
         place = np.empty_like(order)
         place[order] = np.arange(order.size)
@@ -74,10 +90,10 @@ class BoundaryColumns:
         slopes = means = None
         if takes_slopes:
             of = GradientReconstruction.of(mesh, panels)
-            slopes = np.stack([of.before, of.own, of.after])[:, order]
-            means = np.stack([of.mean_before, of.mean_own, of.mean_after])[:, order]
+            slopes = np.stack([each[order] for each in (of.before, of.own, of.after)])
+            means = np.stack([each[order] for each in (of.mean_before, of.mean_own, of.mean_after)])
         return cls(
-            Constants.of(material, mesh.diameter),
+            Constants.of(material, log_length),
             order,
             panels.start[order],
             panels.end[order],
@@ -86,6 +102,7 @@ class BoundaryColumns:
             neighbours,
             slopes,
             means,
+            None if panels.curved is None else CurvedElements.of(panels, material, order, log_length),
         )
 
     @property
@@ -100,14 +117,12 @@ class BoundaryColumns:
 
     def entries(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of the equations; rows are 2 * place + component."""
-        points, place = np.unique(rows // 2, return_inverse=True)
-        fields = self.fields(self.centre[points], points, columns)
-        parts = np.stack([fields.real, fields.imag])
-        block: FloatArray = parts[rows % 2, place]
+        points, number = np.unique(rows // 2, return_inverse=True)
+        block: FloatArray = self.fields(self.centre[points], points, columns)[2 * number + rows % 2]
         return block
 
-    def fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
-        """Return what each column causes at points: (n_points, n_columns), complex displacements.
+    def fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> FloatArray:
+        """Return displacements (2 n_points, n_columns) that columns cause at points; rows are 2 * point + component.
 
         Parameters
         ----------
@@ -115,18 +130,32 @@ class BoundaryColumns:
         places : (n_points,) array
             The element in whose middle the point is, or `NOWHERE`.
         columns : (n_columns,) array
+            Those of an element that follow each other are evaluated at once.
         """
-        element, kind, component = columns // 4, (columns // 2) % 2, columns % 2
-        result = np.empty((x.size, columns.size), complex)
-        for of_kind, factors in ((0, self._of_tractions), (1, self._of_displacements)):
-            chosen = np.flatnonzero(kind == of_kind)
-            if chosen.size:
-                elements, number = np.unique(element[chosen], return_inverse=True)
-                on, on_conjugate = factors(x, places, elements)
-                along_x = component[chosen] == 0
-                result[:, chosen[along_x]] = (on + on_conjugate)[:, number[along_x]]
-                result[:, chosen[~along_x]] = (1j * (on - on_conjugate))[:, number[~along_x]]
-        return result
+        if self.curved is None and (fast := compiled.functions()) is not None:
+            slopes, means = (_NOTHING if of is None else of for of in (self.slopes, self.means))
+            about = self.constants.numbers, x, places, self.start, self.end, self.neighbours, slopes, means
+            values: FloatArray = fast.columns(*about, columns)
+            return values.T
+        result = np.empty((columns.size, x.size), complex)
+        step = max(1, 4 * _PAIRS // max(columns.size, 1))  # about four columns an element
+        for begin in range(0, x.size, step):
+            some = slice(begin, begin + step)
+            result[:, some] = self._some_fields(x[some], places[some], columns).T
+        return result.view(float).T
+
+    def of_forces(self, felt: FloatArray, places: IntArray, forces: ComplexArray) -> FloatArray:
+        """Return what the equations in the middle of elements feel of point forces.
+
+        Parameters
+        ----------
+        felt : (2 n_forces, 2 n_places) array
+            The displacements there, by 8 pi mu (1 - nu).
+        places : (n_places,) array
+        forces : (n_forces,) complex array
+            Where they act.
+        """
+        return felt
 
     def applied(self, places: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return (1/2 + T) u - U t, (n, 2), in the middle of some elements.
@@ -138,52 +167,61 @@ class BoundaryColumns:
             By place.
         """
         t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
-        s = np.zeros_like(u)
+        s, x = np.zeros_like(u), self.centre[places]
         result = 0.5 * u[places]
         if self.slopes is not None and self.means is not None:
             around = u[self.neighbours]
             s, u = np.sum(self.slopes * around, axis=0), u + np.sum(self.means * around, axis=0)
+        if self.curved is None and (fast := compiled.functions()) is not None:
+            result += fast.applied(self.constants.numbers, x, places, self.start, self.end, t, u, s)
+            return np.stack([result.real, result.imag], axis=1)
         step = max(1, _PAIRS // max(places.size, 1))
-        for begin in range(0, self.n_elements, step):
-            some = slice(begin, begin + step)
-            is_own = places[:, None] == np.arange(begin, min(begin + step, self.n_elements))
-            x, start, end = self.centre[places], self.start[some], self.end[some]
-            on, on_conjugate = single_layer_fields(self.constants, x, start, end, is_own)
-            result -= on @ t[some] + on_conjugate @ t[some].conj()
-            fields = double_layer_fields(self.constants, x, start, end, is_own)
-            result += fields[0] @ u[some] + fields[1] @ u[some].conj()
-            result += fields[2] @ s[some] + fields[3] @ s[some].conj()
+        for begin in range(0, t.size, step):
+            some = np.arange(begin, min(begin + step, t.size))
+            fields = self._element_fields(x, places, some)
+            for field, density in zip(fields, (-t, -t.conj(), u, u.conj(), s, s.conj()), strict=True):
+                result += field @ density[some]
         return np.stack([result.real, result.imag], axis=1)
 
-    def _of_tractions(self, x: ComplexArray, places: IntArray, elements: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        is_own = places[:, None] == elements
-        on, on_conjugate = -single_layer_fields(self.constants, x, self.start[elements], self.end[elements], is_own)
-        return on, on_conjugate
+    def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
+        """Return complex displacements (n_points, n_columns)."""
+        elements, number = np.unique(columns // 4, return_inverse=True)
+        touched = elements if self.slopes is None else np.unique(self.neighbours[:, elements])
+        fields = self._element_fields(x, places, touched)
+        own = np.searchsorted(touched, elements)
+        kind, is_along_x = (columns // 2) % 2, columns % 2 == 0
+        result = np.empty((x.size, columns.size), complex)
+        for of_kind in (0, 1):
+            if not np.any(kind == of_kind):
+                continue
+            on, on_conjugate = (
+                (-fields[0][:, own], -fields[1][:, own]) if of_kind == 0 else self._moved(fields, elements, touched)
+            )
+            if of_kind == 1:
+                on = on + 0.5 * (places[:, None] == elements)
+            for along_x, field in ((True, on + on_conjugate), (False, 1j * (on - on_conjugate))):
+                chosen = (kind == of_kind) & (is_along_x == along_x)
+                result[:, chosen] = field[:, number[chosen]]
+        return result
 
-    def _of_displacements(
-        self, x: ComplexArray, places: IntArray, elements: IntArray
-    ) -> tuple[ComplexArray, ComplexArray]:
+    def _element_fields(self, x: ComplexArray, places: IntArray, elements: IntArray) -> ComplexArray:
+        """Return what some elements, ascending, cause; see `element_fields.element_fields`."""
+        if self.curved is not None:
+            return self.curved.fields(x, places, elements)
+        counted = np.searchsorted(elements, places)
+        counted[elements[np.minimum(counted, elements.size - 1)] != places] = NOWHERE
+        return element_fields(self.constants, x, counted, self.start[elements], self.end[elements])
+
+    def _moved(self, fields: ComplexArray, elements: IntArray, touched: IntArray) -> tuple[ComplexArray, ComplexArray]:
+        """Return the factors of displacements of elements and of their conjugates, with slopes."""
+        own = np.searchsorted(touched, elements)
+        total, total_conjugate = fields[2][:, own], fields[3][:, own]
         if self.slopes is None or self.means is None:
-            touched = elements
-        else:
-            touched = np.unique(self.neighbours[:, elements])
-        is_own = places[:, None] == touched
-        fields = double_layer_fields(self.constants, x, self.start[touched], self.end[touched], is_own)
-        fields[0] += 0.5 * is_own
-        if self.slopes is None or self.means is None:
-            return fields[0], fields[1]
+            return total, total_conjugate
         # an element is the one after its predecessor, itself, and the one before its successor
-        at = np.searchsorted(touched, self.neighbours[:, elements])
-        slopes, means = (
-            np.stack([of[k, touched[each]] for k, each in zip((2, 1, 0), at, strict=True)])
-            for of in (self.slopes, self.means)
-        )
-        if (fast := compiled.functions()) is not None:
-            on, on_conjugate = fast.with_slopes(fields, is_own, at, slopes, means)
-            return on, on_conjugate
-        total, total_conjugate = fields[0][:, at[1]], fields[1][:, at[1]]
-        for k in range(3):
-            free = fields[0][:, at[k]] - 0.5 * is_own[:, at[k]]
-            total += fields[2][:, at[k]] * slopes[k] + free * means[k]
-            total_conjugate += fields[3][:, at[k]] * slopes[k].conj() + fields[1][:, at[k]] * means[k].conj()
+        for k, acted_on in zip((2, 1, 0), self.neighbours[:, elements], strict=True):
+            at = np.searchsorted(touched, acted_on)
+            slopes, means = self.slopes[k, acted_on], self.means[k, acted_on]
+            total += fields[4][:, at] * slopes + fields[2][:, at] * means
+            total_conjugate += fields[5][:, at] * slopes.conj() + fields[3][:, at] * means.conj()
         return total, total_conjugate

@@ -1,18 +1,21 @@
 """The closed forms of `element_fields` compiled by numba, if the extra ``fast`` is installed and works.
 
 The compiled functions stand in `compiled_fields`, which only this module imports. Compiling takes some seconds, once
-for an installation: numba keeps the result on disk.
+for an installation: numba keeps the result on disk. `bemkit.operators.hierarchy.warm_up` compiles all of them.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import os
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
 from bemkit.errors import printable
+from bemkit.operators.stopwatch import announce
 
 _MISSING = "not installed: the kernels run in numpy; pip install 'bemkit[fast]' compiles them"
 
@@ -39,15 +42,24 @@ def _loaded() -> tuple[ModuleType | None, str]:
     try:
         from bemkit.operators.hierarchy import compiled_fields
 
+        if not is_cached(compiled_fields):
+            announce("compile kernels, once for this installation")
         point, element = np.array([0.5 + 1.0j]), np.array([0.0j])
-        values = compiled_fields.single_layer_fields(
-            1.0, 0.3, 1.0, point, element, element + 1.0, np.zeros((1, 1), np.bool_)
+        values = compiled_fields.element_fields(
+            np.array([1.0, 1.0, 0.3, 1.0]), point, np.array([-1]), element, element + 1.0
         )
         if not np.isfinite(values).all():
             return None, "numba computes wrong numbers here: the kernels run in numpy"
     except Exception as error:  # whatever a broken installation raises
         return None, f"numba does not work here ({_short(error)}): the kernels run in numpy"
     return compiled_fields, "numba is installed"
+
+
+def is_cached(module: ModuleType) -> bool:
+    """Whether numba has kept what it compiled of a module, beside it or where its settings say."""
+    source = Path(str(module.__file__))
+    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or source.parent / "__pycache__")
+    return any(folder.rglob(f"{source.stem}.*.nbi"))
 
 
 def _short(error: Exception) -> str:

@@ -12,15 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
-from bemkit.operators.hierarchy.interpolative import interpolative
+from bemkit.operators.hierarchy.interpolative import Interpolation, sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, extents, n_proxies, point_forces
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
+_UNEVEN = 10.0
+"""Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
+_FIRST_GUESS, _GROWTH = 100, 1.3
+"""Guesses of ranks: of a leaf, and from one level to the next."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,26 +35,18 @@ class Skeleton:
     ----------
     rows : (n_rows,) array
         Equations 2 * place + component.
-    row_map : (n_candidates, n_rows) array
+    row_map : Interpolation
         What all equations of the cluster (of its children: their skeletons) feel, from what these feel.
     columns : (n_columns,) array
         Unknowns 4 * place + 2 * kind + component.
-    column_map : (n_candidates, n_columns) array
-        What all unknowns of the cluster (of its children: their skeletons) add to these.
+    column_map : Interpolation
+        What all unknowns of the cluster (of its children: their skeletons) cause, as if these had caused it.
     """
 
     rows: IntArray
-    row_map: FloatArray
+    row_map: Interpolation
     columns: IntArray
-    column_map: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Coupling:
-    """What the skeleton columns of one sibling cause at the skeleton rows of the other."""
-
-    on_first: FloatArray
-    on_second: FloatArray
+    column_map: Interpolation
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +61,12 @@ class Compression:
         The columns of each leaf that may have a value: those of tractions and displacements that are not always zero.
     skeletons : tuple of tuples of Skeleton
         By level from the leaves up to below the root, and by cluster.
-    couplings : tuple of tuples of Coupling
-        The same by pair of siblings.
     """
 
     columns: BoundaryColumns
     tree: ClusterTree
     unknowns: tuple[IntArray, ...]
     skeletons: tuple[tuple[Skeleton, ...], ...]
-    couplings: tuple[tuple[Coupling, ...], ...]
 
     @classmethod
     def of(cls, columns: BoundaryColumns, tree: ClusterTree, may_differ: BoolArray, tolerance: float) -> Compression:
@@ -95,22 +88,27 @@ class Compression:
         rows = [np.arange(2 * places.start, 2 * places.stop) for places in leaves]
         candidates = list(unknowns)
         extent = extents(columns)
-        levels, couplings = [], []
+        levels: list[tuple[Skeleton, ...]] = []
+        guesses = [_FIRST_GUESS] * tree.n_leaves
         for level in range(tree.n_levels):
-            view = _LevelView(columns, Discs.of(columns, tree, level), rows, candidates, extent, tolerance)
+            view = _LevelView(columns, Discs.of(columns, tree, level), rows, candidates, extent, tolerance, guesses)
             n_integrals = columns.n_elements * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
-            pairs = list(zip(skeletons[::2], skeletons[1::2], strict=True))
             levels.append(skeletons)
-            couplings.append(
-                tuple(
-                    Coupling(columns.entries(one.rows, two.columns), columns.entries(two.rows, one.columns))
-                    for one, two in pairs
-                )
-            )
+            pairs = list(zip(skeletons[::2], skeletons[1::2], strict=True))
             rows = [np.concatenate([one.rows, two.rows]) for one, two in pairs]
             candidates = [np.concatenate([one.columns, two.columns]) for one, two in pairs]
-        return cls(columns, tree, unknowns, tuple(levels), tuple(couplings))
+            ranks = [max(each.rows.size, each.columns.size) for each in skeletons]
+            guesses = [int(_GROWTH * max(pair)) for pair in zip(ranks[::2], ranks[1::2], strict=True)]
+        return cls(columns, tree, unknowns, tuple(levels))
+
+    def couplings(self, level: int, pair: int) -> tuple[FloatArray, FloatArray]:
+        """Return what columns of two siblings of a level cause at the rows of the other, at the first one first.
+
+        They are evaluated anew each time: that takes less than what follows, and no memory.
+        """
+        one, two = self.skeletons[level][2 * pair : 2 * pair + 2]
+        return self.columns.entries(one.rows, two.columns), self.columns.entries(two.rows, one.columns)
 
     @property
     def largest_rank(self) -> int:
@@ -119,9 +117,12 @@ class Compression:
 
     @property
     def n_bytes(self) -> int:
-        """Memory of all maps and couplings [bytes]."""
-        maps = sum(each.row_map.nbytes + each.column_map.nbytes for level in self.skeletons for each in level)
-        return maps + sum(each.on_first.nbytes + each.on_second.nbytes for level in self.couplings for each in level)
+        """Memory of all skeletons [bytes]."""
+        return sum(
+            each.row_map.n_bytes + each.column_map.n_bytes + each.rows.nbytes + each.columns.nbytes
+            for level in self.skeletons
+            for each in level
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,13 +135,14 @@ class _LevelView:
     candidates: list[IntArray]
     extent: FloatArray
     tolerance: float
+    guesses: list[int]
 
     def skeleton(self, cluster: int) -> Skeleton:
         """Choose the skeleton of one cluster."""
         near_rows, near_columns = self._near(cluster)
-        row_choice, row_map = self._row_skeleton(cluster, near_columns)
-        column_choice, column_map = self._column_skeleton(cluster, near_rows)
-        return Skeleton(self.rows[cluster][row_choice], row_map, self.candidates[cluster][column_choice], column_map)
+        rows, columns = self.rows[cluster], self.candidates[cluster]
+        row_map, column_map = self._row_map(cluster, near_columns), self._column_map(cluster, near_rows)
+        return Skeleton(rows[row_map.skeleton], row_map, columns[column_map.skeleton], column_map)
 
     def _near(self, cluster: int) -> tuple[IntArray, IntArray]:
         """Return the rows and columns of other clusters that lie in the proxy circle of one, or reach into it."""
@@ -155,56 +157,51 @@ class _LevelView:
 
     def _tolerance_at(self, cluster: int, elements: IntArray) -> float:
         """Return the tolerance of a cluster: errors of large clusters with small elements count more."""
-        share = 4.0 * float(self.columns.lengths[elements].min()) / (PROXY_RATIO * float(self.discs.radius[cluster]))
+        share = (
+            4.0
+            * float(self.columns.lengths[elements].min(initial=np.inf))
+            / (PROXY_RATIO * float(self.discs.radius[cluster]))
+        )
         return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
 
-    def _column_skeleton(self, cluster: int, near_rows: IntArray) -> tuple[IntArray, FloatArray]:
+    def _column_map(self, cluster: int, near_rows: IntArray) -> Interpolation:
         """Interpolate the columns of a cluster, seen from near rows and from the proxy circle."""
         candidates, of = self.candidates[cluster], self.columns
-        if not candidates.size:
-            return np.zeros(0, np.intp), np.zeros((0, 0))
-        points, number = np.unique(near_rows // 2, return_inverse=True)
-        proxies = self.discs.points(cluster, n_proxies(self.tolerance))
+        points, proxies = np.unique(near_rows // 2), self._proxies(cluster)
         places = np.append(np.full(proxies.size, NOWHERE), points)
         fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
-        seen, near = fields[: proxies.size], fields[proxies.size :]
-        weight = self._proxy_weight(cluster)
-        parts = np.stack([near.real, near.imag])[near_rows % 2, number]
-        parts *= np.sqrt(of.lengths[near_rows // 2])[:, None]
-        matrix = np.concatenate([weight * seen.real, weight * seen.imag, parts])
+        spacing = 2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / proxies.size
+        weights = np.repeat(np.sqrt(np.append(np.full(proxies.size, spacing), of.lengths[points])), 2)
         sizes = 1.0 / np.sqrt(of.lengths[candidates // 4])
-        matrix *= sizes
-        norms = np.sqrt(np.square(matrix).sum(axis=0))
+        norms = sizes * np.sqrt(np.square(weights) @ np.square(fields))
         for kind in (0, 1):
             own = (candidates // 2) % 2 == kind
-            largest = norms[own].max(initial=0.0) or 1.0
-            matrix[:, own] /= largest
-            sizes[own] /= largest
-        choice, interpolation = interpolative(matrix, self._tolerance_at(cluster, candidates // 4))
-        # the columns were scaled by their sizes
-        column_map = (interpolation * sizes[choice, None] / sizes).T
-        return choice, np.ascontiguousarray(column_map)
+            sizes[own] /= norms[own].max(initial=0.0) or 1.0
+        guess = self._guess(cluster, np.append(points, candidates // 4))
+        return sketched(fields, weights, sizes, self._tolerance_at(cluster, candidates // 4), guess)
 
-    def _row_skeleton(self, cluster: int, near_columns: IntArray) -> tuple[IntArray, FloatArray]:
+    def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
         """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
         rows, of = self.rows[cluster], self.columns
         points, number = np.unique(rows // 2, return_inverse=True)
-        x, proxies = of.centre[points], self.discs.points(cluster, n_proxies(self.tolerance))
+        x, proxies = of.centre[points], self._proxies(cluster)
         circle = PROXY_RATIO * float(self.discs.radius[cluster])
-        forces = point_forces(x, proxies, of.constants.poisson_ratio, circle).reshape(-1, x.size)
-        near = of.fields(x, points, near_columns).T / np.sqrt(of.lengths[near_columns // 4])[:, None]
-        kind = np.append((near_columns // 2) % 2, np.full(len(forces), 2))
-        fields = np.concatenate([near, forces])
-        parts = np.stack([fields.real, fields.imag])[rows % 2, :, number].T
+        forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
+        fields = np.concatenate([of.fields(x, points, near_columns).T, forces])[:, 2 * number + rows % 2]
+        weights = np.append(1.0 / np.sqrt(of.lengths[near_columns // 4]), np.ones(len(forces)))
         sizes = np.sqrt(of.lengths[rows // 2])
-        parts *= sizes
-        for each in (0, 1, 2):
-            group = parts[kind == each]
-            parts[kind == each] /= np.sqrt(np.square(group).sum(axis=0).max(initial=0.0)) or 1.0
-        choice, interpolation = interpolative(parts, self._tolerance_at(cluster, rows // 2))
-        row_map = (interpolation * sizes[choice, None] / sizes).T
-        return choice, np.ascontiguousarray(row_map)
+        kind = np.append((near_columns // 2) % 2, np.full(len(forces), 2))
+        groups = (kind == np.arange(3)[:, None]) * np.square(weights)
+        largest = np.sqrt(np.max((groups @ np.square(fields)) * np.square(sizes), axis=1, initial=0.0))
+        weights /= np.where(largest > 0.0, largest, 1.0)[kind]
+        guess = self._guess(cluster, np.append(points, near_columns // 4))
+        return sketched(fields, weights, sizes, self._tolerance_at(cluster, rows // 2), guess)
 
-    def _proxy_weight(self, cluster: int) -> float:
-        n_points = n_proxies(self.tolerance)
-        return float(np.sqrt(2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / n_points))
+    def _guess(self, cluster: int, elements: IntArray) -> int | None:
+        """Return a guess of the rank; none where random combinations would lose the smallest elements."""
+        lengths = self.columns.lengths[elements]
+        is_even = lengths.max(initial=0.0) <= _UNEVEN * lengths.min(initial=np.inf)
+        return self.guesses[cluster] if is_even else None
+
+    def _proxies(self, cluster: int) -> ComplexArray:
+        return self.discs.points(cluster, n_proxies(self.tolerance))

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray
+from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.series import FAR, SERIES
 from bemkit.operators.material import Material
@@ -54,68 +54,48 @@ class Constants:
         double = 1.0 / (4.0 * np.pi * (1.0 - nu))
         return cls(0.5 * double / material.shear_modulus, double, nu, log_length)
 
+    @property
+    def numbers(self) -> FloatArray:
+        """The same as an array (4,), for the compiled loops."""
+        return np.array([self.single, self.double, self.poisson_ratio, self.log_length])
 
-def single_layer_fields(
-    constants: Constants, x: ComplexArray, start: ComplexArray, end: ComplexArray, is_own: BoolArray
+
+def element_fields(
+    constants: Constants, x: ComplexArray, places: IntArray, start: ComplexArray, end: ComplexArray
 ) -> ComplexArray:
-    """Return the factors (2, n_points, n_elements) of p and conj(p) in U p, p a constant traction.
+    """Return factors (6, n_points, n_elements) of p, conj(p) in U p and of v, conj(v), s, conj(s) in T (v + s t).
 
     Parameters
     ----------
     constants : Constants
     x : (n_points,) complex array
+    places : (n_points,) array
+        The element, counted in `start`, in whose middle the point is; there the integral T is a principal value. Any
+        other number elsewhere.
     start, end : (n_elements,) complex arrays
-    is_own : (n_points, n_elements) bool array
-        Where the point is the middle of the element.
+
+    Notes
+    -----
+    p is a constant traction, v a constant displacement and s its slope by the coordinate t, from -1 to 1.
     """
     if (fast := compiled.functions()) is not None:
-        numbers = constants.single, constants.poisson_ratio, constants.log_length
-        values: ComplexArray = fast.single_layer_fields(*numbers, x, start, end, is_own)
+        values: ComplexArray = fast.element_fields(constants.numbers, x, places, start, end)
         return values
-    place = _Place(x, start, end, is_own)
-    a, kappa = constants.single * place.half, 3.0 - 4.0 * constants.poisson_ratio
-    j = 0.5 * (place.log_start + place.log_end) - 2.0 * np.log(place.half) - 2.0
-    j += place.zeta.real * place.log_ratio + place.eta * place.angle
-    result = np.empty((2, *place.eta.shape), complex)
-    result[0] = a * (1.0 - kappa * (2.0 * np.log(place.half / constants.log_length) + j))
-    result[1].real = 1.0 - place.eta * place.angle
-    result[1].imag = place.eta * place.log_ratio
+    place = _Place(x, start, end, places[:, None] == np.arange(start.size))
+    result = np.empty((6, *place.eta.shape), complex)
+    log, moment, quotient, of_moment = place.integrals()
+    nu = constants.poisson_ratio
+    a, kappa = constants.single * place.half, 3.0 - 4.0 * nu
+    logs = 0.5 * (place.log_start + place.log_end) + place.zeta.real * log.real - place.eta * log.imag
+    result[0] = a * (1.0 + kappa * (2.0 + 2.0 * np.log(constants.log_length) - logs))
+    result[1].real, result[1].imag = 1.0 + place.eta * log.imag, place.eta * log.real
     result[1] *= a * place.tangent**2
-    return result
-
-
-def double_layer_fields(
-    constants: Constants, x: ComplexArray, start: ComplexArray, end: ComplexArray, is_own: BoolArray
-) -> ComplexArray:
-    """Return the factors (4, n_points, n_elements) of v, conj(v), s and conj(s) in T (v + s t), t from -1 to 1.
-
-    Parameters are those of `single_layer_fields`. On the element itself the integral is a principal value.
-    """
-    if (fast := compiled.functions()) is not None:
-        numbers = constants.double, constants.poisson_ratio
-        values: ComplexArray = fast.double_layer_fields(*numbers, x, start, end, is_own)
-        return values
-    place = _Place(x, start, end, is_own)
-    nu, zeta = constants.poisson_ratio, place.zeta
     rates = -constants.double * (2.0 - 2.0 * nu), -constants.double * (1.0 - 2.0 * nu)
-    quotient = 2.0 / np.where(is_own, -1.0, place.product)  # on the element eta is zero
-    log = place.log_ratio - 1j * place.angle
-    moment = zeta * log - 2.0
-    of_moment = zeta * quotient - log
-    far = np.nonzero(np.square(zeta.real) + np.square(zeta.imag) > FAR**2)
-    inverse = 1.0 / zeta[far]
-    square = inverse * inverse
-    series = np.zeros_like(square)
-    for factor in SERIES:
-        series = (series + factor) * square
-    log[far], moment[far] = 2.0 * inverse * (1.0 + series), 2.0 * series
-    of_moment[far] = 2.0 * inverse * (square / (1.0 - square) - series)
-    result = np.empty((4, *place.eta.shape), complex)
-    result[0].real, result[0].imag = -rates[0] * log.imag, rates[1] * log.real
-    result[2].real, result[2].imag = -rates[0] * moment.imag, rates[1] * moment.real
+    result[2].real, result[2].imag = -rates[0] * log.imag, rates[1] * log.real
+    result[4].real, result[4].imag = -rates[0] * moment.imag, rates[1] * moment.real
     turned = (-constants.double * place.tangent**2) * place.eta
-    result[1] = turned * quotient.conj()
-    result[3] = turned * of_moment.conj()
+    result[3] = turned * quotient.conj()
+    result[5] = turned * of_moment.conj()
     return result
 
 
@@ -124,6 +104,7 @@ class _Place:
 
     def __init__(self, x: ComplexArray, start: ComplexArray, end: ComplexArray, is_own: BoolArray) -> None:
         span = end - start
+        self.is_own = is_own
         self.half = 0.5 * np.abs(span)
         self.tangent = span / (2.0 * self.half)
         to_start, to_end = x[:, None] - start, x[:, None] - end
@@ -142,3 +123,19 @@ class _Place:
         eta = np.where(is_own, 0.0, np.where(is_nearer_start, plus.imag, minus.imag))
         self.zeta.imag = eta
         self.eta = eta
+
+    def integrals(self) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return L, zeta L - 2, G and -L + zeta G, far from the element by the series."""
+        quotient = np.asarray(2.0 / np.where(self.is_own, -1.0, self.product), complex)  # on the element eta is zero
+        log = np.asarray(self.log_ratio - 1j * self.angle, complex)
+        moment = self.zeta * log - 2.0
+        of_moment: ComplexArray = self.zeta * quotient - log
+        far = np.nonzero(np.square(self.zeta.real) + np.square(self.zeta.imag) > FAR**2)
+        inverse = 1.0 / self.zeta[far]
+        square = inverse * inverse
+        series = np.zeros_like(square)
+        for factor in SERIES:
+            series = (series + factor) * square
+        log[far], moment[far] = 2.0 * inverse * (1.0 + series), 2.0 * series
+        of_moment[far] = 2.0 * inverse * (square / (1.0 - square) - series)
+        return log, moment, quotient, of_moment

@@ -12,13 +12,14 @@ tractions). They are passed through all clusters beside the skeletons and solved
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.compression import Compression, Skeleton
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -60,16 +61,28 @@ class Border:
     balances: FloatArray
 
 
-class _LU:
-    """Factors of a dense matrix, its columns of any size."""
+class SingularClusterError(SingularMatrixError):
+    """A cluster of the tree whose own equations do not determine its unknowns, whatever the rest of the body does."""
 
-    def __init__(self, matrix: FloatArray, name: str) -> None:
+    def __init__(self, n_elements: int) -> None:
+        super().__init__(
+            f"a cluster of {n_elements} elements is singular: check that supports and contacts hold the body; if they "
+            "do, take the linear solver 'direct'"
+        )
+
+
+class _LU:
+    """Factors of a dense matrix, its columns of any size; raises `error` if it is singular."""
+
+    def __init__(self, matrix: FloatArray, error: SingularMatrixError, smallest_size: float = 0.0) -> None:
         from scipy.linalg.lapack import dgetrf
 
-        sizes = np.abs(matrix).max(axis=0, initial=0.0)
+        if not matrix.size:
+            return
+        sizes = np.maximum(np.abs(matrix).max(axis=0, initial=0.0), smallest_size)
         self._factor, self._pivots, info = dgetrf(matrix)
         if info or np.any(np.abs(np.diagonal(self._factor)) <= _SMALLEST_PIVOT * sizes):
-            raise SingularMatrixError(f"{name} is singular: check that supports and contacts hold the body")
+            raise error
 
     def solve(self, right: FloatArray) -> FloatArray:
         from scipy.linalg.lapack import dgetrs
@@ -78,33 +91,32 @@ class _LU:
             return np.zeros(right.shape)
         return np.asarray(dgetrs(self._factor, self._pivots, right)[0])
 
-    @property
-    def n_bytes(self) -> int:
-        return int(self._factor.nbytes)
-
 
 @dataclass(eq=False)
 class _Cluster:
-    """A cluster under the present conditions: what it causes is ``alone - scattering @ (what its rows feel)``."""
+    """A cluster under the present conditions, by what its rows feel and by the unknowns of the border, f.
+
+    Parameters
+    ----------
+    scattering, alone : (n_caused, n_felt), (n_caused, k) arrays
+        Its columns cause, and to the balances it adds, ``alone - scattering @ f``, for k different loads.
+    response, at_rest : arrays
+        The unknowns of a leaf, and what the rows of both children of another cluster feel, are
+        ``at_rest - response @ f``.
+    """
 
     scattering: FloatArray
     alone: FloatArray
-
-
-@dataclass(eq=False)
-class _Leaf(_Cluster):
-    """A leaf; its unknowns are ``unknowns - response @ (what its rows feel)``."""
-
     response: FloatArray
-    unknowns: FloatArray
+    at_rest: FloatArray
 
+    def unloaded(self, k: int) -> _Cluster:
+        """Return the same under k times no load."""
+        return replace(self, alone=np.zeros((len(self.alone), k)), at_rest=np.zeros((len(self.at_rest), k)))
 
-@dataclass(eq=False)
-class _Parent(_Cluster):
-    """A cluster of two: its children cause ``caused - merged^-1 scattered``, scattered what they do to a field."""
-
-    merged: _LU
-    caused: FloatArray
+    @property
+    def n_bytes(self) -> int:
+        return self.scattering.nbytes + self.alone.nbytes + self.response.nbytes + self.at_rest.nbytes
 
 
 @dataclass(eq=False)
@@ -150,9 +162,12 @@ class HierarchicalFactor:
         self.laws = laws
         changed = sorted(self._stale)
         n_integrals = len(changed) * tree.bounds[1] ** 2
-        for leaf, factored in zip(
-            changed, for_each_chunk(lambda leaf: self._leaf(leaf, laws), changed, n_integrals=n_integrals), strict=True
-        ):
+
+        def factor_leaf(leaf: int) -> _Cluster:
+            places = tree.places(0, leaf)
+            return self._leaf(leaf, laws.factors[places], laws.given[places].reshape(-1, 1))
+
+        for leaf, factored in zip(changed, for_each_chunk(factor_leaf, changed, n_integrals=n_integrals), strict=True):
             self._levels[0][leaf] = factored
         for level in range(1, tree.n_levels + 1):
             changed = sorted({cluster // 2 for cluster in changed})
@@ -170,130 +185,146 @@ class HierarchicalFactor:
         leaves : (n_leaves,) array
             Ascending.
         """
-        felt = {0: self.errors()}
-        tree = self.compression.tree
-        for level in range(tree.n_levels, 0, -1):
-            wanted = set((leaves >> (level - 1)).tolist())
-            felt = {
-                child: of_child
-                for cluster, of_cluster in felt.items()
-                for child, of_child in self._felt_by_children(level, cluster, of_cluster)
-                if child in wanted
-            }
-        parts = []
-        for number in leaves.tolist():
-            leaf = self._levels[0][number]
-            assert isinstance(leaf, _Leaf)
-            parts.append(leaf.unknowns - leaf.response @ felt[number])
-        return np.concatenate([np.zeros(0), *parts]).reshape(-1, 2)
+        parts = self._descend(self.errors()[:, None], leaves, self._cluster)
+        return np.concatenate([np.zeros((0, 1)), *parts])[:, 0].reshape(-1, 2)
+
+    def responses(self, leaf: int, given: FloatArray, leaves: IntArray) -> FloatArray:
+        """Return the unknowns z (n, 2, k) of the elements of some leaves if nothing is given but in one leaf.
+
+        Parameters
+        ----------
+        leaf : int
+        given : (n_of_leaf, 4, k) array
+            What stands in the place of the given part of the laws there.
+        leaves : (n_leaves,) array
+            Ascending.
+        """
+        assert self.laws is not None  # `update` comes first
+        k, n_levels = given.shape[2], self.compression.tree.n_levels
+        places = self.compression.tree.places(0, leaf)
+        path = [self._leaf(leaf, self.laws.factors[places], given.reshape(-1, k))]
+        for level in range(1, n_levels + 1):
+            below = leaf >> (level - 1)
+            pair = path[-1], self._cluster(level - 1, below ^ 1).unloaded(k)
+            path.append(self._merged(level, leaf >> level, *(pair if below % 2 == 0 else pair[::-1])))
+
+        def cluster_at(level: int, cluster: int) -> _Cluster:
+            return path[level] if cluster == leaf >> level else self._cluster(level, cluster).unloaded(k)
+
+        parts = self._descend(_of_border(path[-1]), leaves, cluster_at)
+        return np.concatenate([np.zeros((0, k)), *parts]).reshape(-1, 2, k)
+
+    def _descend(
+        self, errors: FloatArray, leaves: IntArray, cluster_at: Callable[[int, int], _Cluster]
+    ) -> list[FloatArray]:
+        """Return the unknowns (2 n_elements, k) of some leaves from those of the border (n_border, k)."""
+        felt = {0: errors}
+        for level in range(self.compression.tree.n_levels, 0, -1):
+            wanted, below = set((leaves >> (level - 1)).tolist()), {}
+            for number, of_cluster in felt.items():
+                cluster = cluster_at(level, number)
+                of_children = cluster.at_rest - cluster.response @ of_cluster
+                n_one = self.compression.skeletons[level - 1][2 * number].rows.size
+                for child, half in ((2 * number, of_children[:n_one]), (2 * number + 1, of_children[n_one:])):
+                    if child in wanted:
+                        below[child] = np.concatenate([half, errors])
+            felt = below
+        of_leaves = ((cluster_at(0, number), felt[number]) for number in leaves.tolist())
+        return [leaf.at_rest - leaf.response @ of_leaf for leaf, of_leaf in of_leaves]
 
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
-        root = self._levels[-1][0]
-        assert root is not None  # `update` comes first
-        return _LU(root.scattering, "the balance of the body").solve(root.alone)
+        root = self._cluster(-1, 0)
+        return _of_border(root)[:, 0]
 
     @property
     def n_bytes(self) -> int:
         """Memory of all factors [bytes]."""
-        total = 0
-        for level in self._levels:
-            for each in level:
-                if isinstance(each, _Leaf):
-                    total += each.scattering.nbytes + each.response.nbytes
-                elif isinstance(each, _Parent):
-                    total += each.scattering.nbytes + each.merged.n_bytes
-        return total
+        return sum(each.n_bytes for level in self._levels for each in level if each is not None)
 
-    def _leaf(self, number: int, laws: ElementLaws) -> _Leaf:
+    def _leaf(self, number: int, factors: FloatArray, given: FloatArray) -> _Cluster:
+        """Factor a leaf under laws (n, 4, 2) and k loads (4 n, k)."""
         compression = self.compression
         places, columns = compression.tree.places(0, number), compression.unknowns[number]
         rows = np.arange(2 * places.start, 2 * places.stop)
         n, n_border = places.stop - places.start, self.border.errors.shape[1]
-        factors, given = laws.factors[places], laws.given[places]
-        entries = np.zeros((rows.size, 4 * n))
+        entries = np.zeros((4 * n, rows.size))
         own = columns - 4 * places.start
-        entries[:, own] = compression.columns.entries(rows, columns)
-        by_element = entries.reshape(rows.size, n, 4).transpose(1, 0, 2)
-        matrix = np.ascontiguousarray((by_element @ factors).transpose(1, 0, 2)).reshape(rows.size, 2 * n)
-        factor = _LU(matrix, "the body held by its supports and its contact boundary")
+        entries[own] = compression.columns.entries(rows, columns).T
         skeleton = compression.skeletons[0][number]
-        incoming = np.column_stack([skeleton.row_map, self.border.errors[rows]])
-        outgoing = np.zeros((skeleton.columns.size + n_border, 4 * n))
-        outgoing[: skeleton.columns.size, own] = skeleton.column_map.T
-        outgoing[skeleton.columns.size :] = self.border.balances[:, 4 * places.start : 4 * places.stop]
-        of_unknowns = (outgoing.reshape(-1, n, 4).transpose(1, 0, 2) @ factors).transpose(1, 0, 2)
-        of_unknowns = np.ascontiguousarray(of_unknowns).reshape(-1, 2 * n)
-        response, at_rest = factor.solve(incoming), np.zeros(2 * n)
+        outgoing = np.zeros((4 * n, skeleton.columns.size + n_border))
+        outgoing[own, : skeleton.columns.size] = skeleton.column_map.matrix()
+        outgoing[:, skeleton.columns.size :] = self.border.balances[:, 4 * places.start : 4 * places.stop].T
+        both = np.concatenate([entries, outgoing], axis=1).reshape(n, 4, -1)
+        of_unknowns = (factors.transpose(0, 2, 1) @ both).reshape(2 * n, -1)
+        factor = _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
+        response = factor.solve(np.concatenate([skeleton.row_map.matrix(), self.border.errors[rows]], axis=1))
+        outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros((2 * n, given.shape[1]))
         if given.any():
-            at_rest = -factor.solve(entries @ given.ravel())
-        alone = of_unknowns @ at_rest + outgoing @ given.ravel()
-        return _Leaf(of_unknowns @ response, alone, response, at_rest)
+            at_rest = -factor.solve(entries.T @ given)
+        alone = outgoing_of_unknowns @ at_rest + outgoing.T @ given
+        return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
 
-    def _parent(self, level: int, cluster: int) -> _Parent:
-        one, two = self._children(level, cluster)
-        coupling = self.compression.couplings[level - 1][cluster]
-        n_one, n_two = len(one.scattering), len(two.scattering)
-        matrix = np.eye(n_one + n_two, order="F")
-        rows_one, columns_two = coupling.on_first.shape
-        rows_two, columns_one = coupling.on_second.shape
-        matrix[:n_one, n_one : n_one + columns_two] = one.scattering[:, :rows_one] @ coupling.on_first
-        matrix[n_one:, :columns_one] = two.scattering[:, :rows_two] @ coupling.on_second
-        merged = _LU(matrix, "the body held by its supports and its contact boundary")
-        caused = merged.solve(np.concatenate([one.alone, two.alone]))
-        incoming, outgoing = self._maps(level, cluster)
-        n_rows_one = one.scattering.shape[1]
-        scattered = np.concatenate([one.scattering @ incoming[:n_rows_one], two.scattering @ incoming[n_rows_one:]])
-        return _Parent(outgoing.T @ merged.solve(scattered), outgoing.T @ caused, merged, caused)
-
-    def _felt_by_children(self, level: int, cluster: int, felt: FloatArray) -> list[tuple[int, FloatArray]]:
-        """Return what the rows of both children feel, with their numbers, from what their parent feels."""
-        one, two = self._children(level, cluster)
-        parent = self._levels[level][cluster]
-        assert isinstance(parent, _Parent)
-        n_border, n_one = self.border.errors.shape[1], len(one.scattering)
-        skeletons = self.compression.skeletons[level - 1][2 * cluster : 2 * cluster + 2]
-        of_one, of_two = (np.append(np.zeros(each.rows.size), felt[felt.size - n_border :]) for each in skeletons)
-        if level < self.compression.tree.n_levels:
-            from_outside = self.compression.skeletons[level][cluster].row_map @ felt[: felt.size - n_border]
-            of_one[:-n_border], of_two[:-n_border] = np.split(from_outside, [skeletons[0].rows.size])
-        scattered = np.concatenate([one.scattering @ of_one, two.scattering @ of_two])
-        caused = parent.caused - parent.merged.solve(scattered)
-        coupling = self.compression.couplings[level - 1][cluster]
-        rows_one, columns_two = coupling.on_first.shape
-        rows_two, columns_one = coupling.on_second.shape
-        of_one[:rows_one] += coupling.on_first @ caused[n_one : n_one + columns_two]
-        of_two[:rows_two] += coupling.on_second @ caused[:columns_one]
-        return [(2 * cluster, of_one), (2 * cluster + 1, of_two)]
-
-    def _children(self, level: int, cluster: int) -> tuple[_Cluster, _Cluster]:
-        one, two = self._levels[level - 1][2 * cluster : 2 * cluster + 2]
-        assert one is not None  # children come first
-        assert two is not None
-        return one, two
-
-    def _maps(self, level: int, cluster: int) -> tuple[FloatArray, FloatArray]:
-        """Return what the rows of both children feel from what their parent feels, and the same of the columns."""
-        one, two = self.compression.skeletons[level - 1][2 * cluster : 2 * cluster + 2]
-        is_root = level == self.compression.tree.n_levels
-        parent = None if is_root else self.compression.skeletons[level][cluster]
-        n_border = self.border.errors.shape[1]
-        row_map = None if parent is None else parent.row_map
-        column_map = None if parent is None else parent.column_map
-        return (
-            _with_border(row_map, one.rows.size, two.rows.size, n_border),
-            _with_border(column_map, one.columns.size, two.columns.size, n_border),
+    def _parent(self, level: int, cluster: int) -> _Cluster:
+        return self._merged(
+            level, cluster, self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
         )
 
+    def _merged(self, level: int, cluster: int, one: _Cluster, two: _Cluster) -> _Cluster:
+        """Merge two clusters under the same loads.
 
-def _with_border(skeleton_map: FloatArray | None, n_one: int, n_two: int, n_border: int) -> FloatArray:
-    """Return a map of skeletons to which the border of the parent is added, that of both children."""
-    n = 0 if skeleton_map is None else skeleton_map.shape[1]
-    result = np.zeros((n_one + n_two + 2 * n_border, n + n_border))
-    if skeleton_map is not None:
-        result[:n_one, :n] = skeleton_map[:n_one]
-        result[n_one + n_border : n_one + n_border + n_two, :n] = skeleton_map[n_one:]
-    unit = np.eye(n_border)
-    result[n_one : n_one + n_border, n:] = unit
-    result[n_one + n_two + n_border :, n:] = unit
-    return result
+        What the rows of both feel is, with f what those of the parent feel and e the unknowns of the border,
+        f1 + S12 W2 (f2, e) = R1 f + S12 a2 and the same with 1 and 2 exchanged. The second is put into the first.
+        """
+        on_one, on_two = self.compression.couplings(level - 1, cluster)
+        n_border, n_one, n_two = self.border.errors.shape[1], len(on_one), len(on_two)
+        parent = self._skeleton(level, cluster)
+        n_rows = 0 if parent is None else parent.rows.size
+        # columns: what the rows feel, the border, and the loads
+        from_two = on_one @ np.column_stack([two.scattering, two.alone])[: on_one.shape[1]]
+        from_one = on_two @ np.column_stack([one.scattering, one.alone])[: on_two.shape[1]]
+        n_felt = n_rows + n_border
+        felt = np.zeros((n_one + n_two, n_felt + one.alone.shape[1]), order="F")
+        if parent is not None:
+            felt[:, :n_rows] = parent.row_map.matrix()
+        felt[:n_one, n_rows:], felt[n_one:, n_rows:] = -from_two[:, n_two:], -from_one[:, n_one:]
+        felt[:, n_felt:] *= -1.0
+        twice = from_two[:, :n_two] @ from_one[:, :n_one]
+        felt[:n_one] -= from_two[:, :n_two] @ felt[n_one:]
+        felt[:n_one] = _LU(np.eye(n_one) - twice, self._singular(level, cluster), 1.0).solve(felt[:n_one])
+        felt[n_one:] -= from_one[:, :n_one] @ felt[:n_one]
+        caused = []
+        for each, of_rows in ((one, felt[:n_one]), (two, felt[n_one:])):
+            causes = each.scattering[:, : len(of_rows)] @ of_rows
+            causes[:, n_rows:n_felt] += each.scattering[:, len(of_rows) :]
+            causes[:, n_felt:] -= each.alone
+            caused.append(causes)
+        skeletons = np.concatenate([causes[: len(causes) - n_border] for causes in caused])
+        balances = sum(causes[len(causes) - n_border :] for causes in caused)
+        of_parent = np.zeros((0, felt.shape[1])) if parent is None else parent.column_map.gather(skeletons)
+        scattering = np.concatenate([of_parent, balances])
+        return _Cluster(
+            np.ascontiguousarray(scattering[:, :n_felt]),
+            -scattering[:, n_felt:],
+            np.ascontiguousarray(-felt[:, :n_felt]),
+            felt[:, n_felt:].copy(),
+        )
+
+    def _singular(self, level: int, cluster: int) -> SingularClusterError:
+        places = self.compression.tree.places(level, cluster)
+        return SingularClusterError(places.stop - places.start)
+
+    def _cluster(self, level: int, cluster: int) -> _Cluster:
+        factored = self._levels[level][cluster]
+        assert factored is not None  # `update` comes first, and children before their parents
+        return factored
+
+    def _skeleton(self, level: int, cluster: int) -> Skeleton | None:
+        """Return the skeleton of a cluster, none of the root."""
+        return None if level == self.compression.tree.n_levels else self.compression.skeletons[level][cluster]
+
+
+def _of_border(root: _Cluster) -> FloatArray:
+    """Return the unknowns (n_border, k) of the boundary as a whole."""
+    error = SingularMatrixError("the balance of the body is singular: check that supports and contacts hold the body")
+    return _LU(root.scattering, error).solve(root.alone)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.tree import ClusterTree
 
@@ -38,10 +39,11 @@ class Discs:
         """Return the discs of a level of a tree."""
         begins = tree.bounds[: -1 : 2**level]
         counts = np.diff(np.append(begins, columns.n_elements))
-        ends = np.stack([columns.start, columns.end])
+        ends = np.stack([columns.start, columns.centre, columns.end])
+        own = ends[:, : columns.n_elements]
         low, high = (
             of.reduceat(bound.real, begins) + 1j * of.reduceat(bound.imag, begins)
-            for of, bound in ((np.minimum, _box(np.minimum, ends)), (np.maximum, _box(np.maximum, ends)))
+            for of, bound in ((np.minimum, _box(np.minimum, own)), (np.maximum, _box(np.maximum, own)))
         )
         centre = 0.5 * (low + high)
         farthest = np.abs(ends[:, columns.reach] - np.repeat(centre, counts)).max(axis=(0, 1))
@@ -68,18 +70,35 @@ def n_proxies(tolerance: float) -> int:
 
 def extents(columns: BoundaryColumns) -> FloatArray:
     """Return how far from the middle of each element its unknowns act [m]."""
-    ends = np.stack([columns.start, columns.end])
-    far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre).max(axis=(0, 1))
+    ends = np.stack([columns.start, columns.centre, columns.end])
+    far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre[: columns.n_elements]).max(axis=(0, 1))
     return far
 
 
-def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, log_length: float) -> ComplexArray:
-    """Return displacements (n_sources, 2, n_points) that unit forces along x and y cause, by 8 pi mu (1 - nu)."""
+def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, log_length: float) -> FloatArray:
+    """Return displacements that unit forces along x and y cause, by 8 pi mu (1 - nu).
+
+    Parameters
+    ----------
+    x : (n_points,) complex array
+    sources : (n_sources,) complex array
+    poisson_ratio, log_length : float
+
+    Returns
+    -------
+    (2 n_sources, 2 n_points) array
+        By 2 * source + component of the force and 2 * point + component of the displacement.
+    """
+    kappa = 3.0 - 4.0 * poisson_ratio
+    if (fast := compiled.functions()) is not None:
+        values: FloatArray = fast.point_forces(kappa, log_length, x, sources)
+        return values
     arm = x - sources[:, None]
     squared = np.square(arm.real) + np.square(arm.imag)
-    log = (-0.5 * (3.0 - 4.0 * poisson_ratio)) * np.log(squared / log_length**2)
-    result = np.stack([log + arm.real * arm / squared, 1j * log + arm.imag * arm / squared], axis=1)
-    return result
+    log = (-0.5 * kappa) * np.log(squared / log_length**2)
+    turned = arm / squared
+    result = np.stack([log + arm.real * turned, 1j * log + arm.imag * turned], axis=1)
+    return result.reshape(2 * sources.size, x.size).view(float)
 
 
 def _box(of: np.ufunc, ends: ComplexArray) -> ComplexArray:

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.collocation.reciprocity import HoleSource, Reciprocity
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import solve_conditions
 from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
-LEAF_SIZE = 48
+LEAF_SIZE = 88
 """Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 
 
@@ -47,6 +47,12 @@ class NodeConditions:
             np.where(is_displacement, displacement, traction),
         )
 
+    def beside(self, traction: FloatArray, displacement: FloatArray) -> NodeConditions:
+        """Return what they ask of the rest beside known tractions and displacements, (n, 2) in the frames."""
+        known = np.einsum("nrk,nk->nr", self.on_traction, traction)
+        known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
+        return replace(self, value=self.value - known)
+
 
 class UndeterminedError(SingularMatrixError):
     """Two conditions at an element that are only one."""
@@ -58,7 +64,6 @@ class HierarchicalSystem:
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
     material : Material
     frame : (n_elements, 2, 2) array
         Rows are the directions of the conditions of each element.
@@ -86,22 +91,27 @@ class HierarchicalSystem:
         slopes: bool,
         tolerance: float,
     ) -> None:
-        self._tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
-        self._order, n = self._tree.order, mesh.n_elements
+        n, holes = mesh.n_elements, _holes(mesh)
+        at_holes = [
+            [source.centre.real, source.centre.imag] for source in (HoleSource.of(mesh, each) for each in holes)
+        ]
+        self._tree = ClusterTree.of(np.concatenate([mesh.centres, np.reshape(at_holes, (-1, 2))]), LEAF_SIZE)
+        self._order, self._n_elements = self._tree.order, n
         self._place = np.empty_like(self._order)
-        self._place[self._order] = np.arange(n)
-        self._columns = BoundaryColumns.of(mesh, material, self._order, takes_slopes=slopes)
+        self._place[self._order] = np.arange(self._order.size)
+        self._columns = boundary_columns(mesh, material, self._order, takes_slopes=slopes, holes=holes)
         may_differ = np.repeat(np.stack([may_be_traction, may_be_displacement], axis=1), 2, axis=1)
+        may_differ = np.concatenate([may_differ, np.tile([True, True, False, False], (len(holes), 1))])
         self.compression = Compression.of(self._columns, self._tree, may_differ[self._order], tolerance)
-        border = _border(mesh, material, self._order, slopes)
+        border = _border(mesh, material, self._order, slopes, has_holes=not holes)
         self.factor = HierarchicalFactor(self.compression, border)
-        self._frame = frame
+        self._frame = np.concatenate([frame, np.tile(np.eye(2), (len(holes), 1, 1))])
         self._unit = mesh.diameter / n / material.plane_modulus  # displacement by traction of a single element
 
     @property
     def n_elements(self) -> int:
         """Number of elements."""
-        return self._order.size
+        return self._n_elements
 
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.
@@ -130,19 +140,48 @@ class HierarchicalSystem:
             factors[places], given[places] = turned.factors, turned.given
         self.factor.update(ElementLaws(factors, given))
         leaves = self._tree.leaves_of(places)
-        unknowns = np.empty((self.n_elements, 2))
+        unknowns = np.empty((self._order.size, 2))
         unknowns[self._places_in(leaves)] = self.factor.unknowns(leaves)
         state: FloatArray = (local.factors @ unknowns[places, :, None])[:, :, 0] + local.given
         return state
 
+    def responses(self, known: ElementLaws, moved: IntArray, elements: IntArray) -> FloatArray:
+        """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4, n_moved), under unit displacements of others one by one.
+
+        Parameters
+        ----------
+        known : ElementLaws
+            Of all elements, by `laws`; what is given there counts for nothing.
+        moved : (n_moved,) array
+            Directions 2 * element + direction that `known` holds fast.
+        elements : (n,) array
+        """
+        self.factor.update(known)
+        places = self._place[elements]
+        leaves = self._tree.leaves_of(places)
+        at = np.searchsorted(self._places_in(leaves), places)
+        result = np.empty((elements.size, 4, moved.size))
+        moved_place, unit = self._place[moved // 2], self._frame[moved // 2, moved % 2]
+        for leaf in self._tree.leaves_of(moved_place).tolist():
+            own = self._tree.places(0, leaf)
+            columns = np.flatnonzero((moved_place >= own.start) & (moved_place < own.stop))
+            given = np.zeros((own.stop - own.start, 4, columns.size))
+            given[moved_place[columns] - own.start, 2:, np.arange(columns.size)] = unit[columns]
+            unknowns = self.factor.responses(leaf, given, leaves)[at]
+            states = np.einsum("nqz,nzk->nqk", known.factors[places], unknowns)
+            is_own = np.flatnonzero((places >= own.start) & (places < own.stop))
+            states[is_own] += given[places[is_own] - own.start]
+            result[:, :, columns] = states
+        local: FloatArray = np.concatenate(
+            [np.einsum("nkc,ncm->nkm", self._frame[elements], each) for each in (result[:, :2], result[:, 2:])], axis=1
+        )
+        return local
+
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        laws = self.factor.laws
-        assert laws is not None  # `state` comes first
-        unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
-        state = np.empty((self.n_elements, 4))
-        state[self._order] = (laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given
-        return state[:, :2], state[:, 2:]
+        state = np.empty((self._order.size, 4))
+        state[self._order] = self._states()
+        return state[: self.n_elements, :2], state[: self.n_elements, 2:]
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements, all integrals in closed form.
@@ -154,13 +193,19 @@ class HierarchicalSystem:
             As `everywhere` has returned them.
         """
         places, border = self._place[elements], self.factor.border
-        left = self._columns.applied(places, traction[self._order], displacement[self._order])
-        errors = border.errors.reshape(self.n_elements, 2, -1)[places] @ self.factor.errors()
+        of_all = self._states()
+        is_element = self._order < self.n_elements
+        of_all[is_element] = np.concatenate([traction, displacement], axis=1)[self._order[is_element]]
+        left = self._columns.applied(places, of_all[:, :2], of_all[:, 2:])
+        errors = border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
         return left + errors
 
     def laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
-        return self.turned(np.arange(self.n_elements), self.local_laws(conditions)).take(self._order)
+        n_holes = self._order.size - self.n_elements
+        free = NodeConditions.given(np.ones((n_holes, 2), bool), *np.zeros((2, n_holes, 2)))
+        every = NodeConditions(*map(np.concatenate, zip(vars(conditions).values(), vars(free).values(), strict=True)))
+        return self.turned(np.arange(self._order.size), self.local_laws(every)).take(self._order)
 
     def local_laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions make of tractions and displacements, in the frames of their elements."""
@@ -177,20 +222,40 @@ class HierarchicalSystem:
         turn[:, :2, :2] = turn[:, 2:, 2:] = self._frame[elements].transpose(0, 2, 1)
         return ElementLaws(turn @ laws.factors, (turn @ laws.given[:, :, None])[:, :, 0])
 
+    def _states(self) -> FloatArray:
+        """Return (t_x, t_y, u_x, u_y) at all places under the conditions of the last `state`."""
+        laws = self.factor.laws
+        assert laws is not None  # `state` comes first
+        unknowns = self.factor.unknowns(np.arange(self._tree.n_leaves))
+        states: FloatArray = (laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given
+        return states
+
     def _places_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])
 
 
-def _border(mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool) -> Border:
-    """Return the errors and balances that the equations of collocation have besides, by place."""
+def _holes(mesh: BoundaryMesh) -> list[IntArray]:
+    """Return the elements of each hole; none of a symmetric body, whose sources are several."""
+    if mesh.symmetry is not None:
+        return []
+    return [loop for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True) if area <= 0.0]
+
+
+def _border(mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool, *, has_holes: bool) -> Border:
+    """Return the errors and balances that the equations of collocation have besides, by place.
+
+    Those of holes are among them unless these have places of their own.
+    """
     n = mesh.n_elements
     motions = traction_free_modes(mesh, mesh.centres)
-    reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
+    reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes, has_holes=has_holes)
     compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
     on_traction = np.concatenate([motions.T * (compliance * np.repeat(mesh.lengths, 2)), reciprocity.on_traction])
     on_displacement = np.concatenate([np.zeros(motions.T.shape), reciprocity.on_displacement])
     errors = np.column_stack([motions, reciprocity.fields])
     n_border = errors.shape[1]
     balances = np.concatenate([on_traction.reshape(n_border, n, 2), -on_displacement.reshape(n_border, n, 2)], axis=2)
-    by_place = errors.reshape(n, 2, n_border)[order].reshape(2 * n, n_border)
-    return Border(by_place, balances[:, order].reshape(n_border, 4 * n))
+    n_holes = order.size - n
+    by_place = np.concatenate([errors.reshape(n, 2, n_border), np.zeros((n_holes, 2, n_border))])[order]
+    balances = np.concatenate([balances, np.zeros((n_border, n_holes, 4))], axis=1)[:, order]
+    return Border(by_place.reshape(2 * order.size, n_border), balances.reshape(n_border, 4 * order.size))

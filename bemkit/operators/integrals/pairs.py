@@ -162,6 +162,11 @@ class PairIntegrals:
         self.quotient[..., chosen] = other.quotient
         self.double[..., chosen] = other.double
 
+    def reshaped(self, shape: tuple[int, ...]) -> PairIntegrals:
+        """Return the listed pairs as an array of pairs."""
+        log, double = (values.reshape(*values.shape[:2], *shape) for values in (self.log, self.double))
+        return PairIntegrals(log, self.quotient.reshape(*self.quotient.shape[:2], *shape), double)
+
     def take(self, chosen: IntArray | slice) -> PairIntegrals:
         """Return some of the listed pairs."""
         return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])

@@ -119,15 +119,18 @@ class PairSweep:
 
         All pairs are swept with the base rule, then the listed pairs are put in their places.
         """
+        listed = slice(*np.searchsorted(self._rows, [rows.start, rows.stop]))
+        shape = self.test[rows].size, self.trial.size
+        if listed.stop - listed.start == shape[0] * shape[1]:  # on small meshes
+            return self._listed.take(listed).reshaped(shape)
         straight, curved = self._columns_by_kind
         with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced below
             if not curved.size:
                 result = self._sweep_straight(rows, self.trial)
             else:
-                result = PairIntegrals.zeros(self.degrees, (self.test[rows].size, self.trial.size))
+                result = PairIntegrals.zeros(self.degrees, shape)
                 result.put(slice(None), straight, self._sweep_straight(rows, self.trial[straight]))
                 result.put(slice(None), curved, self._sweep_curved(rows, self.trial[curved]))
-        listed = slice(*np.searchsorted(self._rows, [rows.start, rows.stop]))
         result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(listed))
         return result
 

@@ -230,7 +230,7 @@ class Automatic:
 class Hierarchical:
     """Boundary equations compressed over a tree and factored there: time and memory grow like the number of elements.
 
-    For constant collocation on straight elements without symmetry; elsewhere what `Automatic` takes is taken, and the
+    For constant collocation; elsewhere what `Automatic` takes is taken, and the
     plan says why.
 
     Parameters
@@ -241,14 +241,16 @@ class Hierarchical:
     Raises
     ------
     ValueError
-        If the tolerance is not between 1e-13 and 1e-4.
+        If the tolerance is not between 1e-12 and 1e-4; finer ones than that cannot be met in double precision.
     """
 
-    tolerance: float = 1e-11
+    tolerance: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not 1e-13 <= self.tolerance <= 1e-4:
-            raise InputError(f"tolerance is {self.tolerance}: give a number from 1e-13 to 1e-4 such as 1e-11")
+        if not 1e-12 <= self.tolerance <= 1e-4:
+            raise InputError(
+                f"tolerance is {self.tolerance}: give 1e-12, finer ones cannot be met, to 1e-4, such as 1e-10"
+            )
 
 
 LinearSolverChoice: TypeAlias = Automatic | Hierarchical | LinearSolver

@@ -21,6 +21,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
 from bemkit.operators.integrals.panels import Panels
@@ -287,8 +288,8 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
             f"{name}_dofs has the shape {dofs.shape}{'' if dofs.shape != shape else ' and is not finite'}: "
             f"give {shape} finite numbers, one row for each scalar dof"
         )
-    values: ComplexArray = dofs[:, 0] + 1j * dofs[:, 1]
-    coefficients: ComplexArray = values[space.element_dofs] @ local_coefficients(space)
+    on_elements = values_on_elements(space, dofs) @ np.array([1.0, 1j])
+    coefficients: ComplexArray = on_elements @ local_coefficients(space)
     in_powers = coefficients @ np.linalg.inv(legendre_of_monomials(space.degree))
     result = np.zeros((3, *coefficients.shape), complex)
     result[CENTRE] = coefficients
@@ -297,5 +298,5 @@ def _element_polynomials(mesh: BoundaryMesh, space: BoundarySpace, dofs: FloatAr
             for j in range(k + 1):
                 result[origin, :, j] += comb(k, j) * e ** (k - j) * in_powers[:, k]
     # the very value at the node, so that two elements agree there to the last bit
-    result[[START, END], :, 0] = (values[space.element_dofs] @ space.basis(np.array([-1.0, 1.0]))).T
+    result[[START, END], :, 0] = (on_elements @ space.basis(np.array([-1.0, 1.0]))).T
     return result

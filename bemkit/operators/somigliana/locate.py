@@ -16,6 +16,8 @@ CHUNK_PAIRS = 65536
 N_CHORDS = 8
 """Chords in place of a curved element while the nearest element is looked for."""
 N_REFINEMENTS = 20
+_STANDS = 4.0 * np.finfo(float).eps
+"""Step of a local coordinate that is round-off."""
 
 
 class PointNotInsideError(GeometryError):
@@ -111,6 +113,8 @@ class Locator:
         for _ in range(N_REFINEMENTS):
             y, slope = self._curved.place(element, xi[:, None])
             step = ((x - y[:, 0]) * slope[:, 0].conj()).real / np.abs(slope[:, 0]) ** 2
-            xi = np.clip(xi + step, -1.0, 1.0)
+            before, xi = xi, np.clip(xi + step, -1.0, 1.0)
+            if np.abs(xi - before).max() <= _STANDS:
+                break
         y, _ = self._curved.place(element, xi[:, None])
         return xi, np.abs(x - y[:, 0])

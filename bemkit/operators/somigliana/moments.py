@@ -30,6 +30,8 @@ from bemkit.operators import kernels
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.integrals.splitting import SEPARATION, split_until
 
+Integrands = Callable[[ComplexArray, ComplexArray], list[ComplexArray]]
+"""Of rho and tau."""
 N_POINTS = 14
 """Gauss points of a piece: (3 + sqrt(8))**-28 is far below round-off, which leaves room for the third power of rho."""
 CENTRE, START, END = 0, 1, 2
@@ -177,6 +179,7 @@ class CurvedElements:
         self._curve = np.zeros(0, np.intp) if mesh.element_curve is None else mesh.element_curve
         self._span = np.zeros((0, 2)) if mesh.element_span is None else mesh.element_span
         self._origin = complex(origin[0], origin[1])
+        self._rules: dict[int, tuple[ComplexArray, ComplexArray]] = {}
 
     def place(self, elements: IntArray, xi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return y and dy/dxi, (n, q), for (n,) elements at (n, q) local coordinates."""
@@ -231,9 +234,36 @@ class CurvedElements:
         x: ComplexArray,
         elements: IntArray,
         highest: int,
-        integrands: Callable[[ComplexArray, ComplexArray], list[ComplexArray]],
+        integrands: Integrands,
     ) -> list[ComplexArray]:
         """Integrate the Legendre polynomials times each integrand: a list of (highest + 1, n) arrays."""
+        middle, slope = (values[elements, 0] for values in self._rule(1))
+        is_far = _is_away(x, middle, slope, 2.0)
+        sums = []
+        for far, near in zip(
+            self._integrate_whole(x[is_far], elements[is_far], highest, integrands),
+            self._integrate_pieces(x[~is_far], elements[~is_far], highest, integrands),
+            strict=True,
+        ):
+            total = np.empty((highest + 1, x.size), complex)
+            total[:, is_far], total[:, ~is_far] = far, near
+            sums.append(total)
+        return sums
+
+    def _integrate_whole(
+        self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
+    ) -> list[ComplexArray]:
+        """Integrate over elements that are well away from their points; all points share the places on an element."""
+        reference, weights = gauss_legendre(N_POINTS + highest // 2)
+        polynomials = weights * kernels.legendre_values(highest, reference)
+        y, slope = (values[elements] for values in self._rule(reference.size))
+        speed = np.abs(slope)
+        return [(value * speed @ polynomials.T).T for value in integrands(x[:, None] - y, slope / speed)]
+
+    def _integrate_pieces(
+        self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
+    ) -> list[ComplexArray]:
+        """Integrate over elements that are bisected until each piece is well away from its point."""
         pair, low, high = self._split(x, elements)
         reference, weights = gauss_legendre(N_POINTS + highest // 2)
         xi = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * reference
@@ -247,12 +277,24 @@ class CurvedElements:
                 np.add.at(total[k], pair, np.sum(value * measure * polynomial, axis=1))
         return sums
 
+    def _rule(self, n_points: int) -> tuple[ComplexArray, ComplexArray]:
+        """Return y and dy/dxi (n_elements, n_points) of every element, zero of straight ones, computed once."""
+        if n_points not in self._rules:
+            xi = np.tile(gauss_legendre(n_points)[0], (self._curve.size, 1))
+            self._rules[n_points] = self.place(np.arange(self._curve.size), xi)
+        return self._rules[n_points]
+
     def _split(self, x: ComplexArray, elements: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
         """Bisect elements until each piece [low, high] is well away from its point."""
 
         def is_away(pair: IntArray, low: FloatArray, high: FloatArray) -> BoolArray:
             y, slope = self.place(elements[pair], 0.5 * (low + high)[:, None])
-            away: BoolArray = np.abs(x[pair] - y[:, 0]) >= SEPARATION * 0.5 * (high - low) * np.abs(slope[:, 0])
-            return away
+            return _is_away(x[pair], y[:, 0], slope[:, 0], high - low)
 
         return split_until(is_away, x.size, -1.0, 1.0)
+
+
+def _is_away(x: ComplexArray, middle: ComplexArray, slope: ComplexArray, length: FloatArray | float) -> BoolArray:
+    """Tell which pieces, of lengths in the local coordinate, are so far from their points that one rule serves."""
+    away: BoolArray = np.abs(x - middle) >= SEPARATION * 0.5 * length * np.abs(slope)
+    return away

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, blended
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.material import Material
@@ -196,7 +197,7 @@ class HeavyElasticity:
         points = space.mesh.points(elements, xi)
         of_forces = inside.solution.forces
         at_nodes = of_forces.displacement(dof_points(moved_space))
-        interpolated = np.einsum("pq,epc->eqc", moved_space.basis(xi), at_nodes[moved_space.element_dofs])
+        interpolated = np.einsum("pq,epc->eqc", moved_space.basis(xi), values_on_elements(moved_space, at_nodes))
         rest = of_forces.displacement(points.reshape(-1, 2)).reshape(points.shape) - interpolated
         measure = space.mesh.jacobian(elements, xi) * weights
         work = float(np.sum(force * at_nodes))

@@ -98,6 +98,8 @@ class FreeStiffness:
         n = self.space.n_dofs // 2
         order = np.argsort(self.space.local_nodes)
         first, last = (self.space.element_dofs[:, order[part]].ravel() for part in (slice(None, -1), slice(1, None)))
+        is_step = first != last  # elements of a lower degree than others repeat their last dof
+        first, last = first[is_step], last[is_step]
         points = dof_points(self.space)
         length = np.hypot(*(points[last] - points[first]).T)
         size = self.space.mesh.diameter

@@ -9,10 +9,11 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
-from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points
+from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, dof_points, element_nodes
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
@@ -128,7 +129,7 @@ class GalerkinElasticity:
         dofs = self.traction_space.element_dofs
         everywhere = np.arange(self.mesh.n_elements)
         normals = np.zeros((self.traction_space.n_dofs // 2, 2))
-        normals[dofs] = self.mesh.normals_at(everywhere, self.traction_space.local_nodes)
+        normals[dofs] = self.mesh.normals_at(everywhere, element_nodes(self.traction_space))
         pressures = np.zeros((len(normals), 2, len(self._pressed)))
         for number, elements in enumerate(self._pressed):
             pressures[dofs[elements].ravel(), :, number] = normals[dofs[elements].ravel()]
@@ -228,7 +229,7 @@ class GalerkinElasticity:
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells."""
         tractions = self.tractions(displacement)
-        at_nodes: FloatArray = tractions[self.traction_space.element_dofs]
+        at_nodes = values_on_elements(self.traction_space, tractions)
         if self.material.is_incompressible and not self.mesh.is_exterior:
             carried = mass_product(self.traction_space, self.displacement_space, tractions.reshape(-1, 1))
             missing = force.ravel() - carried[:, 0]

@@ -11,6 +11,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
+from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
@@ -18,13 +19,16 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, 
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
+class InexactEquationsError(SingularMatrixError):
+    """Compressed equations that are not as accurate as their tolerance says."""
+
+
 class HierarchicalCollocation(CollocationElasticity):
-    """The map of `CollocationElasticity` that solves over a tree wherever nothing is to be condensed.
+    """The map of `CollocationElasticity` that solves over a tree.
 
     Parameters
     ----------
     mesh : BoundaryMesh
-        Of straight elements, without symmetry.
     material : Material
     options : Hierarchical
     slopes : bool
@@ -36,37 +40,55 @@ class HierarchicalCollocation(CollocationElasticity):
         self.options = options
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Solve for all unknowns if nothing is retained; otherwise condense the dense equations."""
-        if conditions.is_retained.any():
-            return super().condense(conditions, force)
-        return self._condensed(self.loaded(conditions, force))
+        """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.
+
+        Raises
+        ------
+        InexactEquationsError
+            If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
+            of the solutions.
+        """
+        loaded = self.loaded(conditions, force)
+        condensed = self._condensed(loaded, loaded.stiffness())
+        residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
+        if residual > _LARGEST_RESIDUAL * self.options.tolerance:
+            raise InexactEquationsError(
+                f"compressed to {self.options.tolerance:g} the boundary equations leave a residual of {residual:.1e} "
+                "of the displacements: choose the linear solver 'direct' for this body"
+            )
+        return condensed
 
     def loaded(self, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
         """Return the compressed equations of the body under supports and given nodal forces (n_elements, 2)."""
         return LoadedSystem.of(self, conditions, force)
 
-    def _condensed(self, loaded: LoadedSystem) -> CondensedMap:
-        nothing = np.zeros(0)
-
+    def _condensed(self, loaded: LoadedSystem, stiffness: FloatArray) -> CondensedMap:
         def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            loaded.system.state(loaded.known, _NO_ELEMENTS, _NO_CONDITIONS)
-            return loaded.everywhere()
+            displacement, traction = loaded.recovered(retained_displacement)
+            return displacement, traction * self.mesh.lengths[:, None]
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            displacement, _ = recover(nothing)
+            displacement, _ = recover(np.zeros(loaded.retained.size))
             local = np.einsum("nkc,nc->nk", loaded.conditions.frame, displacement)
-            return np.zeros((directions.size, 0)), local.ravel()[directions]
+            return loaded.responses(directions)[1], local.ravel()[directions]
 
         def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
-            return self._condensed(loaded.under(displacement, force))
+            return self._condensed(loaded.under(displacement, force), stiffness)
 
-        return CondensedMap(np.zeros((0, 0)), nothing, recover, under, follow)
+        _, forces = recover(np.zeros(loaded.retained.size)) if loaded.retained.size else (None, np.zeros((0, 2)))
+        load = np.zeros(0)
+        if loaded.retained.size:
+            load = -np.einsum("nkc,nc->nk", loaded.conditions.frame, forces - loaded.force).ravel()[loaded.retained]
+        return CondensedMap(stiffness, load, recover, under, follow)
 
 
+_LEAST_TURN = 1e-9
+"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
+_LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
+"""Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
+below one on all bodies that were tried."""
 _FAR = 10.0
 """A rigid motion so much larger than what is left of the displacements is left out."""
-_NO_ELEMENTS = np.zeros(0, np.intp)
-_NO_CONDITIONS = NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +110,7 @@ class LoadedSystem:
     force : (n_elements, 2) array [N/m]
         Given forces, in x and y.
     motions : (n_elements, 2, n_motions) array
-        Rigid motions that no support resists.
+        Rigid motions that no support resists and that cause no tractions.
     travel : (n_motions,) array
         One of these that is left out of all displacements. The compressed equations would hold it to their tolerance
         only, which counts where a body moves by far more than it strains.
@@ -119,7 +141,10 @@ class LoadedSystem:
             slopes=map.slopes,
             tolerance=map.options.tolerance,
         )
-        motions = np.ascontiguousarray(free_modes(map.displacement_space, conditions).transpose(1, 2, 0))
+        motions = free_modes(map.displacement_space, conditions)
+        if not map.slopes:  # constant elements resist a rotation
+            motions = motions[np.ptp(motions, axis=1).max(axis=1, initial=0.0) < _LEAST_TURN]
+        motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
         loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest)
@@ -164,10 +189,59 @@ class LoadedSystem:
         left = np.abs(displacement.ravel() - moved).max(initial=0.0)
         return travel if np.abs(moved).max(initial=0.0) > _FAR * left else None
 
+    @property
+    def retained(self) -> IntArray:
+        """(n_retained,) array: the retained directions 2 * element + direction."""
+        return np.flatnonzero(self.conditions.is_retained)
+
+    def responses(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return tractions and displacements (k, n_retained) along directions under unit retained displacements."""
+        elements, number = np.unique(directions // 2, return_inverse=True)
+        states = self.system.responses(self.known, self.retained, elements)
+        along = directions % 2
+        return states[number, along], states[number, 2 + along]
+
+    def stiffness(self) -> FloatArray:
+        """Return the forces (n_retained, n_retained) that unit displacements of retained directions take [N/m]."""
+        retained = self.retained
+        if not retained.size:
+            return np.zeros((0, 0))
+        lengths = self.map.mesh.lengths[retained // 2]
+        stiffness = lengths[:, None] * self.responses(retained)[0]
+        # what no support resists costs no force, in the compressed equations but for their tolerance
+        motions = np.einsum("nkc,ncm->nkm", self.conditions.frame, self.motions).reshape(self.force.size, -1)
+        basis = np.linalg.qr(motions[retained])[0]
+        return np.asarray(stiffness - (stiffness @ basis) @ basis.T)
+
+    def recovered(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and tractions (n_elements, 2) of the whole boundary, in x and y."""
+        elements = np.unique(self.retained // 2)
+        displacement = self.conditions.displacement.copy()
+        displacement.ravel()[self.retained] = retained_displacement
+        held = np.einsum("nkc,nk->nc", self.conditions.frame[elements], displacement[elements])
+        travel = None if elements.size == 0 else self.travel_of(elements, held)
+        loaded = self if travel is None else self.moved(travel)
+        motion = np.einsum("nkc,nc->nk", self.conditions.frame, loaded.motion)
+        traction = np.einsum("nkc,nc->nk", self.conditions.frame, self.force) / self.map.mesh.lengths[:, None]
+        given = NodeConditions.given(
+            ~self.conditions.is_free[elements], traction[elements], (displacement - motion)[elements]
+        )
+        loaded.system.state(loaded.known, elements, given)
+        strained, all_traction = loaded.everywhere()
+        return strained + loaded.motion, all_traction
+
+    def residual(self, retained_displacement: FloatArray) -> float:
+        """Return the residual of the boundary equations at some elements by the largest displacement."""
+        displacement, traction = self.recovered(retained_displacement)
+        n = self.map.mesh.n_elements
+        sampled = np.unique(np.linspace(0, n - 1, _SAMPLED).astype(int))
+        size = float(np.abs(displacement).max())
+        return float(np.abs(self.system.residual(sampled, traction, displacement)).max()) / size if size else 0.0
+
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
-        """Return displacements without `motion` and nodal forces (n_elements, 2), in x and y, of the last response."""
+        """Return displacements without `motion` and tractions (n_elements, 2), in x and y, of the last response."""
         traction, displacement = self.system.everywhere()
-        return displacement, traction * self.map.mesh.lengths[:, None]
+        return displacement, traction
 
 
 def _loaded(conditions: NodalConditions, force: FloatArray) -> tuple[BoolArray, BoolArray]:

@@ -1,6 +1,6 @@
 """Whether the equations of collocation are compressed over a tree, and what that takes, foreseen from sizes alone.
 
-Times and memory are those of a square with 1e3 to 1e4 elements (`tests/benchmarks/large.py` measures what is estimated
+Times and memory are those of a square with 1e4 to 1e5 elements (`tests/benchmarks/large.py` measures what is estimated
 here); they hardly depend on the shape.
 """
 
@@ -26,19 +26,21 @@ _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
 """Of a tree that is worth its name."""
 _MOST_LOOPS = 40
-"""Each loop has an equation of its own that passes through the whole tree."""
-_LARGEST_POISSON_RATIO = 0.49
-"""Beyond, the pressure within a cluster of the tree is hardly told by its displacements."""
+"""Each loop of a symmetric body has an equation of its own that passes through the whole tree."""
+_LEAST_COMPRESSIBILITY = 1e-8
+"""1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
 _SHARE = 0.5
 """Predicted share of the time of the dense equations below which they are compressed."""
 _EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
 """Seconds of a closed-form integral, of a flop on small blocks, and of one in the factorisation of a large matrix."""
 _CONTACT_STEPS, _SHARE_OF_STEP = 8.0, 0.1
 """Contact steps of a load step, and what each takes of the compressed equations, by their factorisation."""
-_EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 30e3, 10e3, 6e6
+_EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 40e3, 6e3, 1.6e6
 """For each element at the tolerance 1e-10."""
-_BYTES, _BYTES_OF_CONTACT = 20e3, 13e3
+_BYTES, _BYTES_OF_CONTACT = 8.5e3, 3.5e3
 """Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
+_BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
+"""Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
 LARGEST_BLOCK = 1000
 """Order that the largest dense block of a tree hardly exceeds."""
@@ -46,24 +48,22 @@ LARGEST_BLOCK = 1000
 
 def why_dense(case: BodyCase) -> str:
     """Say why the equations of a body cannot be compressed; empty if they can."""
-    mesh, conditions = case.mesh, case.conditions
-    if mesh.symmetry is not None:
-        return "the body is symmetric"
-    if case.n_curved:
-        return f"{case.n_curved} elements are curved"
+    mesh = case.mesh
     if mesh.n_elements < _FEWEST_ELEMENTS:
         return f"{mesh.n_elements} elements are few"
-    if len(mesh.loops) > _MOST_LOOPS:
-        return f"the boundary has {len(mesh.loops)} closed curves"
-    if case.material.effective_poisson_ratio > _LARGEST_POISSON_RATIO:
-        return "the material is nearly incompressible"
-    if np.any(conditions.is_retained.any(axis=1) & conditions.is_fixed.any(axis=1)):
-        return "supports hold contact nodes"
+    if mesh.symmetry is not None and len(mesh.loops) > _MOST_LOOPS:
+        return f"the boundary of half the body has {len(mesh.loops)} closed curves"
+    if (
+        mesh.symmetry is not None
+        and len(mesh.loops) > 1
+        and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
+    ):
+        return "the material is incompressible, and the body symmetric and with holes"
     return ""
 
 
 def choose_collocation_solver(
-    requested: LinearSolverChoice, case: BodyCase, hindrance: str, memory: float
+    requested: LinearSolverChoice, case: BodyCase, memory: float, hindrance: str = ""
 ) -> ChosenLinearSolver:
     """Choose between the dense and the compressed equations of collocation.
 
@@ -72,10 +72,10 @@ def choose_collocation_solver(
     requested : LinearSolver, Hierarchical or Automatic
     case : BodyCase
         Its linear solver counts for nothing.
-    hindrance : str
-        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
     memory : float [bytes]
         Of the computer.
+    hindrance : str, optional
+        Why the equations cannot be compressed, whatever `why_dense` says; empty if they can.
 
     Returns
     -------
@@ -92,9 +92,7 @@ def choose_collocation_solver(
         return ChosenLinearSolver(_DIRECT, "asked for", options)
     dense, compressed = collocation_needs(case, takes_slopes=True), _needs(case, options)
     of_dense = _FLOP_OF_LARGE * (dense.flops + _CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
-    share = (_EVALUATION * compressed.evaluations + _FLOP * compressed.flops) / (
-        _EVALUATION * dense.evaluations + of_dense
-    )
+    share = _seconds(compressed) / (_EVALUATION * dense.evaluations + of_dense)
     if share < _SHARE:
         return ChosenLinearSolver(_DIRECT, f"about {share:.2g} of the time of dense equations", options)
     if compressed.memory < memory < dense.memory:
@@ -113,16 +111,34 @@ def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
         PlanItem("slopes between constant elements", takes_slopes, slopes),
         PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
         PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
-        PlanItem("compiled kernels (numba)", compiled.functions() is not None, compiled.why()),
+        _kernels(case, options),
         PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
     )
     return replace(_needs(case, options), items=items)
 
 
-def _needs(case: BodyCase, options: Hierarchical) -> BodyNeeds:
+def _kernels(case: BodyCase, options: Hierarchical) -> PlanItem:
+    """Say which kernels are used, and what the others would cost."""
+    is_compiled = compiled.functions() is not None
+    here, there = (_seconds(_needs(case, options, is_compiled=each)) for each in (is_compiled, not is_compiled))
+    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.2g} s instead of {here:.2g} s"
+    return PlanItem("compiled kernels (numba)", is_compiled, f"{compiled.why()}; {others}")
+
+
+def _seconds(needs: BodyNeeds) -> float:
+    return _EVALUATION * needs.evaluations + _FLOP * needs.flops
+
+
+def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyNeeds:
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     memory = int(digits * (_BYTES * n + _BYTES_OF_CONTACT * n_both))
-    evaluations = digits * n * (_EVALUATIONS_COMPILED if compiled.is_installed() else _EVALUATIONS)
+    if is_compiled is None:
+        is_compiled = compiled.is_installed()  # whether it works takes a while to find out
+    evaluations = digits * n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
     flops = digits * _FLOPS * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
-    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=True)
+    if case.is_condensed:
+        memory += int(_BYTES_OF_STATE * case.n_retained**2)
+        flops += _FLOPS_OF_STATE * case.n_retained**2
+    is_matrix_free = not case.is_condensed
+    return BodyNeeds(memory=memory, kept=memory, evaluations=evaluations, flops=flops, is_matrix_free=is_matrix_free)

@@ -15,13 +15,14 @@ from bemkit.operators.counts import Entries, Factorisation, FactorKind, Operatio
 from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.integrals.sweep import CHUNK_PAIRS, sweep_memory
 from bemkit.operators.linear.choice import krylov_cost
-from bemkit.operators.linear.solvers import ChosenLinearSolver, Krylov
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Krylov
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 _BYTES = 8
+_OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,18 @@ class BodyCase:
         Those of contact are retained.
     loads : tuple of GivenData
         Given forces and displacements of each load step.
-    linear_solver : ChosenLinearSolver
-        Taken for a symmetric map.
+    linear_solver : ChosenLinearSolver, optional
+        Taken for a symmetric map; by default that of collocation.
+    is_condensed : bool
+        Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
     """
 
     mesh: BoundaryMesh
     material: Material
     conditions: NodalConditions
     loads: tuple[GivenData, ...]
-    linear_solver: ChosenLinearSolver
+    linear_solver: ChosenLinearSolver = _OWN_SOLVER
+    is_condensed: bool = False
 
     @property
     def n_displacements(self) -> int:

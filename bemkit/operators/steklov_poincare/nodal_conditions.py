@@ -9,6 +9,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
@@ -138,7 +139,8 @@ def supporting_forces(conditions: NodalConditions, given: FloatArray, total: Flo
     ----------
     conditions : NodalConditions
     given, total : (n_nodes, 2) arrays [N/m]
-        The given forces, and all that act on the boundary of the body.
+        The given forces, and all that act on the boundary of the body but those of contact: a support may hold a node
+        obliquely to what it touches.
     """
     local, own = (np.einsum("nkc,nc->nk", conditions.frame, each) for each in (total, given))
     acting = np.where(conditions.is_fixed, local, own)
@@ -162,9 +164,7 @@ def integrate_traction(space: BoundarySpace, elements: IntArray, field: Traction
     values = field(places.reshape(-1, 2), normals.reshape(-1, 2)).reshape(places.shape)
     measure = space.mesh.jacobian(elements, points) * weights
     local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
-    result = np.zeros((space.n_dofs // 2, 2))
-    np.add.at(result, space.element_dofs[elements], local)
-    return result
+    return summed_at_dofs(space, local, elements)
 
 
 def rotate_columns(matrix: FloatArray, frame: FloatArray) -> FloatArray:

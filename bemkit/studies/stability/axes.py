@@ -12,18 +12,20 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.obstacle import HalfPlane
+from bemkit.contact.obstacle import Gap, HalfPlane
 from bemkit.errors import InputError
+from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.grading import Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Rectangle
-from bemkit.geometry.spaces import ConstantSpace, break_nodes
+from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
 from bemkit.operators.material import Material
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
+from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
@@ -123,6 +125,8 @@ class Axis(Generic[Baseline]):
     make : callable (baseline solution, value) -> Case
     reference : float, optional
         Value whose row the others are compared with; the given scene if left out.
+    beside_half_planes, beside_periodic : str
+        Why the axis says nothing of half-planes, or of periodic ones; empty if it does.
     """
 
     name: str
@@ -131,6 +135,17 @@ class Axis(Generic[Baseline]):
     values: tuple[float, ...]
     make: Callable[[Baseline, float], Case]
     reference: float | None = None
+    beside_half_planes: str = ""
+    beside_periodic: str = ""
+
+    def reason_against(self, scene: Scene | Assembly) -> str:
+        """Return why the axis says nothing of a scene; empty if it does."""
+        if isinstance(scene, Assembly):
+            return ""
+        surface = scene.shape.outline().surface
+        if surface is None:
+            return ""
+        return self.beside_half_planes or (self.beside_periodic if surface.is_periodic else "")
 
     @property
     def is_logarithmic(self) -> bool:
@@ -200,11 +215,15 @@ def _poisson(baseline: Solution, value: float) -> Case:
 
 
 def _friction(baseline: Solution, value: float) -> Case:
+    return Case(value, _with_friction(baseline.scene, value))
+
+
+def _with_friction(scene: Scene, coefficient: float) -> Scene:
     parts = [
         replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
-        for part in baseline.scene.parts
+        for part in scene.parts
     ]
-    return Case(value, replace(baseline.scene, parts=tuple(parts), law=Coulomb(value)))
+    return replace(scene, parts=tuple(parts), law=Coulomb(coefficient))
 
 
 def _gap(baseline: Solution, value: float) -> Case:
@@ -219,8 +238,13 @@ def _turned(baseline: Solution, value: float) -> Case:
 
 
 def _pushed(baseline: Solution, value: float) -> Case:
-    """Press a loose block, twice as wide as high, onto the floor and push it from the left."""
+    """Press a loose block, twice as wide as high, onto the floor and push it from the left.
+
+    A half-plane is pressed by its own force onto its own obstacles, and pushed from far away.
+    """
     scene = baseline.scene
+    if baseline.mesh.surface is not None:
+        return _pushed_half_plane(baseline, value)
     parts = (
         Part("floor", Contact(HalfPlane()), sides=("bottom",)),
         Part("press", Traction(y=-1.0), sides=("top",)),
@@ -237,6 +261,16 @@ def _pushed(baseline: Solution, value: float) -> Case:
         solver=scene.solver,
     )
     return Case(value, block, is_solvable=None if value == 1.0 else value < 1.0)
+
+
+def _pushed_half_plane(baseline: Solution, value: float) -> Case:
+    scene, force = _with_friction(baseline.scene, _BLOCK_FRICTION), baseline.force_normal
+    far = FarField(force_x=_BLOCK_FRICTION * value * force, force_y=force, turn=0.0)
+    parts = tuple(part for part in scene.parts if isinstance(part.condition, Contact))
+    # where gaps are measured along the surface's normal, friction alone acts along it
+    is_flat = all(isinstance(part.condition, Contact) and isinstance(part.condition.obstacle, Gap) for part in parts)
+    scene = replace(scene, parts=parts, far=far)
+    return Case(value, scene, is_solvable=value < 1.0 if is_flat and value != 1.0 else None)
 
 
 def _stretched(baseline: Solution, value: float) -> Case:
@@ -337,6 +371,7 @@ AXES: tuple[Axis[Solution], ...] = (
         _UNITS,
         _NEAR_DEGENERATE,
         _degenerate,
+        beside_half_planes="the flexibility of a half-plane, measured by its strip, is singular at no size",
     ),
     Axis(
         "poisson-ratio", "Poisson's ratio", f"{_FREE}; drift proportional to 1/2 - nu near 1/2", _RATIOS, _poisson, 0.5
@@ -344,8 +379,15 @@ AXES: tuple[Axis[Solution], ...] = (
     Axis("friction", "friction coefficient", _FREE, _COEFFICIENTS, _friction),
     Axis("gap", "gap added / largest displacement", _FREE, _OFFSETS, _gap),
     Axis("load-direction", "turn of all loads [degrees]", _FREE, _ANGLES, _turned),
-    Axis("sliding", "push / friction available, loose block", "solved below 1, refused above", _PUSHES, _pushed, 0.0),
-    Axis("aspect-ratio", "stretch along x", _FREE, _STRETCHES, _stretched),
+    Axis("sliding", "push / friction available, loose body", "solved below 1, refused above", _PUSHES, _pushed, 0.0),
+    Axis(
+        "aspect-ratio",
+        "stretch along x",
+        _FREE,
+        _STRETCHES,
+        _stretched,
+        beside_half_planes="a half-plane has no thickness to compare its length with",
+    ),
     Axis("rho-newton", "rho / (E'/L), semismooth Newton", _INDEPENDENT, _PENALTIES, _newton),
     Axis("rho-augmented", "rho / (E'/L), augmented Lagrangian", _INDEPENDENT, _PENALTIES, _augmented),
     Axis(
@@ -362,6 +404,7 @@ AXES: tuple[Axis[Solution], ...] = (
         _GRADINGS,
         _graded,
         _REFERENCE_GRADING,
+        beside_periodic="the elements of a periodic half-plane are equal",
     ),
 )
 """Every axis, in the order of the report."""

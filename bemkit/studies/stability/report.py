@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -55,6 +55,13 @@ def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord], console: Con
         if record.message:
             console.print(Text(f"  {record.value:.9g}: {record.message}"))
     console.print()
+
+
+def print_left_out(reasons: Mapping[str, str], console: Console | None = None) -> None:
+    """Print which axes say nothing of a scene, and why."""
+    console = stdout_console(console)
+    for name, reason in reasons.items():
+        console.print(Text(f"{name}: left out: {reason}", style="dim"))
 
 
 def print_verdicts(records: Sequence[StabilityRecord], console: Console | None = None) -> None:

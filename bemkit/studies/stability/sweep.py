@@ -9,8 +9,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
-from bemkit.contact.periodic_body import PeriodicBody
 from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
@@ -51,10 +49,16 @@ def sweep(
     Raises
     ------
     StabilityError
-        If the scene itself has no converged solution, or no contact.
+        If the scene itself has no converged solution, or no contact, or several load steps, or an axis says nothing of
+        it.
     """
+    if scene.n_steps > 1:
+        raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
     if isinstance(scene, Scene) and not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
+    for axis in axes:
+        if reason := axis.reason_against(scene):
+            raise StabilityError(f"axis {axis.name!r} says nothing of this scene: {reason}: leave it out")
     baseline = attempt(lambda: run(scene))
     if baseline.solution is None or not baseline.is_converged:
         raise StabilityError(f"the scene itself has no converged solution ({baseline.message}): give one that has")
@@ -88,7 +92,7 @@ def solve_and_judge(axis: str, case: Case, reference: AnySolution | None) -> Sta
             drift = difference(reference, solution, case.similarity)
         if second.solution is not None:
             twin = difference(solution, second.solution, factors, in_mean=case.levels > 0)
-    verdict, objection = _judge(case, reference, first, second, drift, twin)
+    verdict, objection = _judge(case, reference, first, second, check, drift, twin)
     return StabilityRecord(
         axis=axis,
         value=case.value,
@@ -176,15 +180,13 @@ def difference(
 
 
 def condition_number(scene: Scene | Assembly, case: Case) -> float:
-    """Return the condition number of the contact stiffness of one body, nan of several; see `StabilityRecord`."""
+    """Return the condition number of the contact stiffness of one body, NaN where none is formed and of several."""
     if isinstance(scene, Assembly):
         return math.nan
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(prepare(scene, mesh)).body
-        if isinstance(body, PeriodicBody):
-            raise InputError("a periodic half-plane has no stiffness matrix: sweep a block, or a half-plane")
-        if isinstance(body, HierarchicalBody):  # which forms no stiffness
+        if body.condensed is None:
             return math.nan
         stiffness = body.condensed.stiffness
         diagonal = np.abs(np.diagonal(stiffness))
@@ -207,17 +209,17 @@ def _judge(
     reference: AnySolution | None,
     first: Attempt[Any],
     second: Attempt[Any],
+    check: Entries | None,
     drift: float,
     twin: float,
 ) -> tuple[Verdict, str]:
     """Return the verdict and what speaks against the record, if anything does."""
     if first.status != second.status:
         return Verdict.WRONG, f"{first.status}, but its similar twin: {second.status} ({second.message})"
-    if not first.is_converged or first.solution is None or second.solution is None:
+    if not first.is_converged or first.solution is None or second.solution is None or check is None:
         if case.is_solvable or case.keeps_steps:
             return Verdict.WRONG, f"solvable, but: {first.message}"
         return Verdict.NAMED, ""
-    check, other = _checked(first.solution), _checked(second.solution)
     objections = {
         "no solution exists": case.is_solvable is False,
         f"the independent check finds {check.worst:.1e}": not check.is_good,
@@ -227,8 +229,8 @@ def _judge(
         objections["other active sets"] = not np.array_equal(first.solution.contact.status, reference.contact.status)
         objections["other linear solves"] = first.solution.linear_solves != reference.linear_solves
     differs = not twin <= case.precision
-    is_free = math.isinf(case.drift_limit) and other.is_good
-    objections["the similar twin differs"] = differs and not is_free
+    is_another = differs and math.isinf(case.drift_limit) and _checked(second.solution).is_good
+    objections["the similar twin differs"] = differs and not is_another
     found = [text for text, speaks_against in objections.items() if speaks_against]
     if found:
         return Verdict.WRONG, "; ".join(found)

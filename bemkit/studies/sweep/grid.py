@@ -36,6 +36,22 @@ def read_variation(text: str) -> tuple[str, tuple[float, ...]]:
     return key, spaced(_number(pieces[0], text), _number(pieces[1], text), count)
 
 
+def read_variations(texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+    """Return the values of each key of some texts; see `read_variation`.
+
+    Raises
+    ------
+    StudyError
+        If a text has another form, or a key is given twice.
+    """
+    values: dict[str, tuple[float, ...]] = {}
+    for key, own in map(read_variation, texts):
+        if key in values:
+            raise StudyError(f"key {key!r} is given twice: give all its values at once")
+        values[key] = own
+    return values
+
+
 def spaced(first: float, last: float, count: int) -> tuple[float, ...]:
     """Return numbers at equal distances, without the last digit of decimal ones: 0.3 and no 0.30000000000000004."""
     return tuple(_without_noise(value) for value in np.linspace(first, last, count).tolist())

@@ -136,11 +136,11 @@ def test_uniform_stick_is_exact(shear: float) -> None:
 
 
 def test_uniform_slip_is_exact() -> None:
-    for scene in (patch(0.3, slips=True), bk.load_scene("uniform-slip")):
+    for scene, scale in ((patch(0.3, slips=True), 1.0), (bk.load_scene("uniform-slip"), 1e-3)):
         contact = bk.run(scene).contact
         np.testing.assert_allclose(contact.sigma_n, -1.0, atol=1e-9)
         np.testing.assert_allclose(contact.sigma_t, -0.3, atol=1e-9)
-        np.testing.assert_allclose(contact.u_t, 0.1 * contact.x + 0.2, atol=1e-9)
+        np.testing.assert_allclose(contact.u_t / scale, 0.1 * contact.x + 0.2, atol=1e-9)
         assert set(contact.status_words()) == {"slip"}
 
 

@@ -12,8 +12,9 @@ from bemkit.contact.mortar.coupling import MortarCoupling, NotFacingError, coupl
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import dof_points, dof_weights
+from bemkit.geometry.spaces import dof_points
 from tests.contact.mortar.pairs import block, chain, quadrangle, space_of
 from tests.geometry.strategies import angles, rotation
 

@@ -270,3 +270,44 @@ def test_geometries_that_are_no_plane_body(tmp_path) -> None:
             continue
         with pytest.raises(GeometryError, match=message):
             _ = MeshFile(str(tmp_path / "part.geo")).shape
+
+
+OLD_SAVE_ALL = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+1 1 "floor"
+2 2 "body"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+$EndNodes
+$Elements
+6
+1 1 2 0 1 1 2
+2 1 2 0 2 2 3
+3 1 2 0 3 3 4
+4 1 2 0 4 4 1
+5 2 2 0 1 1 2 3
+6 2 2 0 1 1 3 4
+$EndElements
+"""
+
+
+def test_groups_that_a_file_names_without_saying_what_is_in_them_are_told(reader: str, tmp_path: Path) -> None:
+    path = tmp_path / "old.msh"
+    path.write_text(OLD_SAVE_ALL, "utf-8")
+    shape = MeshFile(str(path)).shape
+    assert [side.name for side in shape.loops[0].sides] == ["side-1", "side-2", "side-3", "side-4"]
+    (note,) = (note for note in shape.notes if "groups" in note)
+    assert note == (
+        "its groups floor, body have no cells, as gmsh writes version 2 with SaveAll: save it as version 4, or without "
+        "SaveAll"
+    )
+    path.write_text(OLD_SAVE_ALL.replace("1 1 2 0 1 1 2", "1 1 2 1 1 1 2"), "utf-8")
+    assert not any("groups" in note for note in MeshFile(str(path)).shape.notes)

@@ -36,7 +36,7 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
             rows = np.arange(2 * tree.places(0, one).start, 2 * tree.places(0, one).stop)
             block = columns.entries(rows, compression.unknowns[two])
             few = columns.entries(leaves[one].rows, leaves[two].columns)
-            error = np.abs(leaves[one].row_map @ few @ leaves[two].column_map.T - block).max()
+            error = np.abs(leaves[one].row_map.matrix() @ few @ leaves[two].column_map.matrix().T - block).max()
             # ten times: interpolation multiplies what pivoted QR leaves out, which is measured in mean squares
             assert error <= 10.0 * tolerance * np.abs(block).max() + 1e-14
 

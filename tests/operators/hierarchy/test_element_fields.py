@@ -9,11 +9,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, discretise
+from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
-from bemkit.operators.hierarchy.element_fields import Constants, double_layer_fields, single_layer_fields
+from bemkit.operators.hierarchy.curved_elements import CurvedElements
+from bemkit.operators.hierarchy.element_fields import Constants, element_fields
+from bemkit.operators.hierarchy.folded_columns import boundary_columns
+from bemkit.operators.hierarchy.proxies import point_forces
+from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
 
 MATERIAL = Material(2.0, 0.3)
@@ -44,18 +48,40 @@ def straight(shape: Rectangle | PlateWithHole, n_elements: int) -> BoundaryMesh:
 
 @pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
 @pytest.mark.parametrize("shape", [Rectangle(1.0, 2.0), PlateWithHole(2.0, 1.5, 0.4)], ids=["rectangle", "hole"])
+@pytest.mark.parametrize("is_curved", [False, True], ids=["straight", "curved"])
 @pytest.mark.usefixtures("backend")
-def test_columns_are_those_of_collocation(shape: Rectangle | PlateWithHole, slopes: bool) -> None:
-    mesh = straight(shape, 60)
+def test_columns_are_those_of_collocation(shape: Rectangle | PlateWithHole, is_curved: bool, slopes: bool) -> None:
+    mesh = discretise(shape.outline(), n_elements=60).unit if is_curved else straight(shape, 60)
+    assert mesh.is_straight.all() == (not is_curved or isinstance(shape, Rectangle))
+    assert_columns_are_those_of_collocation(mesh, slopes)
+
+
+@pytest.mark.parametrize("symmetry", [Symmetry(x=1.0), Symmetry(y=0.75), Symmetry(x=1.0, y=0.75)], ids=str)
+@pytest.mark.parametrize("shape", [Rectangle(2.0, 1.5), PlateWithHole(2.0, 1.5, 0.4)], ids=["rectangle", "hole"])
+@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+def test_columns_of_symmetric_bodies_are_those_of_collocation(
+    shape: Rectangle | PlateWithHole, symmetry: Symmetry, slopes: bool
+) -> None:
+    mesh = discretise(shape.outline(), n_elements=80, symmetry=symmetry).unit
+    assert mesh.n_elements * symmetry.n_images == 80
+    assert_columns_are_those_of_collocation(mesh, slopes)
+    columns = boundary_columns(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=slopes)
+    # a point of no element sees the element alone, a point in the middle of one its images, too
+    alone, with_images = (columns.fields(columns.centre[:1], np.array([at]), np.array([40])) for at in (NOWHERE, 0))
+    assert abs(alone - with_images).max() > 1e-3
+
+
+def assert_columns_are_those_of_collocation(mesh: BoundaryMesh, slopes: bool) -> None:
     n, order = mesh.n_elements, np.random.default_rng(0).permutation(mesh.n_elements)
     single, double = collocation_matrices(mesh, MATERIAL, takes_slopes=slopes)
     dofs = (2 * order[:, None] + np.arange(2)).ravel()
-    columns = BoundaryColumns.of(mesh, MATERIAL, order, takes_slopes=slopes)
+    columns = boundary_columns(mesh, MATERIAL, order, takes_slopes=slopes)
     entries = columns.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 2, 2)
     whole = np.ix_(dofs, dofs)
     # closed forms on either side: only round-off of entries of size one differs
     np.testing.assert_allclose(entries[:, :, 0].reshape(2 * n, -1), -single[whole], atol=1e-15)
-    np.testing.assert_allclose(entries[:, :, 1].reshape(2 * n, -1), (double + 0.5 * np.eye(2 * n))[whole], atol=2e-15)
+    # four Gauss points at 30 half lengths of an arc leave 6e-15
+    np.testing.assert_allclose(entries[:, :, 1].reshape(2 * n, -1), (double + 0.5 * np.eye(2 * n))[whole], atol=1e-14)
     traction, displacement = np.random.default_rng(1).normal(size=(2, n, 2))
     both = np.concatenate([traction, displacement], axis=1).ravel()
     product = (entries.reshape(2 * n, -1) @ both).reshape(n, 2)
@@ -68,9 +94,8 @@ def test_fields_anywhere_are_integrals_of_the_kernel() -> None:
     constants = Constants.of(MATERIAL, 0.7)
     x = np.array([0.3 + 0.4j, -2.0 + 0.1j, 5.0 - 3.0j])
     start, end = np.array([0.2 - 0.1j, 1.0 + 0.5j]), np.array([0.6 + 0.2j, 0.5 + 0.1j])
-    is_own = np.zeros((3, 2), bool)
-    single = single_layer_fields(constants, x, start, end, is_own)
-    double = double_layer_fields(constants, x, start, end, is_own)
+    fields = element_fields(constants, x, np.full(3, NOWHERE), start, end)
+    single, double = fields[:2], fields[2:]
     t, weights = np.polynomial.legendre.leggauss(60)
     span = end - start
     y = 0.5 * (start + end) + 0.5 * np.multiply.outer(t, span)
@@ -93,26 +118,41 @@ def test_fields_anywhere_are_integrals_of_the_kernel() -> None:
 
 
 @pytest.mark.usefixtures("backend")
+def test_quadrature_gives_the_closed_forms_where_elements_are_straight() -> None:
+    mesh, order = straight(Rectangle(1.0, 1.0), 48), np.random.default_rng(2).permutation(48)
+    panels, constants = Panels(mesh), Constants.of(MATERIAL, mesh.diameter)
+    elements = CurvedElements.of(panels, MATERIAL, order, mesh.diameter)
+    chosen = np.array([3, 10, 47])
+    start, end, centre = (of[order[chosen]] for of in (panels.start, panels.end, panels.centre))
+    # close to the first of them, some half lengths away, far away, and in the middle of the last one
+    x = np.append(centre[0] + np.array([1e-3, 0.03j, 0.06, 0.07j, 0.3 + 0.2j, 2.0]), centre[2])
+    places = np.append(np.full(6, NOWHERE), 47)
+    expected = element_fields(constants, x, np.where(places == 47, 2, NOWHERE), start, end)
+    np.testing.assert_allclose(elements.fields(x, places, chosen), expected, atol=1e-14)
+
+
+@pytest.mark.usefixtures("backend")
 def test_points_on_the_line_of_an_element_and_close_to_it_keep_their_digits() -> None:
     constants, element = Constants.of(MATERIAL, 1.0), (np.array([0.0j]), np.array([1.0 + 0.0j]))
     close = np.array([0.5 + 1e-14j, 1.0 + 1e-12 + 0j, 3.0 + 0j])
-    double = double_layer_fields(constants, close, *element, np.zeros((3, 1), bool))
+    double = element_fields(constants, close, np.full(3, NOWHERE), *element)[2:]
     # just inside of its left side half of the plane is seen, 2 (1 - nu) pi B = 1 / 2; along its line nothing is
     np.testing.assert_allclose(double[0].real, [[-0.5], [0.0], [0.0]], atol=1e-13)
     assert np.isfinite(double).all()
-    own = double_layer_fields(constants, np.array([0.5 + 0j]), *element, np.ones((1, 1), bool))
+    own = element_fields(constants, np.array([0.5 + 0j]), np.array([0]), *element)[2:]
     np.testing.assert_allclose(own[:2], 0.0, atol=1e-16)
 
 
+@pytest.mark.usefixtures("backend")
 def test_points_of_no_element_see_no_jump() -> None:
     columns = BoundaryColumns.of(straight(Rectangle(1.0, 1.0), 20), MATERIAL, np.arange(20), takes_slopes=False)
     of_displacements = 4 * np.arange(20) + 2
-    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)
+    inside = columns.fields(np.array([0.05 + 0.02j]), np.array([NOWHERE]), of_displacements)[0]
     # a unit translation of the boundary: T 1 is -1 inside of the body, -1/2 + 1/2 on its boundary, 0 outside
     np.testing.assert_allclose(inside.sum(), -1.0, atol=1e-14)
-    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)
+    on = columns.fields(columns.centre[:1], np.array([0]), of_displacements)[0]
     np.testing.assert_allclose(on.sum(), 0.0, atol=1e-14)
-    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)
+    outside = columns.fields(np.array([3.0 + 0.0j]), np.array([NOWHERE]), of_displacements)[0]
     np.testing.assert_allclose(outside.sum(), 0.0, atol=1e-14)
 
 
@@ -134,7 +174,8 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
         return np.array([fault])
 
     module = types.ModuleType("compiled_fields")
-    module.single_layer_fields = broken  # type: ignore[attr-defined]
+    module.element_fields = broken  # type: ignore[attr-defined]
+    module.__file__ = "compiled_fields.py"
     name = "bemkit.operators.hierarchy.compiled_fields"
     monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.setattr(sys.modules["bemkit.operators.hierarchy"], "compiled_fields", module, raising=False)
@@ -142,8 +183,18 @@ def test_a_broken_numba_is_replaced_by_numpy_and_named_in_one_line(
     assert compiled.functions() is None
     assert words in compiled.why()
     assert "\n" not in compiled.why()
-    x, start, is_own = np.array([1j]), np.array([0j]), np.zeros((1, 1), bool)
-    assert np.isfinite(single_layer_fields(Constants(1.0, 1.0, 0.3, 1.0), x, start, start + 1.0, is_own)).all()
+    x, start = np.array([1j]), np.array([0j])
+    assert np.isfinite(element_fields(Constants(1.0, 1.0, 0.3, 1.0), x, np.array([NOWHERE]), start, start + 1.0)).all()
+
+
+@pytest.mark.usefixtures("backend")
+def test_forces_are_those_of_the_kernel() -> None:
+    x, sources = np.array([0.3 + 0.4j, -2.0 + 0.1j]), np.array([1.0 + 1.0j, -0.5j, 3.0 + 0.0j])
+    found = point_forces(x, sources, 0.3, 0.7).reshape(3, 2, 2, 2)  # source, its direction, point, component
+    rho = np.stack([(x - sources[:, None]).real, (x - sources[:, None]).imag], axis=-1)
+    r = np.linalg.norm(rho, axis=-1)[..., None, None]
+    kelvin = -(3.0 - 4.0 * 0.3) * np.log(r / 0.7) * np.eye(2) + rho[..., :, None] * rho[..., None, :] / r**2
+    np.testing.assert_allclose(found, kelvin.transpose(0, 2, 1, 3), rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.usefixtures("backend")
@@ -151,8 +202,7 @@ def test_far_away_fields_keep_their_digits() -> None:
     constants, length = Constants.of(MATERIAL, 1.0), 1e-5
     x = 3.0 * np.exp(1j * np.linspace(0.1, 6.0, 7)) + 0.2
     start, end = np.array([0.2 + 0.1j]), np.array([0.2 + 0.1j + length * np.exp(0.7j)])
-    is_own = np.zeros((7, 1), bool)
-    double = double_layer_fields(constants, x, start, end, is_own)
+    double = element_fields(constants, x, np.full(7, NOWHERE), start, end)[2:]
     # ten Gauss points are exact to round-off at 6e5 half lengths
     t, weights = np.polynomial.legendre.leggauss(10)
     tangent, nu = np.exp(0.7j), MATERIAL.effective_poisson_ratio

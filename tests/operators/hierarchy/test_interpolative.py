@@ -6,26 +6,52 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.operators.hierarchy.interpolative import interpolative
+from bemkit.operators.hierarchy.interpolative import interpolative, sketched
 
 
-@given(m=st.integers(1, 40), n=st.integers(1, 40), rank=st.integers(1, 12), seed=st.integers(0, 99))
+@given(
+    m=st.integers(1, 60),
+    n=st.integers(1, 40),
+    rank=st.integers(1, 12),
+    seed=st.integers(0, 99),
+    guess=st.sampled_from([None, 2, 15]),
+)
 @settings(max_examples=60, deadline=None)
-def test_columns_follow_from_those_of_the_skeleton(m: int, n: int, rank: int, seed: int) -> None:
+def test_columns_follow_from_those_of_the_skeleton(m: int, n: int, rank: int, seed: int, guess: int | None) -> None:
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=(m, rank)) @ np.diag(10.0 ** -np.arange(rank)) @ rng.normal(size=(rank, n))
-    skeleton, interpolation = interpolative(matrix.copy(), 1e-5)
-    assert skeleton.size <= min(m, n, rank)
-    np.testing.assert_allclose(interpolation[:, skeleton], np.eye(skeleton.size), atol=1e-14)
-    error = np.linalg.norm(matrix - matrix[:, skeleton] @ interpolation, axis=0).max()
-    # pivoted QR leaves at most sqrt(n) times the next pivot in any column
-    assert error <= np.sqrt(n) * 1e-5 * np.linalg.norm(matrix, axis=0).max()
+    weights = np.exp(rng.normal(size=m))
+    result = interpolative(matrix.copy(), 1e-5) if guess is None else sketched(matrix, weights, np.ones(n), 1e-5, guess)
+    weighted = matrix if guess is None else matrix * weights[:, None]
+    assert result.skeleton.size <= min(m, n, rank)
+    np.testing.assert_array_equal(np.sort(np.concatenate([result.skeleton, result.rest])), np.arange(n))
+    error = np.linalg.norm(weighted - weighted[:, result.skeleton] @ result.matrix().T, axis=0).max()
+    # pivoted QR leaves at most sqrt(n) times the next pivot in any column; random combinations know it to a factor ten
+    largest = np.linalg.norm(weighted, axis=0).max()
+    assert error <= (1.0 if guess is None else 10.0) * np.sqrt(n) * 1e-5 * largest
+    values = rng.normal(size=n)
+    np.testing.assert_allclose(
+        result.gather(values), result.matrix().T @ values, atol=1e-12 * np.abs(result.weights).max(initial=1.0)
+    )
+
+
+def test_a_rank_above_the_guess_is_found() -> None:
+    rng = np.random.default_rng(0)
+    matrix = rng.normal(size=(400, 60)) @ rng.normal(size=(60, 150))
+    assert sketched(matrix, np.ones(400), np.ones(150), 1e-9, 5).skeleton.size == 60
+
+
+def test_weights_hold_for_the_columns_as_they_are() -> None:
+    rng = np.random.default_rng(0)
+    matrix, sizes = rng.normal(size=(90, 5)) @ rng.normal(size=(5, 40)), 10.0 ** rng.uniform(-3, 3, 40)
+    result = sketched(matrix, np.ones(90), sizes, 1e-10, 8)
+    assert result.skeleton.size == 5
+    np.testing.assert_allclose(matrix[:, result.skeleton] @ result.matrix().T, matrix, atol=1e-8 * np.abs(matrix).max())
 
 
 def test_nothing_has_no_skeleton() -> None:
     for shape in ((0, 3), (3, 0)):
-        skeleton, interpolation = interpolative(np.zeros(shape), 1e-8)
-        assert skeleton.size == 0
-        assert interpolation.shape == (0, shape[1])
-    skeleton, _ = interpolative(np.zeros((4, 3)), 1e-8)
-    assert skeleton.size == 0
+        result = interpolative(np.zeros(shape), 1e-8)
+        assert result.skeleton.size == 0
+        assert result.matrix().shape == (shape[1], 0)
+    assert interpolative(np.zeros((4, 3)), 1e-8).skeleton.size == 0

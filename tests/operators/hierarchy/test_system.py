@@ -7,7 +7,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.factor import ElementLaws, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
@@ -27,6 +27,15 @@ SHAPES = {
 def mesh_of(name: str, n_elements: int) -> BoundaryMesh:
     mesh = discretise(SHAPES[name].outline(), n_elements=n_elements).unit
     return BoundaryMesh(mesh.nodes, mesh.elements, is_exterior=mesh.is_exterior)  # chords of the hole
+
+
+def graded(n_side: int, power: float) -> BoundaryMesh:
+    """A square whose elements shrink towards all corners."""
+    half = 0.5 * np.linspace(0.0, 1.0, n_side // 2 + 1) ** power
+    side = np.concatenate([half, 1.0 - half[-2:0:-1]])
+    square = np.concatenate([side, 1.0 + 1j * side, 1.0 - side + 1j, 1j * (1.0 - side)])
+    places = np.arange(square.size)
+    return BoundaryMesh(np.stack([square.real, square.imag], axis=1), np.stack([places, np.roll(places, -1)], axis=1))
 
 
 def conditions_of(mesh: BoundaryMesh, seed: int) -> tuple[NodalConditions, FloatArray, FloatArray]:
@@ -89,6 +98,22 @@ def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
         assert np.abs(left).max() <= 20.0 * tolerance * np.abs(found).max()
 
 
+def test_small_elements_of_graded_meshes_keep_their_digits() -> None:
+    mesh = graded(150, 6.0)
+    assert mesh.lengths.max() > 1e10 * mesh.lengths.min()
+    conditions, force, kept = conditions_of(mesh, 3)
+    displacement, all_force = (
+        MixedSystem(mesh, MATERIAL, conditions, "body", force, slopes=True).condensed().recover(kept)
+    )
+    system = system_of(mesh, conditions.frame, True, 1e-8)
+    system.state(laws_of(system, mesh, conditions, force, kept), NOWHERE, NOTHING)
+    traction, found = system.everywhere()
+    expected = all_force / mesh.lengths[:, None]
+    # random combinations of all rows would lose three digits of these tractions
+    assert np.abs(found - displacement).max() <= 20e-8 * np.abs(displacement).max()
+    assert np.abs(traction - expected).max() <= 20e-8 * np.abs(expected).max()
+
+
 def test_conditions_that_change_leave_what_a_new_factorisation_finds() -> None:
     mesh = mesh_of("rectangle", 220)
     conditions, force, kept = conditions_of(mesh, 4)
@@ -133,3 +158,17 @@ def test_a_body_that_nothing_holds_and_conditions_that_are_one_are_named() -> No
     # a uniform dilatation has the pressure 2 (mu + lambda) = 2 mu / (1 - 2 nu) on all sides
     pressure = 2.0 * MATERIAL.shear_modulus / (1.0 - 2.0 * MATERIAL.poisson_ratio)
     np.testing.assert_allclose(traction, pressure * mesh.normals, atol=1e-7 * pressure)
+
+
+def test_a_leaf_that_becomes_singular_is_named() -> None:
+    mesh = mesh_of("rectangle", 220)
+    conditions, force, kept = conditions_of(mesh, 3)
+    system = system_of(mesh, conditions.frame, True, 1e-9)
+    laws = laws_of(system, mesh, conditions, force, kept)
+    factors = laws.factors.copy()
+    factors[7] = 0.0  # neither its traction nor its displacement is unknown
+    with pytest.raises(SingularClusterError, match=r"a cluster of \d+ elements is singular.*linear solver 'direct'"):
+        system.factor.update(ElementLaws(factors, laws.given))
+    system.state(laws, NOWHERE, NOTHING)
+    traction, _ = system.everywhere()
+    assert np.isfinite(traction).all()

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
-from bemkit.geometry.spaces import BoundarySpace, break_nodes
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import check_double_layer, check_operator, check_space

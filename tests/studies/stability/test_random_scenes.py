@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import re
 from collections import Counter
@@ -12,8 +13,8 @@ import pytest
 import bemkit as bk
 from bemkit.scene.toml import scene_from_toml
 from bemkit.studies.engine import compute_with_progress
-from bemkit.studies.stability.random_scenes import random_case
-from bemkit.studies.stability.trials import Outcome, Trial, energy_fault, judge, trial_tasks, try_case
+from bemkit.studies.stability.random_scenes import RandomCase, random_case
+from bemkit.studies.stability.trials import EVERY, Outcome, Trial, energy_fault, judge, trial_tasks, try_case
 from tests.scenes import FLOOR, block
 
 REMEDY = re.compile(
@@ -42,6 +43,27 @@ def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
     assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 48  # a generator of scenes without answers tests nothing
 
 
+def half_planes_among(seed: int, count: int) -> list[RandomCase]:
+    """Return the half-planes among single bodies; what was drawn and is no scene is not among them."""
+    cases = []
+    for index in range(count):
+        with contextlib.suppress(bk.BemkitError):
+            cases.append(random_case(seed, index))
+    return [case for case in cases if case.scenes[0].shape.outline().surface is not None]
+
+
+def test_random_half_planes_end_in_the_right_answer_or_a_named_failure() -> None:
+    cases = half_planes_among(4, 150)
+    assert len(cases) >= 10  # 12 per cent
+    assert {type(case.scenes[0].shape).__name__ for case in cases} == {"HalfPlaneBody", "PeriodicHalfPlaneBody"}
+    for case in cases:
+        assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
+    trials = [try_case(case.seed, case.index) for case in cases if case.index % EVERY != EVERY - 1]
+    assert_honest(trials)
+    counts = Counter(trial.outcome for trial in trials)
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= len(trials) // 2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_many_random_scenes(seed: int) -> None:
@@ -67,6 +89,7 @@ def test_every_kind_is_drawn() -> None:
     drawn = Counter(type(value).__name__ for scene in scenes for value in kinds_in(scene))
     wanted = (
         *("Rectangle", "Polygon", "Disk", "Sector", "Ring", "PlateWithHole", "ExteriorOf"),
+        *("HalfPlaneBody", "PeriodicHalfPlaneBody", "FarField"),
         *("HalfPlane", "Circle", "Cavity", "Gap"),
         *("Clamped", "Roller", "PrescribedDisplacement", "Traction", "Pressure", "Contact"),
         *("Frictionless", "Tresca", "Coulomb", "CohesiveCoulomb"),
@@ -89,7 +112,7 @@ def kinds_in(scene: bk.Scene) -> list[object]:
     obstacles = [condition.obstacle for condition in conditions if isinstance(condition, bk.Contact)]
     return [
         *(scene.shape, scene.law, scene.solver, scene.discretisation, scene.linear_solver, scene.symmetry),
-        *(scene.mesh.grading, *conditions, *obstacles),
+        *(scene.mesh.grading, scene.far, *conditions, *obstacles),
     ]
 
 
@@ -109,7 +132,11 @@ def test_friction_that_gives_back_and_work_that_is_missing_are_wrong() -> None:
     loop = bk.load_scene("friction-loop")
     steps = bk.run_history([dataclasses.replace(loop, mesh=bk.MeshOptions(elements=40), steps=loop.steps[:1])])
     assert judge(steps)[0] in (Outcome.SUCCESS, Outcome.WARNED)
-    for changes, message in (({"dissipation": -1e-9}, "friction gave back"), ({"external_work": 1.0}, "is missing")):
+    for changes, message in (
+        ({"dissipation": -1e-9}, "friction gave back"),
+        ({"friction_gain": 1e-3}, "friction acts along slip"),
+        ({"external_work": 1.0}, "is missing"),
+    ):
         loading = steps[-1].loading
         assert loading is not None
         last = loading.steps[-1]
@@ -128,7 +155,7 @@ def test_round_off_of_a_body_that_only_moves_is_no_missing_work() -> None:
     size = step.scene.material.plane_modulus * float(np.abs(step.boundary.displacement).max()) ** 2
     for share, is_fault in ((1e-15, False), (1e-11, True)):  # either side of ROUND_OFF
         work = dataclasses.replace(last.work, external_work=share * size, dissipation=0.0, increment_work=0.0)
-        idle = dataclasses.replace(last, work=work, elastic_energy=0.0)
+        idle = dataclasses.replace(last, work=work, end=dataclasses.replace(step, energy=0.0))
         moved = dataclasses.replace(step, loading=dataclasses.replace(step.loading, steps=(idle,)))
         assert ("missing" in energy_fault(moved)) is is_fault
 

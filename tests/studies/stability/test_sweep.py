@@ -139,6 +139,13 @@ def test_a_scene_without_a_solution_is_no_baseline() -> None:
         list(sweep(scene, AXES))
 
 
+def test_a_load_history_is_no_baseline() -> None:
+    with pytest.raises(
+        StabilityError, match="the scene has 32 load steps, but a sweep solves one: give it a single load"
+    ):
+        list(sweep(bk.load_scene("friction-loop"), AXES))
+
+
 def test_finished_rows_are_handed_on_and_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     axis = dataclasses.replace(shortened("friction"), values=(0.1, 0.2))
     row = StabilityRecord("friction", 0.1, "right", "converged", 1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, "")

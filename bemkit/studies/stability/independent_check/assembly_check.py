@@ -37,6 +37,8 @@ class AssemblyCheck(Entries):
         Resultant of loads, contacts and forces inside on each body, along free translations.
     negative_energy, energy : float
         Elastic energy of a body below zero; of all against half the work of loads and of contacts.
+    elasticity : float
+        Of half-planes, see `IndependentCheck`.
     reciprocity, coarseness, hidden_overlap
         See `Entries`: the worst of the bodies, the moments on them among them; how deep points between nodes are in
         the partner, over the displacement that strains the body.
@@ -56,6 +58,7 @@ class AssemblyCheck(Entries):
     equilibrium: float
     negative_energy: float
     energy: float
+    elasticity: float
 
     @property
     def needs_warning(self) -> str:
@@ -66,13 +69,18 @@ class AssemblyCheck(Entries):
 
 
 def check_assembly(solution: AssemblySolution, before: AssemblySolution | None = None) -> AssemblyCheck:
-    """Check the fields of an assembly; see `AssemblyCheck`. Slip counts from the end of the load step before."""
+    """Check the fields of an assembly; see `AssemblyCheck`.
+
+    Slip counts from the end of the load step before. Without that, friction against slip is not checked at the end of a
+    load history.
+    """
     if not _is_finite(solution):
         unknown = dict.fromkeys((entry.name for entry in fields(AssemblyCheck)), float("nan"))
         return AssemblyCheck(**{**unknown, "numbers": float("inf")})
     joints = Joints.of(solution)
     measured = joints.measured(before)
     bodies = joints.bodies.values()
+    has_history = before is None and solution.loading is not None and len(solution.loading.steps) > 1
     return AssemblyCheck(
         numbers=0.0,
         gaps=gap_mismatch(joints),
@@ -82,12 +90,13 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
         tension=largest(-measured.pressure),
         complementarity=largest(np.minimum(measured.held, np.abs(measured.clearance))),
         cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
-        slip_opposition=slip_opposition(measured),
-        status=status_mismatch(solution.contact.status, measured),
+        slip_opposition=0.0 if has_history else slip_opposition(measured),
+        status=0.0 if has_history else status_mismatch(solution.contact.status, measured),
         reactions=reaction_mismatch(joints),
         equilibrium=largest_imbalance(joints),
         negative_energy=max(body.negative_energy() for body in bodies),
         energy=energy_mismatch(joints),
+        elasticity=max(body.elasticity() for body in bodies),
         reciprocity=max(max(body.reciprocity(), body.moment()) for body in bodies),
         coarseness=max(body.coarseness for body in bodies),
         hidden_overlap=hidden_overlap(joints),

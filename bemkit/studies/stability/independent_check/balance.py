@@ -84,7 +84,7 @@ def imbalance(fields: Fields) -> float:
     motions = motions_at(solution, solution.boundary.points)
     work = np.einsum("nc,ncm->m", contact, motions[nodes.nodes])
     # what the elements make of a rotation: on curved ones it is not one exactly
-    interpolated = np.einsum("encm,nq->eqcm", motions[boundary.nodes], boundary.basis)
+    interpolated = np.einsum("encm,enq->eqcm", motions[boundary.nodes], boundary.basis)
     loads = _loads(solution, boundary)
     inside = inner_work(solution, boundary)
     if solution.particular is not None:  # its tractions act on the elements as loads do, with the other sign

@@ -27,6 +27,7 @@ from bemkit.studies.stability.independent_check.balance import (
     support_mismatch,
 )
 from bemkit.studies.stability.independent_check.boundary import Boundary, Scales, boundary_of, scales_of
+from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.inside import inner_work
 from bemkit.studies.stability.independent_check.nodes import Fields, contact_nodes_of
 
@@ -122,7 +123,11 @@ class MeasuredBody:
 
     def reciprocity(self) -> float:
         """Return how far tractions and displacements are from belonging to one elastic body [-]."""
-        return reciprocity_mismatch(self.fields)
+        return 0.0 if self.result.mesh.surface is not None else reciprocity_mismatch(self.fields)
+
+    def elasticity(self) -> float:
+        """Return how far displacements of a half-plane are from Flamant's solution for its tractions [-]."""
+        return 0.0 if self.result.mesh.surface is None else Surface.of(self.fields).elasticity_mismatch()
 
     def supported_nodes(self) -> IntArray:
         """Return the nodes that supports hold in some direction."""

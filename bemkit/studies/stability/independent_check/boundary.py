@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Pressure, Roller, Traction
 
@@ -52,8 +53,8 @@ class Boundary:
         Rows of ``solution.boundary.displacement`` that each element interpolates.
     node_points, node_normals : (n_elements, n_local, 2) arrays [m], [-]
         At the nodes of each element; normals are one-sided at corners.
-    basis : (n_local, n_places) array
-        Lagrange polynomials at the quadrature points.
+    basis : (n_elements, n_local, n_places) array
+        Lagrange polynomials at the quadrature points; zero for rows that an element of a lower degree repeats.
     traction : (n_elements, n_places, 2) array [Pa]
         Loads as they are given, reactions of supports as means of elements; none of contact, which is known at nodes.
     held : tuple of Held
@@ -76,7 +77,7 @@ class Boundary:
 
     def interpolated(self, nodal: FloatArray) -> FloatArray:
         """Return (n_elements, n_places, 2) values of nodal vectors (n_nodes, 2)."""
-        return np.asarray(np.einsum("enc,nq->eqc", nodal[self.nodes], self.basis))
+        return np.asarray(np.einsum("enc,enq->eqc", nodal[self.nodes], self.basis))
 
 
 def boundary_of(solution: Solution) -> Boundary:
@@ -87,13 +88,19 @@ def boundary_of(solution: Solution) -> Boundary:
     elements = np.arange(mesh.n_elements)
     fitted = np.polynomial.legendre.leggauss(_N_FITTED)[0]
     curve = mesh.points(elements, fitted) - mesh.centre
-    slopes, node_slopes = (_slopes(curve, fitted, where) for where in (places, space.local_nodes))
+    slopes, node_places = _slopes(curve, fitted, places), element_nodes(space)
+    node_slopes, basis = np.empty((*node_places.shape, 2)), np.zeros((*node_places.shape, places.size))
+    kinds, kind = np.unique(node_places, axis=0, return_inverse=True)
+    for number, nodes in enumerate(kinds):
+        own, different = np.flatnonzero(kind.ravel() == number), np.unique(nodes, return_index=True)[1]
+        node_slopes[own] = _slopes(curve[own], fitted, nodes)
+        powers = (np.vander(where, different.size).T for where in (nodes[different], places))
+        basis[np.ix_(own, different)] = np.linalg.solve(*powers)
     # on straight elements half the chord is exact, where differences of points lose digits
     half_chord = 0.5 * (mesh.end - mesh.start)[mesh.is_straight][:, None]
     slopes[mesh.is_straight] = node_slopes[mesh.is_straight] = half_chord
     points, normals = mesh.points(elements, places), _turned_right(slopes)
-    node_points, node_normals = mesh.points(elements, space.local_nodes), _turned_right(node_slopes)
-    lagrange = np.linalg.solve(np.vander(space.local_nodes).T, np.vander(places, space.local_nodes.size).T)
+    node_points, node_normals = mesh.points(elements, node_places), _turned_right(node_slopes)
     return Boundary(
         points=points,
         normals=normals,
@@ -101,7 +108,7 @@ def boundary_of(solution: Solution) -> Boundary:
         nodes=space.element_dofs,
         node_points=node_points,
         node_normals=node_normals,
-        basis=np.asarray(lagrange),
+        basis=basis,
         traction=_tractions(solution, points, normals),
         held=tuple(_held(solution, node_points, node_normals)),
     )

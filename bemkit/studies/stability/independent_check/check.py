@@ -20,6 +20,7 @@ from bemkit.studies.stability.independent_check.balance import (
     support_mismatch,
 )
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
+from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
 from bemkit.studies.stability.independent_check.verdict import Entries
 
@@ -192,11 +193,15 @@ class IndependentCheck(Entries):
     status : float
         What the status of a node claims against its traction, clearance and slip.
     equilibrium : float
-        Work of loads and contact tractions on the rigid motions that no support holds.
+        Work of loads and contact tractions on the rigid motions that no support holds; of a half-plane, of tractions
+        and loads far away on the motions that these drive.
     negative_energy, energy : float
         Elastic energy below zero; against half the work of the external forces.
+    elasticity : float
+        Of half-planes alone: displacements against Flamant's solution for the tractions and the motion far away.
     reciprocity, coarseness, hidden_overlap
         See `Entries`; point forces and centres of dilatation outside of the body and uniform stresses are the states.
+        Nothing of half-planes, whose displacements are exact.
     """
 
     numbers: float
@@ -213,6 +218,7 @@ class IndependentCheck(Entries):
     equilibrium: float
     negative_energy: float
     energy: float
+    elasticity: float
 
 
 def check_solution(solution: Solution, before: Solution | None = None) -> IndependentCheck:
@@ -239,13 +245,30 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
         cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
         slip_opposition=0.0 if has_history else slip_opposition(measured),
         status=0.0 if has_history else status_mismatch(solution.contact.status, measured),
-        equilibrium=imbalance(parts),
-        negative_energy=negative_energy(parts),
-        energy=energy_mismatch(parts),
-        reciprocity=reciprocity_mismatch(parts),
+        **_balances(parts),
         coarseness=float(parts.boundary.lengths.max()) / solution.mesh.diameter,
         hidden_overlap=hidden_overlap(parts),
     )
+
+
+def _balances(parts: Fields) -> dict[str, float]:
+    """Return what tractions and displacements say of each other."""
+    if parts.solution.mesh.surface is None:
+        return {
+            "equilibrium": imbalance(parts),
+            "negative_energy": negative_energy(parts),
+            "energy": energy_mismatch(parts),
+            "elasticity": 0.0,
+            "reciprocity": reciprocity_mismatch(parts),
+        }
+    surface = Surface.of(parts)
+    return {
+        "equilibrium": surface.imbalance(),
+        "negative_energy": surface.negative_energy(),
+        "energy": surface.energy_mismatch(),
+        "elasticity": surface.elasticity_mismatch(),
+        "reciprocity": 0.0,
+    }
 
 
 def _is_finite(solution: Solution) -> bool:

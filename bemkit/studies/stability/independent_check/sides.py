@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.studies.stability.independent_check.bodies import MeasuredBody
 
 _PARALLEL = 1e-9
@@ -51,7 +52,7 @@ class Side:
         """Return displacements (n, 2) at xi (n,) of the elements at the positions `row` (n,)."""
         result = self.body.result
         space = result.scene.discretisation.displacement_space(result.mesh)
-        nodal = result.boundary.displacement[space.element_dofs[self.elements[row]]]
+        nodal = values_on_elements(space, result.boundary.displacement, self.elements[row])
         return np.asarray(np.einsum("ln,nlc->nc", space.basis(xi), nodal))
 
 

@@ -21,9 +21,10 @@ from bemkit.studies.stability.random_assemblies.layouts import random_layout
 from bemkit.studies.stability.random_assemblies.members import Members
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.histories import shear_of, sheared_steps
 
-_STREAM = 2
-"""Keeps the draws of assemblies apart from those of scenes with the same numbers."""
+_STREAM, _HISTORIES = 2, 4
+"""Keep the draws of assemblies and of their load histories apart from those of scenes with the same numbers."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def random_assembly(seed: int, index: int) -> RandomAssembly:
         mesh = MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 80)))
         assembly = replace(assembly, bodies=bodies, mesh=mesh)
     elsewhere = _similarity(draw).apply(assembly)
-    return RandomAssembly(seed, index, _history(draw, elsewhere))
+    sheared = _sheared(Draw(np.random.PCG64([seed, index, _HISTORIES])), elsewhere)
+    return RandomAssembly(seed, index, _history(draw, elsewhere) if sheared is None else (sheared,))
 
 
 def _similarity(draw: Draw) -> AssemblySimilarity:
@@ -93,6 +95,19 @@ def _solver(draw: Draw) -> ContactSolver:
         FixedPoint(max_steps=60): 1.0,
     }
     return draw.one_by_weight(drivers)
+
+
+def _sheared(draw: Draw, assembly: Assembly) -> Assembly | None:
+    """Return the assembly now and then with steps: the loads come, a part is sheared to and fro, the loads go."""
+    places = [
+        (f'bodies."{body.name}".{found[0]}', found[1])
+        for body in assembly.bodies
+        for part in body.parts
+        if (found := shear_of(part))
+    ]
+    if assembly.mesh.accuracy is not None or not places or not draw.chance(0.15):
+        return None
+    return replace(assembly, steps=sheared_steps(draw, *draw.one_of(tuple(places))))
 
 
 def _history(draw: Draw, assembly: Assembly) -> tuple[Assembly, ...]:

@@ -33,11 +33,14 @@ from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_scenes.bodies import Body, random_body
 from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.half_planes import random_half_plane
 from bemkit.studies.stability.random_scenes.histories import pressed_and_sheared
 from bemkit.studies.stability.random_scenes.inside import random_body_forces
 from bemkit.studies.stability.random_scenes.parts import random_actions, random_contact, random_law
 from bemkit.testing.lemke import LemkePivoting
 
+HALF_PLANES = 0.12
+"""Share of half-planes among the scenes."""
 _NEARLY_INCOMPRESSIBLE = (0.45, 0.49, 0.4995, 0.499995, 0.49999995, 0.5, 0.5)
 
 
@@ -64,6 +67,11 @@ def random_case(seed: int, index: int) -> RandomCase:
     BemkitError
         If what was drawn is no scene; the message says why.
     """
+    title = f"random scene {index} of seed {seed}"
+    draw = Draw(np.random.PCG64([seed, index, 3]))  # of its own, so that all other scenes are drawn as without
+    if draw.chance(HALF_PLANES):
+        material, solver = _material(draw, draw.decades(-6.0, 12.0)), _solver(draw)
+        return RandomCase(seed, index, random_half_plane(draw, title, material, solver))
     draw = Draw(np.random.PCG64([seed, index]))
     modulus = draw.decades(-6.0, 12.0)
     if draw.chance(0.1):
@@ -75,7 +83,7 @@ def random_case(seed: int, index: int) -> RandomCase:
         parts = (*contact, *random_actions(draw, body, taken, down, modulus))
         layout = {"shape": body.shape, "parts": parts, "law": law}
     layout |= _inside(index, seed, layout, modulus)
-    scene = _scene(draw, f"random scene {index} of seed {seed}", modulus, layout)
+    scene = _scene(draw, title, modulus, layout)
     return RandomCase(seed, index, pressed_and_sheared(seed, index, scene) or _history(draw, scene))
 
 
@@ -132,7 +140,7 @@ def _mesh(draw: Draw, shape: Any, discretisation: Discretisation) -> MeshOptions
     if discretisation.estimates_error and draw.chance(0.04):
         return MeshOptions(accuracy=draw.decades(-2.0, -0.7), most_elements=int(draw.integers(40, 100)))
     low, high = draw.one_by_weight({(3, 9): 0.08, (10, 40): 0.67, (41, 80): 0.2, (81, 160): 0.05})
-    if isinstance(discretisation, Galerkin) and discretisation.degree > 2:
+    if isinstance(discretisation, Galerkin) and discretisation.takes_layers:
         low, high = 3, 30  # of many nodes each
     gradings: dict[Grading, float] = {
         Uniform(): 6.0,

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.atomic_files import replacing
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.geometry.local_values import values_on_elements
 from bemkit.operators.material import Plane
 from bemkit.operators.somigliana.stress import von_mises
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.interior import interior_fields
 from bemkit.results.solution import Solution
+from bemkit.results.vtk_xml import Block, in_space, write_vtk_xml
 from bemkit.solvers.active_sets import NodeStatus
 
 _POINTS_OF_CURVE = 9
@@ -24,17 +24,6 @@ _CLEAR = 0.5
 """Distance of points inside from the boundary, in lengths of its elements: closer, stresses have peaks of their own."""
 
 
-@dataclass(frozen=True)
-class _Block:
-    """Points (n, 2), cells (m, k) of them, and values at both; what a block lacks is not a number."""
-
-    kind: str
-    points: FloatArray
-    cells: IntArray
-    point_data: Mapping[str, FloatArray]
-    cell_data: Mapping[str, FloatArray]
-
-
 def bodies_of(solution: Solution | AssemblySolution) -> Mapping[str, Solution | BodyResult]:
     """Return the bodies of a solution by the prefix of their arrays."""
     if isinstance(solution, Solution):
@@ -42,8 +31,8 @@ def bodies_of(solution: Solution | AssemblySolution) -> Mapping[str, Solution | 
     return {f"{name}/": body for name, body in solution.bodies.items()}
 
 
-def write_vtu(path: Path, solution: Solution | AssemblySolution, inside: int = 0) -> None:
-    """Write a .vtu file, through meshio.
+def write_vtk(path: Path, solution: Solution | AssemblySolution, inside: int = 0) -> None:
+    """Write a .vtu or .vtp file.
 
     Parameters
     ----------
@@ -59,66 +48,42 @@ def write_vtu(path: Path, solution: Solution | AssemblySolution, inside: int = 0
     ``status`` (`NodeStatus` values) and ``weight`` at contact nodes, where ``slip`` is u_t of nodes that touch. Cell
     data: ``traction`` [Pa] of lines and ``body``, its number. What is not defined somewhere is not a number there.
     """
-    import meshio
-
     bodies = list(bodies_of(solution).values())
     blocks = [_boundary(body, number) for number, body in enumerate(bodies)]
-    if solution.contact.n_contact:
-        blocks.append(_contact_nodes(solution))
+    blocks.append(_contact_nodes(solution))
     if inside:
         blocks += [_inside(body, number, inside) for number, body in enumerate(bodies)]
-    blocks = [block for block in blocks if len(block.cells)]
-    counts = np.array([len(block.points) for block in blocks])
-    offsets = np.cumsum(counts) - counts
-    mesh = meshio.Mesh(
-        _in_space(np.concatenate([block.points for block in blocks])),
-        [(block.kind, block.cells + offset) for block, offset in zip(blocks, offsets.tolist(), strict=True)],
-        point_data={name: np.concatenate(values) for name, values in _joined(blocks, "point_data", counts).items()},
-        cell_data=_joined(blocks, "cell_data", np.array([len(block.cells) for block in blocks])),
-    )
-    with replacing(path.resolve()) as temporary:
-        mesh.write(temporary, file_format="vtu")
+    write_vtk_xml(path, blocks)
 
 
-def _joined(blocks: list[_Block], attribute: str, counts: IntArray) -> dict[str, list[FloatArray]]:
-    """Return the values of all blocks by name, one array for each block."""
-    shapes = {name: values.shape[1:] for block in blocks for name, values in getattr(block, attribute).items()}
-    return {
-        name: [
-            getattr(block, attribute).get(name, np.full((count, *shape), np.nan))
-            for block, count in zip(blocks, counts.tolist(), strict=True)
-        ]
-        for name, shape in shapes.items()
-    }
-
-
-def _boundary(body: Solution | BodyResult, number: int) -> _Block:
+def _boundary(body: Solution | BodyResult, number: int) -> Block:
     """Return the boundary of a body as lines, each element sampled by itself."""
     mesh, space = body.mesh, body.scene.discretisation.displacement_space(body.mesh)
     n_points = 2 if space.degree <= 1 and bool(mesh.is_straight.all()) else _POINTS_OF_CURVE
     xi = np.linspace(-1.0, 1.0, n_points)
     points = mesh.points(np.arange(mesh.n_elements), xi).reshape(-1, 2)
-    values = np.einsum("pq,epc->eqc", space.basis(xi), body.boundary.displacement[space.element_dofs]).reshape(-1, 2)
+    at_nodes = values_on_elements(space, body.boundary.displacement)
+    values = np.einsum("pq,epc->eqc", space.basis(xi), at_nodes).reshape(-1, 2)
     start = (n_points * np.arange(mesh.n_elements)[:, None] + np.arange(n_points - 1)).ravel()
-    traction = _in_space(np.repeat(body.boundary.traction, n_points - 1, axis=0))
+    traction = in_space(np.repeat(body.boundary.traction, n_points - 1, axis=0))
     of_body = np.full(len(start), float(number))
     lines = np.stack([start, start + 1], axis=1)
-    return _Block("line", points, lines, {"displacement": _in_space(values)}, {"traction": traction, "body": of_body})
+    return Block("line", points, lines, {"displacement": in_space(values)}, {"traction": traction, "body": of_body})
 
 
-def _contact_nodes(solution: Solution | AssemblySolution) -> _Block:
+def _contact_nodes(solution: Solution | AssemblySolution) -> Block:
     table = solution.contact
     values = {name: np.asarray(getattr(table, name), float) for name in _CONTACT}
     values["slip"] = np.where(table.status == NodeStatus.SEPARATED, np.nan, table.u_t)
     nodes = np.arange(table.n_contact)[:, None]
-    return _Block("vertex", np.stack([table.x, table.y], axis=1), nodes, values, {})
+    return Block("vertex", np.stack([table.x, table.y], axis=1), nodes, values, {})
 
 
-def _inside(body: Solution | BodyResult, number: int, across: int) -> _Block:
+def _inside(body: Solution | BodyResult, number: int, across: int) -> Block:
     """Return the squares of a grid whose corners lie inside a body, clear of its boundary; none without an end."""
     mesh = body.mesh.whole
     if mesh.is_exterior or mesh.surface is not None:
-        return _Block("quad", np.zeros((0, 2)), np.zeros((0, 4), np.intp), {}, {})
+        return Block("quad", np.zeros((0, 2)), np.zeros((0, 4), np.intp), {}, {})
     low, size = mesh.nodes.min(axis=0), np.ptp(mesh.nodes, axis=0)
     step = float(size.max()) / (across - 1)
     n = np.maximum(np.ceil(size / step).astype(int), 1) + 1
@@ -133,19 +98,19 @@ def _inside(body: Solution | BodyResult, number: int, across: int) -> _Block:
     used, cells = np.unique(squares, return_inverse=True)
     points = grid[used]
     if not len(points):
-        return _Block("quad", points, np.zeros((0, 4), np.intp), {}, {})
+        return Block("quad", points, np.zeros((0, 4), np.intp), {}, {})
     stress, material = fields.stress(points), body.scene.material
     tensor = np.zeros((len(points), 3, 3))
     tensor[:, :2, :2] = stress
     if material.plane is Plane.STRAIN:
         tensor[:, 2, 2] = material.poisson_ratio * (stress[:, 0, 0] + stress[:, 1, 1])
     values = {
-        "displacement": _in_space(fields.displacement(points)),
+        "displacement": in_space(fields.displacement(points)),
         "stress": tensor.reshape(-1, 9),
         "von_mises": von_mises(stress, material.poisson_ratio, material.plane),
     }
     of_body = np.full(len(squares), float(number))
-    return _Block("quad", points, cells.reshape(-1, 4).astype(np.intp), values, {"body": of_body})
+    return Block("quad", points, cells.reshape(-1, 4).astype(np.intp), values, {"body": of_body})
 
 
 def _is_clear(centres: FloatArray, lengths: FloatArray, points: FloatArray) -> BoolArray:
@@ -157,7 +122,3 @@ def _is_clear(centres: FloatArray, lengths: FloatArray, points: FloatArray) -> B
     is_clear = np.ones(len(points), bool)
     is_clear[[k for own in near for k in own]] = False
     return is_clear
-
-
-def _in_space(vectors: FloatArray) -> FloatArray:
-    return np.column_stack([vectors, np.zeros(len(vectors))])
