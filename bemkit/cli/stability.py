@@ -86,14 +86,16 @@ def _sweep(
 ) -> int:
     """Compute what is missing, keep every record at once, and print each axis when it is complete."""
     with StudyProgress(quiet) as progress:
-        from bemkit.scene.toml import load_single_body, scene_to_toml, with_overrides
-        from bemkit.studies.stability.axes import find_axes
+        from bemkit.scene.assembly import Assembly
+        from bemkit.scene.toml import load_scene, scene_to_toml, with_overrides
+        from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
+        from bemkit.studies.stability.axes import AXES, find_axes
         from bemkit.studies.stability.records import CSV_START, FILE, MARKDOWN_START, to_csv, to_markdown
         from bemkit.studies.stability.report import draw_axes, figure_name, print_axis, print_left_out, print_verdicts
         from bemkit.studies.stability.sweep import sweep
 
-        chosen = with_overrides(load_single_body(scene or "paper-1"), elements=elements, discretisation=discretisation)
-        every = find_axes(axis)
+        chosen = with_overrides(load_scene(scene or "paper-1"), elements=elements, discretisation=discretisation)
+        every = find_axes(axis, ASSEMBLY_AXES if isinstance(chosen, Assembly) else AXES)
         # an axis that is asked for by its name is refused by the sweep
         axes = every if axis else tuple(each for each in every if not each.reason_against(chosen))
         texts = (

@@ -175,6 +175,16 @@ class LinearBody(Protocol):
         """Name what that may touch, in words that go after "along"."""
         return "the obstacle"
 
+    def shares(self, forces: FloatArray) -> FloatArray:
+        """Return by which share (n_contact,) of the largest of some forces each node is measured; all by default.
+
+        Parameters
+        ----------
+        forces : (n_contact,) array [N/m]
+            Sizes, some of them positive.
+        """
+        return np.ones(self.n_contact)
+
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far all forces on the body, those inside it included, are from equilibrium.
 

@@ -73,6 +73,8 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     -----
     Tractions are measured by the largest traction in the state or in the sticking state (all nodes held), whichever is
     larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
+    Of several bodies each contact is measured so by the one of its partners that carries less, down to a thousandth of
+    what the others carry: a light block is not judged by the heaviest; see `LinearBody.shares`.
     A node to which that would give more than the largest nodal force is measured by this force, so that tractions of
     tiny elements in a corner excuse nothing. Lengths are measured by the displacement which the largest nodal force
     causes at its node, ``force / E'``, however few nodes or small elements carry it: a far obstacle or a long rigid
@@ -80,8 +82,9 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
     displacement.
     """
-    largest, force, length = _scales(problem, state)
-    stress = np.minimum(largest, force / problem.body.weights)
+    scales = _scales(problem, state)
+    stress = np.minimum(scales.stress, scales.force / problem.body.weights) * scales.share
+    length = np.maximum(scales.length * scales.share, scales.least_length)
     clearance = problem.gap - state.u_n
     slip = state.u_t - problem.slip_origin
     # friction given across the gap is no sign of contact
@@ -113,6 +116,8 @@ class _Scales(NamedTuple):
     stress: float
     force: float
     length: float
+    least_length: float
+    share: FloatArray
 
 
 def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
@@ -130,13 +135,15 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
             max(float((by * present).max()), min(float((by * sticking).max()), 1e3 * float((by * at_hand).max())))
             for by in (1.0, weights)
         )
-        return _Scales(stress, force, max(force / modulus, 1e-6 * furthest))
+        least = 1e-6 * furthest
+        share = problem.body.shares(weights * np.maximum(present, np.minimum(sticking, 1e3 * at_hand)))
+        return _Scales(stress, force, max(force / modulus, least), least, share)
     # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
     # by what would hold it or, if even that is nothing, by the gaps.
     gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
     force = float((weights * sticking).max())
     length = furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
-    return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length)
+    return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length, length, np.ones(len(weights)))
 
 
 def _largest(values: FloatArray) -> float:

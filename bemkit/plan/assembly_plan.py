@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bemkit.contact.joined.joined_bodies import MOST_DENSE
+from bemkit.contact.joined.sparse_solver import sparse_solver_name
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, prepare_assembly_steps
 from bemkit.operators.counts import OperationCounts
@@ -125,7 +126,9 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
     names = ", ".join(dict.fromkeys(type(rows.law).__name__ for rows in prepared.rows if not rows.law.is_frictionless))
     yield PlanItem("friction", bool(names), f"law {names}" if names else "the law allows no tangential traction")
-    form = "one dense matrix of relative displacements" if is_dense else "a sparse system, factored in every step"
+    form = "one dense matrix of relative displacements"
+    if not is_dense:
+        form = f"a sparse system, factored in every step by {sparse_solver_name()}"
     yield PlanItem("contact system", True, f"{sizes.n_contact} nodes, {sizes.n_contact_unknowns} unknowns: {form}")
     modes = "supports hold all bodies"
     if sizes.n_free_motions:

@@ -193,11 +193,12 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
     clearance = np.where(np.isfinite(contact.clearance), contact.clearance, 0.0)
     is_apart = (contact.sigma_n >= 0.0) & (clearance > _CLOSED * np.abs(clearance).max(initial=0.0))
     is_closed = (words != "separated") & ~is_apart
+    is_word = {word: words == word for word in ("stick", "slip")}
     for part in contact.parts:
         own = contact.rows(part)
         kinds = {"contact": own & is_closed}
         if part not in smooth:
-            kinds |= {word: own & (words == word) for word in ("stick", "slip")}
+            kinds |= {word: own & chosen for word, chosen in is_word.items()}
         reported = np.zeros(own.size, bool)
         for kind, chosen in kinds.items():
             narrow = [zone for zone in _zones(contact, chosen) if zone.size < FEWEST_NODES]

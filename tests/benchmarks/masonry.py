@@ -2,9 +2,9 @@
 
 ``[courses] [blocks a course]`` alone: the contact system of a wall, one sticking response, the programme that finds
 unsolvable loads, and a whole solve under weight and a push on the uppermost course of a tenth of what friction holds.
-Times are those of the processor and, in brackets, of the clock. ``steps [courses] [blocks a course]``: such a wall as
-an assembly, weight alone and then the push, with the seconds of each stage. ``packing [discs] [width] [seed]``: a
-random packing of discs in a box.
+``steps [courses] [blocks a course]``: such a wall as an assembly, weight alone and then the push.
+``packing [discs] [width] [seed]``: a random packing of discs in a box. Times are those of the processor and, in
+brackets, of the clock; those of stages are of the clock.
 """
 
 import resource
@@ -59,7 +59,8 @@ def assembled(assembly: bk.Assembly) -> None:
 
     def shown(record: StepRecord) -> None:
         words = f"{record.n_separated} open, {record.n_slip} slip, certificate {record.certificate.worst:.0e}"
-        print(f"{time.perf_counter() - begin:8.1f} s  step {record.step}: {words} {record.message}", flush=True)
+        now = f"{time.process_time():8.1f} s  ({time.perf_counter() - begin:7.1f} s)"
+        print(f"{now}  step {record.step}: {words} {record.message}", flush=True)
 
     for solution in bk.run_assembly_history([assembly], callback=shown):
         stages = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in solution.timings.items())

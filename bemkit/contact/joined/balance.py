@@ -8,7 +8,7 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance
 
-_LIGHTEST = 1e-3
+LIGHTEST = 1e-3
 """Forces on a member below this share of the largest on any are measured by this share: one linear system finds them
 all, and leaves its round-off everywhere."""
 
@@ -48,8 +48,8 @@ def imbalance_of(joined: CoupledMembers, state: ContactState) -> Imbalance:
         largest, total = np.maximum.reduceat(terms, first), np.add.reduceat(terms, first)
     if not (largest.max() > 0.0 and np.isfinite(largest).all()):
         return Imbalance(0.0, 0.0) if not missed.any() else Imbalance(float("inf"), 0.0)
-    largest = np.maximum(largest, _LIGHTEST * largest.max())
-    total = np.maximum(total, _LIGHTEST * total.max())
+    largest = np.maximum(largest, LIGHTEST * largest.max())
+    total = np.maximum(total, LIGHTEST * total.max())
 
     at_contact = joined.least_of_partners(largest)
     stray = np.where(joined.tangent_is_eliminated, joined.weights * np.abs(state.sigma_t), 0.0)

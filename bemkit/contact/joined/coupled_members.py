@@ -17,6 +17,8 @@ from bemkit.contact.rigid_motions import null_space
 from bemkit.errors import InputError
 from bemkit.operators.linear.blocks import diagonal_blocks
 
+_ROUNDS = 2
+"""Times that rigid motions are fitted: the normal equations leave two stiff bodies apart by the digits they lose."""
 _FEW_MOTIONS = 60
 """Rigid motions up to which their shares in what is kept are weighed; of more, those that nothing holds are found."""
 
@@ -83,7 +85,7 @@ class CoupledMembers:
         """
         displacement = self.deformation(self.load + self.contact_forces(state))
         missed = state.displacement.ravel() - self.offset - self.relative @ displacement
-        for _ in range(2):  # the second time what normal equations have left of the first
+        for _ in range(_ROUNDS):
             displacement = displacement + self.motions @ self._motion_fit(missed)
             missed = state.displacement.ravel() - self.offset - self.relative @ displacement
         return displacement, missed
@@ -172,10 +174,14 @@ class CoupledMembers:
         return self._named(self._is_moved(coefficients))
 
     def partners_of(self, coefficients: FloatArray) -> str:
-        """Name the members at rest that these may touch; without any there are only obstacles."""
+        """Name the members at rest that these may touch; without any there are obstacles, or they meet each other."""
         is_moved = self._is_moved(coefficients)
-        met = np.asarray(self.owners.T @ (self.owners @ is_moved.astype(float) > 0.0).astype(float)) > 0.0
-        return self._named(met & ~is_moved) if np.any(met & ~is_moved) else "the obstacle"
+        meets = self.owners @ is_moved.astype(float) > 0.0
+        met = np.asarray(self.owners.T @ meets.astype(float)) > 0.0
+        if np.any(met & ~is_moved):
+            return self._named(met & ~is_moved)
+        is_alone = np.diff(self.owners.indptr) == 1
+        return "the obstacle" if np.any(meets & is_alone) else "each other"
 
     def _is_moved(self, coefficients: FloatArray) -> BoolArray:
         """Return (n_members,) bool: the members that a combination (n_motions,) of the rigid motions moves."""

@@ -12,10 +12,10 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents, with_given_tractions
 from bemkit.contact.conditions import LinearConditions
-from bemkit.contact.joined.balance import imbalance_of
+from bemkit.contact.joined.balance import LIGHTEST, imbalance_of
+from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
-from bemkit.contact.joined.reduced_members import ReducedMembers
 from bemkit.contact.joined.sparse_form import sparse_response
 from bemkit.contact.rigid_motions import RigidMotions
 from bemkit.operators.equilibrium import Imbalance
@@ -27,7 +27,7 @@ _ROUND_OFF = 1e-12
 """Share of the forces that those of missed relative displacements may have before a response is refined."""
 
 _WITHOUT_LOAD = (
-    *("shapes", "motions", "felt_motions", "is_symmetric", "_reduced", "_relative_stiffness", "_motion_fit"),
+    *("shapes", "motions", "felt_motions", "is_symmetric", "_compliance", "_relative_stiffness", "_motion_fit"),
     *("owners", "moduli", "modulus", "stiffness_scale", "is_costly"),
 )
 """What stays as it is under another load."""
@@ -100,7 +100,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if conditions.free_motions(self.rigid_motions()).shape[0]:
             raise SingularResponse("the contact conditions leave a rigid motion free")
-        return sparse_response(self, self._reduced, conditions)
+        return sparse_response(self, self._compliance, conditions)
 
     def _refined(self, conditions: LinearConditions, state: ContactState) -> ContactState:
         """Return a response less what round-off of the dense stiffness has left: one step of iterative refinement.
@@ -128,6 +128,13 @@ class JoinedBodies(CoupledMembers, LinearBody):
         """Return the work of the loads on these motions."""
         return np.asarray(self.motions.T @ self.load)
 
+    def shares(self, forces: FloatArray) -> FloatArray:
+        """Return the largest of the forces on the partner that carries less, relative to the largest of all."""
+        takes_part = self.owners[::2].tocoo()
+        of_members = np.zeros(len(self.members))
+        np.maximum.at(of_members, takes_part.col, forces[takes_part.row])
+        return np.asarray(np.maximum(self.least_of_partners(of_members)[::2] / forces.max(), LIGHTEST))
+
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far each member is from equilibrium, and the state from a response; see `imbalance_of`."""
         return imbalance_of(self, state)
@@ -138,8 +145,8 @@ class JoinedBodies(CoupledMembers, LinearBody):
         return tuple(np.split(displacement, np.cumsum([member.n_components for member in self.members])[:-1]))
 
     @cached_property
-    def _reduced(self) -> ReducedMembers:
-        return ReducedMembers.of(self)
+    def _compliance(self) -> Compliance:
+        return Compliance.of(self)
 
     @cached_property
     def _relative_stiffness(self) -> RelativeStiffness:

@@ -1,34 +1,37 @@
-"""Many members: one sparse system for all displacements and contact forces, factored anew for each response."""
+"""Many members: one sparse system for all contact forces and rigid motions, factored anew for each response."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import maximum_bipartite_matching
-from scipy.sparse.linalg import splu
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.contact.joined.reduced_members import ReducedMembers
+from bemkit.contact.joined.sparse_solver import NotFactored, factored
 
 _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
 _LARGEST_RESIDUAL = 1e-13
 """Residual, relative to its terms, from which on a factorisation counts as failed."""
-_LARGE = 0.3
-"""Entries of a row of the coupling above this share of its largest may be pivots."""
+_PENALTIES = (1e-8, 1e-12)
+"""What stands on the diagonal of the motions while the matrix is factored, until refinement has taken it out again.
+Small beside what contact gives there, or that takes many rounds; the smaller, the more digits a round loses."""
+_MOST_ROUNDS = 12
+"""Rounds of refinement; three are usual."""
+_TINY = float(np.finfo(float).tiny)
 
 
-def sparse_response(joined: CoupledMembers, reduced: ReducedMembers, conditions: LinearConditions) -> ContactState:
+def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: LinearConditions) -> ContactState:
     """Return the response of many members; see `LinearBody.respond`.
 
     Parameters
     ----------
     joined : CoupledMembers
-    reduced : ReducedMembers
-        The same members as far as contacts feel them.
+    compliance : Compliance
+        Of the same members.
     conditions : LinearConditions
         That leave no rigid motion free.
 
@@ -40,31 +43,33 @@ def sparse_response(joined: CoupledMembers, reduced: ReducedMembers, conditions:
     Notes
     -----
     With tractions that are given by their conditions (open nodes, friction of slipping ones) substituted as
-    ``p = T y + p_0``, the unknowns u and y solve ``K u - B^T T y = f + B^T p_0`` and
-    ``U B u + X T y = c - U o - X p_0``.
-    The second rows have no diagonal. Exchanged with those of the displacement that each of them ties they make a matrix
-    like that of the bodies grown together, which a symmetric minimum degree ordering suits: a third of the entries of
-    an ordering by columns.
+    ``p = T y + p_0``, the unknown forces y and motions a of the members solve ``U (w_0 + C p + M a) + X p = c`` and
+    ``M^T p = -l``, the balance of each member under the work l of its load on its motions. The second rows have no
+    diagonal. A small penalty there lets the motions be eliminated first, which couples no more forces than the
+    compliance C of their member does: half of the entries of a system of forces and displacements.
     """
-    n, modulus = joined.n_contact, joined.modulus
+    n = joined.n_contact
     given = _Given.by(conditions, joined.weights)
     kept = np.flatnonzero(~given.is_given.ravel())
     on_displacement, on_force = (
         _blocks(array)[kept]
         for array in (conditions.on_displacement, conditions.on_traction / joined.weights[:, None, None])
     )
-    ties = sparse.csr_array(on_displacement @ reduced.relative)
-    spread = reduced.relative.T @ given.by_kept
-    matrix = sparse.block_array(
-        [[reduced.stiffness / modulus, -spread], [ties, modulus * (on_force @ given.by_kept)]], format="csr"
-    )
-    forces = reduced.on_kept @ joined.load + reduced.relative.T @ given.at_rest
-    values = conditions.value.ravel()[kept] - on_displacement @ joined.offset - on_force @ given.at_rest
-    solution = _solved(matrix, np.concatenate([forces / modulus, values]), ties)
-    n_displacements = reduced.relative.shape[1]
-    displacement = (reduced.relative @ solution[:n_displacements] + joined.offset).reshape(n, 2)
-    force = given.by_kept @ (modulus * solution[n_displacements:]) + given.at_rest
-    return _exact(conditions, displacement, force.reshape(n, 2) / joined.weights[:, None])
+    at_rest = joined.offset + joined.relative @ joined.deformation(joined.load) + compliance.by_force @ given.at_rest
+    # forces by the square root of the modulus on both sides, motions by its inverse: entries of size one
+    row, motion = np.sqrt(compliance.force_unit[kept]), np.sqrt(compliance.motion_unit)
+    scaled = sparse.diags_array(row)
+    ties = scaled @ (on_displacement @ compliance.by_force + on_force) @ given.by_kept @ scaled
+    moved = scaled @ on_displacement @ compliance.by_motion @ sparse.diags_array(motion)
+    balance = sparse.diags_array(motion) @ compliance.by_motion.T @ given.by_kept @ scaled
+    matrix = sparse.block_array([[ties, moved], [balance, None]], format="csr")
+    values = row * (conditions.value.ravel()[kept] - on_displacement @ at_rest - on_force @ given.at_rest)
+    rest = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given.at_rest)
+    solution = _solved(matrix, np.append(values, rest), n_motions=motion.size)
+    force = given.by_kept @ (row * solution[: kept.size])
+    displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[kept.size :])
+    traction = (force + given.at_rest).reshape(n, 2) / joined.weights[:, None]
+    return _exact(conditions, displacement.reshape(n, 2), traction)
 
 
 class _Given:
@@ -103,48 +108,47 @@ def _blocks(blocks: FloatArray) -> sparse.csr_array:
     return array
 
 
-def _solved(matrix: sparse.csr_array, right_side: FloatArray, ties: sparse.csr_array) -> FloatArray:
+def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) -> FloatArray:
     """Return the solution, with every row scaled to a largest entry of one and its residual checked."""
     sizes = abs(matrix).max(axis=1).toarray().ravel()
     if not sizes.all():
         raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
-    order = _exchanged(ties)
-    scaled = sparse.csc_array((sparse.diags_array(1.0 / sizes) @ matrix)[order])
-    right_side = (right_side / sizes)[order]
+    scaled = sparse.csr_array(sparse.diags_array(1.0 / sizes) @ matrix)
+    right_side, terms = right_side / sizes, abs(scaled)
     probe = 0.5 + np.modf(np.arange(1, len(right_side) + 1) * 0.6180339887498949)[0]
-    trials = (
-        {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.01, "options": {"SymmetricMode": True}},
-        {"permc_spec": "COLAMD"},
-    )
-    terms = abs(scaled)
-    for options in trials:
-        try:
-            factors = splu(scaled, **options)
-        except RuntimeError as error:
-            raise SingularResponse(f"the contact conditions do not hold the bodies ({error})") from error
-        solution, probed = factors.solve(np.stack([right_side, probe], axis=1)).T
-        rcond = 1.0 / (float(terms.sum(axis=1).max()) * float(np.abs(probed).max()))
-        solution = solution + factors.solve(right_side - scaled @ solution)
-        residual = np.abs(right_side - scaled @ solution)
-        if residual.max() <= _LARGEST_RESIDUAL * (terms @ np.abs(solution) + np.abs(right_side)).max():
+    right_sides, is_motion = np.stack([right_side, probe], axis=1), np.arange(len(right_side)) >= len(probe) - n_motions
+    rcond = 0.0
+    for penalty in _PENALTIES:
+        solutions, residual = _refined(scaled, right_sides, np.where(is_motion, -penalty, 0.0))
+        if residual <= _LARGEST_RESIDUAL:
+            rcond = 1.0 / (float(terms.sum(axis=1).max()) * float(np.abs(solutions[:, 1]).max()))
             if rcond > _SMALLEST_RCOND:
-                return np.asarray(solution)
+                return np.asarray(solutions[:, 0])
             break
     raise SingularResponse(f"the contact conditions do not hold the bodies (reciprocal condition {rcond:.1e})")
 
 
-def _exchanged(ties: sparse.csr_array) -> IntArray:
-    """Return the order of rows in which each tie has changed places with a displacement of its own."""
-    n_ties, n = ties.shape
-    largest = abs(ties).max(axis=1).toarray().ravel()
-    is_large = ties.copy()
-    is_large.data = (np.abs(ties.data) >= _LARGE * np.repeat(largest, np.diff(ties.indptr))).astype(float)
-    is_large.eliminate_zeros()
-    partner = maximum_bipartite_matching(sparse.csr_matrix(is_large), perm_type="column")
-    tie = np.flatnonzero(partner >= 0)
-    order: IntArray = np.arange(n + n_ties, dtype=np.intp)
-    order[partner[tie]], order[n + tie] = n + tie, partner[tie]
-    return order
+def _refined(matrix: sparse.csr_array, right_sides: FloatArray, penalty: FloatArray) -> tuple[FloatArray, float]:
+    """Solve with the factors of a matrix with a penalty until residuals fall no more; return the largest one."""
+    terms = abs(matrix)
+    solutions, before = np.zeros_like(right_sides), np.inf
+    try:
+        with factored(sparse.csr_array(matrix + sparse.diags_array(penalty))) as solve:
+            for _ in range(_MOST_ROUNDS):
+                following = solutions + solve(right_sides - matrix @ solutions)
+                if not np.isfinite(following).all():
+                    break
+                sizes = (terms @ np.abs(following) + np.abs(right_sides)).max(axis=0)
+                missed = np.abs(right_sides - matrix @ following).max(axis=0)
+                residual = float((missed / np.maximum(sizes, _TINY)).max())
+                if residual < before:
+                    solutions = following
+                if residual > 0.5 * before or residual == 0.0:
+                    break
+                before = residual
+    except NotFactored as error:
+        raise SingularResponse(f"the contact conditions do not hold the bodies ({error})") from error
+    return solutions, before
 
 
 def _exact(conditions: LinearConditions, displacement: FloatArray, traction: FloatArray) -> ContactState:

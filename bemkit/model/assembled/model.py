@@ -66,10 +66,8 @@ class AssembledModel:
             each if _is_loaded_alike(prepared, self.prepared, number) else _under(each, prepared, number)
             for number, each in enumerate(self.condensed)
         )
-        elastic = tuple(
-            replace(each, inside=inside) if isinstance(each, HeavyElasticity) and inside is not None else each
-            for each, inside in zip(self.elastic, prepared.insides, strict=True)
-        )
+        maps = [each.weightless if isinstance(each, HeavyElasticity) else each for each in self.elastic]
+        elastic = _loaded(maps, prepared.insides)
         offset, is_eliminated = _offset(prepared), prepared.tangent_is_eliminated
         loads = [*(each.load for each in condensed), *(member.load for member in rigid_members(prepared))]
         body = self.body.under(loads, offset)
@@ -221,12 +219,13 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
         first_inside = prepared.insides[group[0]]
         try:
             map_ = first.scene.discretisation.chosen_map(first.own_mesh.unit, material, chosen)
-            base = _loaded(map_, first_inside).condense(prepared.conditions[group[0]], prepared.forces[group[0]])
+            loaded = map_ if first_inside is None else HeavyElasticity(map_, first_inside)
+            base = loaded.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
         except (SingularMatrixError, NotConvergedError) as error:
             raise type(error)(f"body {first.name!r}: {error}") from error
         work += base.work
         for number in group.tolist():
-            elastic[number] = _loaded(map_, prepared.insides[number])
+            elastic[number] = map_
             condensed[number] = base if number == group[0] else _under(base, prepared, number)
     maps = tuple(each for each in condensed if each is not None)
     motions = [_motions(*pair) for pair in zip(bodies, prepared.conditions, strict=True)]
@@ -249,13 +248,17 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     )
     n_eliminated = int(np.count_nonzero(prepared.tangent_is_eliminated))
     work += OperationCounts(contact_unknowns=2 * prepared.n_contact - n_eliminated)
-    return AssembledModel(
-        prepared, tuple(each for each in elastic if each is not None), maps, joined, _problem(prepared, joined), work
-    )
+    loaded_maps = _loaded([each for each in elastic if each is not None], prepared.insides)
+    return AssembledModel(prepared, loaded_maps, maps, joined, _problem(prepared, joined), work)
 
 
-def _loaded(elastic: SteklovPoincare, inside: ForcesInside | None) -> SteklovPoincare:
-    return elastic if inside is None else HeavyElasticity(elastic, inside)
+def _loaded(maps: Sequence[SteklovPoincare], insides: Sequence[ForcesInside | None]) -> tuple[SteklovPoincare, ...]:
+    """Return the maps under what acts inside their bodies; copies alike share theirs, and what it finds out."""
+    shared: dict[tuple[int, int], SteklovPoincare] = {}
+    for map_, inside in zip(maps, insides, strict=True):
+        loaded = map_ if inside is None else HeavyElasticity(map_, inside)
+        shared.setdefault((id(map_), id(inside)), loaded)
+    return tuple(shared[id(map_), id(inside)] for map_, inside in zip(maps, insides, strict=True))
 
 
 def _under(condensed: CondensedMap, prepared: PreparedAssembly, number: int) -> CondensedMap:

@@ -8,6 +8,7 @@ u_p is exact, so that whatever S holds exactly stays exact, and u_h alone has a 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -163,7 +164,15 @@ class HeavyElasticity:
         """Return all tractions (n_elements, n_local, 2) [Pa], those of the particular solution projected."""
         inside = self.inside
         left = self.weightless.element_tractions(displacement - inside.displacement, force - inside.force)
-        return left + projected_tractions(inside.solution, self.traction_space)
+        return left + self._particular_tractions
+
+    @cached_property
+    def _particular_tractions(self) -> FloatArray:
+        return projected_tractions(self.inside.solution, self.traction_space)
+
+    @cached_property
+    def _particular_energy(self) -> float:
+        return self.inside.solution.energy(self.traction_space.mesh)
 
     def energy_beyond(self, displacement: FloatArray, force: FloatArray) -> float:
         """Return the elastic energy [J/m] that a body has beyond the one of the map, f_h u_h / 2.
@@ -194,7 +203,7 @@ class HeavyElasticity:
         work = float(np.sum(force * at_nodes))
         work += float(np.einsum("eq,lq,elc,eqc->", measure, space.basis(xi), traction, rest, optimize=True))
         of_heat = integrate_traction(self.displacement_space, elements, inside.solution.expansions.traction)
-        return work + float(np.sum(of_heat * displacement)) + inside.solution.energy(space.mesh)
+        return work + float(np.sum(of_heat * displacement)) + self._particular_energy
 
 
 def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import radians
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -20,7 +21,9 @@ from bemkit.geometry.shapes import Rectangle
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
 from bemkit.operators.material import Material
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
 from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
@@ -29,6 +32,9 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
+from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+
+Baseline = TypeVar("Baseline", Solution, AssemblySolution)
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
@@ -72,8 +78,8 @@ class Case:
     ----------
     value : float
         Place on the axis.
-    scene : Scene
-    similarity : Similarity
+    scene : Scene or Assembly
+    similarity : Similarity or AssemblySimilarity
         Factors that lead from the reference of the axis to this scene, by which results are scaled back.
     levels : int
         How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
@@ -88,8 +94,8 @@ class Case:
     """
 
     value: float
-    scene: Scene
-    similarity: Similarity = Similarity()
+    scene: Scene | Assembly
+    similarity: Similarity | AssemblySimilarity = Similarity()
     levels: int = 0
     precision: float = PRECISION
     drift_limit: float = float("inf")
@@ -105,7 +111,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Axis:
+class Axis(Generic[Baseline]):
     """A direction in which a scene is driven to its extremes.
 
     Parameters
@@ -127,13 +133,15 @@ class Axis:
     label: str
     promise: str
     values: tuple[float, ...]
-    make: Callable[[Solution, float], Case]
+    make: Callable[[Baseline, float], Case]
     reference: float | None = None
     beside_half_planes: str = ""
     beside_periodic: str = ""
 
-    def reason_against(self, scene: Scene) -> str:
+    def reason_against(self, scene: Scene | Assembly) -> str:
         """Return why the axis says nothing of a scene; empty if it does."""
+        if isinstance(scene, Assembly):
+            return ""
         surface = scene.shape.outline().surface
         if surface is None:
             return ""
@@ -146,19 +154,20 @@ class Axis:
         return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
 
 
-def find_axes(names: Sequence[str]) -> tuple[Axis, ...]:
-    """Return the axes of the given names, all of them if there are none.
+def find_axes(names: Sequence[str], axes: Sequence[Axis[Any]] | None = None) -> tuple[Axis[Any], ...]:
+    """Return those of some axes, by default of one body, that have the given names; all if there are no names.
 
     Raises
     ------
     UnknownAxisError
         The message lists the names.
     """
-    known = {axis.name: axis for axis in AXES}
+    axes = AXES if axes is None else axes
+    known = {axis.name: axis for axis in axes}
     for name in names:
         if name not in known:
             raise UnknownAxisError(f"axis is {name!r}: the axes are {', '.join(known)}")
-    return tuple(known[name] for name in names) if names else AXES
+    return tuple(known[name] for name in names) if names else tuple(axes)
 
 
 class UnknownAxisError(InputError):
@@ -345,7 +354,7 @@ _PENALTIES = tuple(10.0**k for k in range(-8, 13, 2))
 _SHARES = (0.125, 0.25, 0.5, 1.0, 2.0)
 _GRADINGS = (1e2, 1e4, _REFERENCE_GRADING, 1e8, 1e10, 1e12)
 
-AXES: tuple[Axis, ...] = (
+AXES: tuple[Axis[Solution], ...] = (
     Axis("youngs-modulus", "factor of Young's modulus", _UNITS, _DECADES, partial(_similar, factor="modulus")),
     Axis("load", "factor of all loads and gaps", _UNITS, _DECADES, partial(_similar, factor="stress")),
     Axis("size", "factor of all lengths", _UNITS, _SIZES, partial(_similar, factor="length")),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def to_csv(records: Sequence[StabilityRecord]) -> str:
     return csv_text([field.name for field in fields(StabilityRecord)], map(astuple, records))
 
 
-def to_markdown(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> str:
+def to_markdown(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> str:
     """Return one Markdown table for each axis; run times are left out, so that equal results make equal text."""
     head = ("verdict", "status", "solves", "certificate", "check", "Betti", "condition", "drift", "twin")
     lines = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Console
@@ -38,7 +38,7 @@ _SERIES = (
 _FLOOR = 1e-18
 
 
-def print_axis(axis: Axis, records: Sequence[StabilityRecord], console: Console | None = None) -> None:
+def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord], console: Console | None = None) -> None:
     """Print the table of one axis, and the reasons of records that are not right."""
     console = stdout_console(console)
     heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s")
@@ -89,17 +89,17 @@ def print_trials(trials: Sequence[Trial], console: Console | None = None) -> Non
         console.print(Text(f"  bemkit stability --random 1 --seed {trial.seed} --first {trial.index} --save ."))
 
 
-def draw_axes(axes: Sequence[Axis], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
+def draw_axes(axes: Sequence[Axis[Any]], records: Sequence[StabilityRecord]) -> dict[str, Figure]:
     """Draw one figure for each axis, by file names."""
     return {figure_name(axis): draw_axis(axis, [one for one in records if one.axis == axis.name]) for axis in axes}
 
 
-def figure_name(axis: Axis) -> str:
+def figure_name(axis: Axis[Any]) -> str:
     """Return the name of the file, without ``.png``."""
     return f"stability-{axis.name}"
 
 
-def draw_axis(axis: Axis, records: Sequence[StabilityRecord]) -> Figure:
+def draw_axis(axis: Axis[Any], records: Sequence[StabilityRecord]) -> Figure:
     """Draw one axis."""
     figure = new_figure(6.4, 4.0)
     plot = figure.add_subplot()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -12,16 +13,24 @@ from bemkit.errors import InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.stability.axes import Axis, Case, Similarity
-from bemkit.studies.stability.independent_check import IndependentCheck, check_solution
+from bemkit.studies.stability.axes import Axis, Baseline, Case, Similarity
+from bemkit.studies.stability.independent_check import check_assembly, check_solution
+from bemkit.studies.stability.independent_check.verdict import Entries
+from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.records import StabilityRecord, Verdict
+
+AnySolution: TypeAlias = Solution | AssemblySolution
 
 TWIN = Similarity(length=3.7e-3, modulus=7.3e5, stress=1.9e-2)
 """Every case is solved a second time in these units. No factor is a power of two, so all round-off differs."""
+ASSEMBLY_TWIN = AssemblySimilarity(length=3.7e-3, stress=7.3e5)
+"""The same for several bodies."""
 
 
 class StabilityError(InputError):
@@ -29,11 +38,11 @@ class StabilityError(InputError):
 
 
 def sweep(
-    scene: Scene,
-    axes: Sequence[Axis],
+    scene: Scene | Assembly,
+    axes: Sequence[Axis[Any]],
     run_tasks: Callable[[Sequence[Task[StabilityRecord]]], Iterable[StabilityRecord]] = compute,
 ) -> Iterator[StabilityRecord]:
-    """Compute the records of some axes from a baseline scene, one axis after the other.
+    """Compute the records of some axes from a baseline scene, of one body or of several, one axis after the other.
 
     `run_tasks` computes the tasks of one axis, such as `compute` of the engine with records of an earlier sweep.
 
@@ -45,7 +54,7 @@ def sweep(
     """
     if scene.n_steps > 1:
         raise StabilityError(f"the scene has {scene.n_steps} load steps, but a sweep solves one: give it a single load")
-    if not scene.contact_parts:
+    if isinstance(scene, Scene) and not scene.contact_parts:
         raise StabilityError("the scene has no contact, which this suite is about: give one that has")
     for axis in axes:
         if reason := axis.reason_against(scene):
@@ -57,7 +66,7 @@ def sweep(
         yield from run_tasks(_tasks(axis, baseline.solution))
 
 
-def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
+def _tasks(axis: Axis[Baseline], baseline: Baseline) -> list[Task[StabilityRecord]]:
     # the reference is solved when the first record needs it
     reference = cache(lambda: _reference(axis, baseline))
 
@@ -67,22 +76,22 @@ def _tasks(axis: Axis, baseline: Solution) -> list[Task[StabilityRecord]]:
     return [Task((axis.name, value), f"{axis.name} {value:.6g}", partial(record, value)) for value in axis.values]
 
 
-def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> StabilityRecord:
+def solve_and_judge(axis: str, case: Case, reference: AnySolution | None) -> StabilityRecord:
     """Solve a case of an axis and its twin, and judge them.
 
     The drift is measured against the reference, which is None if it has no solution itself.
     """
-    twin_scene = TWIN.apply(case.scene)
+    factors, twin_scene = _twin(case.scene)
     first, second = _attempt(case.scene, case), _attempt(twin_scene, case)
     solution = first.solution
     drift = twin = math.nan
     check = None
     if solution is not None:
-        check = check_solution(solution)
+        check = _checked(solution)
         if reference is not None:
             drift = difference(reference, solution, case.similarity)
         if second.solution is not None:
-            twin = difference(solution, second.solution, TWIN, in_mean=case.levels > 0)
+            twin = difference(solution, second.solution, factors, in_mean=case.levels > 0)
     verdict, objection = _judge(case, reference, first, second, check, drift, twin)
     return StabilityRecord(
         axis=axis,
@@ -101,18 +110,37 @@ def solve_and_judge(axis: str, case: Case, reference: Solution | None) -> Stabil
     )
 
 
-def _attempt(scene: Scene, case: Case) -> Attempt[Solution]:
+def _twin(scene: Scene | Assembly) -> tuple[Similarity | AssemblySimilarity, Scene | Assembly]:
+    """Return the similar scene, and how it is similar."""
+    if isinstance(scene, Assembly):
+        return ASSEMBLY_TWIN, ASSEMBLY_TWIN.apply(scene)
+    return TWIN, TWIN.apply(scene)
+
+
+def _checked(solution: AnySolution) -> Entries:
+    return check_assembly(solution) if isinstance(solution, AssemblySolution) else check_solution(solution)
+
+
+def _attempt(scene: Scene | Assembly, case: Case) -> Attempt[Any]:
+    if isinstance(scene, Assembly):
+        return attempt(lambda: run(scene))
     # the mesh is made inside: an error there is an answer too
     return attempt(lambda: run(scene, mesh=case.mesh(scene)))
 
 
-def difference(reference: Solution, solution: Solution, similarity: Similarity, *, in_mean: bool = False) -> float:
+def difference(
+    reference: AnySolution,
+    solution: AnySolution,
+    similarity: Similarity | AssemblySimilarity,
+    *,
+    in_mean: bool = False,
+) -> float:
     """Return the largest difference of two contact tables after scaling the second back.
 
     Parameters
     ----------
-    reference, solution : Solution
-    similarity : Similarity
+    reference, solution : Solution or AssemblySolution
+    similarity : Similarity or AssemblySimilarity
         Leads from the reference to the solution.
     in_mean : bool
         Take the mean along each contact part instead of the largest entry; always on other meshes, because single nodes
@@ -151,8 +179,10 @@ def difference(reference: Solution, solution: Solution, similarity: Similarity, 
     return worst
 
 
-def condition_number(scene: Scene, case: Case) -> float:
-    """Return the condition number of the contact stiffness of a scene, NaN where none is formed."""
+def condition_number(scene: Scene | Assembly, case: Case) -> float:
+    """Return the condition number of the contact stiffness of one body, NaN where none is formed and of several."""
+    if isinstance(scene, Assembly):
+        return math.nan
     mesh = case.mesh(scene)
     with blas_threads_for(2 * mesh.n_elements):
         body = build_model(prepare(scene, mesh)).body
@@ -166,7 +196,7 @@ def condition_number(scene: Scene, case: Case) -> float:
     return float(singular[0]) / smallest if smallest > 0.0 else math.inf
 
 
-def _reference(axis: Axis, baseline: Solution) -> Solution | None:
+def _reference(axis: Axis[Baseline], baseline: Baseline) -> Baseline | None:
     if axis.reference is None:
         return baseline
     case = axis.make(baseline, axis.reference)
@@ -176,10 +206,10 @@ def _reference(axis: Axis, baseline: Solution) -> Solution | None:
 
 def _judge(
     case: Case,
-    reference: Solution | None,
-    first: Attempt[Solution],
-    second: Attempt[Solution],
-    check: IndependentCheck | None,
+    reference: AnySolution | None,
+    first: Attempt[Any],
+    second: Attempt[Any],
+    check: Entries | None,
     drift: float,
     twin: float,
 ) -> tuple[Verdict, str]:
@@ -199,7 +229,7 @@ def _judge(
         objections["other active sets"] = not np.array_equal(first.solution.contact.status, reference.contact.status)
         objections["other linear solves"] = first.solution.linear_solves != reference.linear_solves
     differs = not twin <= case.precision
-    is_another = differs and math.isinf(case.drift_limit) and check_solution(second.solution).is_good
+    is_another = differs and math.isinf(case.drift_limit) and _checked(second.solution).is_good
     objections["the similar twin differs"] = differs and not is_another
     found = [text for text, speaks_against in objections.items() if speaks_against]
     if found:

@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 from bemkit.contact.body import ContactState
+from bemkit.contact.certificate import certify
 from bemkit.contact.conditions import LinearConditions, separated, slip, stick
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
@@ -129,6 +130,21 @@ def test_each_member_is_judged_by_its_own_forces(is_dense):
     assert body.imbalance(ContactState(state.displacement, traction)).worst > 1e-3
     moved = state.displacement + 1e-3 * np.eye(len(state.displacement))[:, [3, 4]]
     assert body.imbalance(ContactState(moved, state.traction)).worst > 1e-3
+
+
+def test_a_contact_is_certified_by_the_partner_that_carries_less():
+    """A wall presses the first of three blocks; the others carry a hundredth of that, or next to nothing."""
+    body = row_of_blocks((1.0, 1.0, 1.0))
+    is_alone = np.arange(body.n_contact) % 4 == 0  # wall and first block; then those of the first and the second, ...
+    for little, share in ((1e-2, 1e-2), (1e-9, 1e-3)):
+        np.testing.assert_allclose(body.shares(np.where(is_alone, 3.0, 3.0 * little)), np.where(is_alone, 1.0, share))
+
+    # friction of 1e-5 more than its bound, where contact carries a thousandth of the largest traction
+    problem = ContactProblem(body, np.zeros(body.n_contact), Coulomb(0.5))
+    traction = np.column_stack([np.where(is_alone, -1e3, -1.0), np.zeros(body.n_contact)])
+    traction[5, 1] = 0.5 + 1e-5
+    certificate = certify(problem, ContactState(np.zeros_like(traction), traction))
+    assert certificate.cone_excess == pytest.approx(1e-5, rel=1e-6)
 
 
 def test_the_compliant_partner_gives_the_scale_of_stiffness():

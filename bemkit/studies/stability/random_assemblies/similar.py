@@ -42,6 +42,11 @@ class AssemblySimilarity:
     shift: tuple[float, float] = (0.0, 0.0)
 
     @property
+    def displacement(self) -> float:
+        """Factor of displacements, and so of gaps."""
+        return self.length
+
+    @property
     def _motion(self) -> Placement:
         return Placement(self.shift, self.turn)
 
@@ -55,6 +60,9 @@ class AssemblySimilarity:
 
     def apply(self, assembly: Assembly) -> Assembly:
         """Return the similar assembly."""
+        for words, given in (("rigid bodies", assembly.rigid), ("load steps", assembly.steps)):
+            if given:
+                raise InputError(f"the assembly has {words}: leave them out, numbers of these have no similar ones yet")
         touching = assembly.touching
         if touching is not None:
             law = None if touching.law is None else self._law(touching.law)
