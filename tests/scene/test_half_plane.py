@@ -15,7 +15,7 @@ from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.surface import Surface
 from bemkit.runs.history import run_on_mesh
 from bemkit.scene.load_history import load_steps
-from bemkit.studies.stability.axes import Case
+from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.sweep import condition_number
 
 PUNCH = bk.Scene(

@@ -12,7 +12,8 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.studies.stability.axes import PRECISION, Axis, Case
+from bemkit.studies.stability.axes import Axis
+from bemkit.studies.stability.case import PRECISION, Case
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 _SIMILAR = "results equal to 1e-9 after scaling"

@@ -1,4 +1,4 @@
-"""The axes of the stability sweeps, the cases they make, and the similarity that leads a case back to the baseline."""
+"""The axes of the stability sweeps, and the cases they make."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap, HalfPlane
 from bemkit.errors import InputError
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.grading import Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.shapes import Rectangle
@@ -32,82 +31,9 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+from bemkit.studies.stability.case import PRECISION, Case, Similarity
 
 Baseline = TypeVar("Baseline", Solution, AssemblySolution)
-
-PRECISION = 1e-9
-"""Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
-
-
-@dataclass(frozen=True)
-class Similarity:
-    """The same problem in other units and elsewhere: every result follows from that of the original.
-
-    Parameters
-    ----------
-    length, modulus, stress : float
-        Factors of all lengths of the body, of Young's modulus, and of all loads.
-    shift : (float, float) [m]
-        Where the origin goes.
-    """
-
-    length: float = 1.0
-    modulus: float = 1.0
-    stress: float = 1.0
-    shift: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def displacement(self) -> float:
-        """Factor of displacements, and so of gaps and prescribed displacements."""
-        return self.stress / self.modulus * self.length
-
-    def apply(self, scene: Scene) -> Scene:
-        """Return the similar scene."""
-        affine = AffineMap((self.length, self.length), self.shift)
-        return transformed_scene(
-            scene, affine, stress=self.stress, displacement=self.displacement, modulus=self.modulus
-        )
-
-
-@dataclass(frozen=True)
-class Case:
-    """One row to compute.
-
-    Parameters
-    ----------
-    value : float
-        Place on the axis.
-    scene : Scene or Assembly
-    similarity : Similarity or AssemblySimilarity
-        Factors that lead from the reference of the axis to this scene, by which results are scaled back.
-    levels : int
-        How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
-    precision : float
-        Agreement owed by the similar twin of this case.
-    drift_limit : float
-        Agreement owed to the reference; infinite if the answer may change along the axis.
-    keeps_steps : bool
-        Whether active sets and the number of linear solves must be those of the reference as well.
-    is_solvable : bool or None
-        Whether a solution exists, where that is known beforehand.
-    """
-
-    value: float
-    scene: Scene | Assembly
-    similarity: Similarity | AssemblySimilarity = Similarity()
-    levels: int = 0
-    precision: float = PRECISION
-    drift_limit: float = float("inf")
-    keeps_steps: bool = False
-    is_solvable: bool | None = None
-
-    def mesh(self, scene: Scene) -> BoundaryMesh:
-        """Divide the boundary of `scene`, which is this case's or similar to it."""
-        mesh = scene.build_mesh()
-        for _ in range(self.levels):
-            mesh = mesh.refined(np.unique(mesh.node_elements[break_nodes(mesh)]))
-        return mesh
 
 
 @dataclass(frozen=True)

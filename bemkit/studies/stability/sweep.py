@@ -19,7 +19,8 @@ from bemkit.runs.run import run
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.stability.axes import Axis, Baseline, Case, Similarity
+from bemkit.studies.stability.axes import Axis, Baseline
+from bemkit.studies.stability.case import Case, Similarity
 from bemkit.studies.stability.independent_check import check_assembly, check_solution
 from bemkit.studies.stability.independent_check.verdict import Entries
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity

@@ -12,7 +12,8 @@ import bemkit as bk
 from bemkit.geometry.grading import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.scene.transform import with_turned_loads
-from bemkit.studies.stability.axes import AXES, Similarity, find_axes
+from bemkit.studies.stability.axes import AXES, find_axes
+from bemkit.studies.stability.case import Similarity
 from bemkit.studies.stability.independent_check import IndependentCheck, check_assembly, check_solution
 from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.nodes import Fields

@@ -12,7 +12,8 @@ import pytest
 import bemkit as bk
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability import sweep as sweep_module
-from bemkit.studies.stability.axes import AXES, Axis, Case, UnknownAxisError, find_axes
+from bemkit.studies.stability.axes import AXES, Axis, UnknownAxisError, find_axes
+from bemkit.studies.stability.case import Case
 from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep

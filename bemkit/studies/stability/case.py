@@ -1,0 +1,87 @@
+"""One case of a stability sweep, and the similarity that leads it back to the baseline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
+from bemkit.scene.transform import AffineMap, transformed_scene
+from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
+
+PRECISION = 1e-9
+"""Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """The same problem in other units and elsewhere: every result follows from that of the original.
+
+    Parameters
+    ----------
+    length, modulus, stress : float
+        Factors of all lengths of the body, of Young's modulus, and of all loads.
+    shift : (float, float) [m]
+        Where the origin goes.
+    """
+
+    length: float = 1.0
+    modulus: float = 1.0
+    stress: float = 1.0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def displacement(self) -> float:
+        """Factor of displacements, and so of gaps and prescribed displacements."""
+        return self.stress / self.modulus * self.length
+
+    def apply(self, scene: Scene) -> Scene:
+        """Return the similar scene."""
+        affine = AffineMap((self.length, self.length), self.shift)
+        return transformed_scene(
+            scene, affine, stress=self.stress, displacement=self.displacement, modulus=self.modulus
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row to compute.
+
+    Parameters
+    ----------
+    value : float
+        Place on the axis.
+    scene : Scene or Assembly
+    similarity : Similarity or AssemblySimilarity
+        Factors that lead from the reference of the axis to this scene, by which results are scaled back.
+    levels : int
+        How often the elements at corners and ends of parts are halved, after the scene's own mesh is made.
+    precision : float
+        Agreement owed by the similar twin of this case.
+    drift_limit : float
+        Agreement owed to the reference; infinite if the answer may change along the axis.
+    keeps_steps : bool
+        Whether active sets and the number of linear solves must be those of the reference as well.
+    is_solvable : bool or None
+        Whether a solution exists, where that is known beforehand.
+    """
+
+    value: float
+    scene: Scene | Assembly
+    similarity: Similarity | AssemblySimilarity = Similarity()
+    levels: int = 0
+    precision: float = PRECISION
+    drift_limit: float = float("inf")
+    keeps_steps: bool = False
+    is_solvable: bool | None = None
+
+    def mesh(self, scene: Scene) -> BoundaryMesh:
+        """Divide the boundary of `scene`, which is this case's or similar to it."""
+        mesh = scene.build_mesh()
+        for _ in range(self.levels):
+            mesh = mesh.refined(np.unique(mesh.node_elements[break_nodes(mesh)]))
+        return mesh
