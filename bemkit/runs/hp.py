@@ -128,7 +128,8 @@ class LayeredMeshes:
         def excess(degrees: IntArray) -> FloatArray:
             return self._share(solution, errors.at_higher_degrees(degrees - old_degrees))
 
-        kept = sufficient_degrees(excess, old_degrees.size, largest)[elements]
+        # never below the old degree: coefficients that have reached round-off do not tell how fast they fell before
+        kept = np.maximum(sufficient_degrees(excess, old_degrees.size, largest), old_degrees)[elements]
         return tuple(few_kinds(below_layers(np.where(is_cut, largest, kept), layers)).tolist())
 
     def _share(self, solution: Solution, errors: CoefficientErrors) -> FloatArray:

@@ -61,7 +61,7 @@ MESHES = squares()
 
 
 @pytest.mark.parametrize("name", MESHES)
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6, 8, 10, 12])
+@pytest.mark.parametrize("degree", range(1, 13))
 def test_polynomial_fields_are_exact(degree: int, name: str) -> None:
     mesh = MESHES[name]
     space, tractions = (
