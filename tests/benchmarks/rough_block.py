@@ -45,6 +45,9 @@ def picture(steps: list[bk.Solution], areas: list[float]) -> plt.Figure:
     """Draw the real area against pressure, and pressures on a hundredth of the block."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 3.6), layout="constrained")
     left.loglog(PRESSURES, areas, "o-")
+    for axis, values in ((left.xaxis, PRESSURES), (left.yaxis, np.round(areas, 2))):
+        axis.set_ticks(values, [f"{value:g}" for value in values])
+        axis.set_ticks([], minor=True)
     left.set(xlabel="pressure on the block [E]", ylabel="share of the lower side that touches")
     for step, pressure in ((steps[k], PRESSURES[k]) for k in (0, 2, 4)):
         x, order = step.contact.x, np.argsort(step.contact.x)
