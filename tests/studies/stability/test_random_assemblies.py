@@ -52,6 +52,7 @@ def test_assemblies_that_once_failed_do_so_no_more(seed: int, index: int) -> Non
     assert try_case(seed, index).outcome in (Outcome.SUCCESS, Outcome.WARNED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_many_random_assemblies(seed: int) -> None:
     assert_honest(trials_of(seed, 300, processes=2))
