@@ -50,7 +50,9 @@ HINDRANCES = {
 }
 
 
-@pytest.mark.parametrize("words", HINDRANCES)
+@pytest.mark.parametrize(
+    "words", [pytest.param(words, marks=[pytest.mark.slow] * (words == "closed curves")) for words in HINDRANCES]
+)
 def test_what_cannot_be_compressed_is_dense_and_the_plan_says_why(words: str) -> None:
     scene = replace(HINDRANCES[words], linear_solver=ASKED)
     choice = chosen(scene)

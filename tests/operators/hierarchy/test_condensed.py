@@ -95,7 +95,7 @@ def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slo
     np.testing.assert_allclose(compressed.boundary.traction, dense.boundary.traction, atol=1e-8 * stress)
 
 
-@pytest.mark.parametrize("name", ["two-cylinders", "pin-in-plate"])
+@pytest.mark.parametrize("name", ["two-cylinders", pytest.param("pin-in-plate", marks=pytest.mark.slow)])
 def test_several_bodies_are_those_of_dense_equations(name: str) -> None:
     assembly = bk.load_scene(name)
     assert isinstance(assembly, bk.Assembly)
