@@ -21,6 +21,8 @@ from bemkit.solvers.base import ContactSolution, Status
 _ROUND_OFF = 1e-10
 """Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
 a ring whose thickness is a hundredth of its radius has 1e-7 of the largest stiffness."""
+_OF_DIFFERENCES = 4.0
+"""Rounding errors in a strain, of the size of the displacements: of these, of the motion, of their difference."""
 _ELIMINATION_TOLERANCE = 64.0 * float(np.finfo(float).eps)
 """Share of the sensitivity of the whole body that elimination may leave in its condensed stiffness."""
 
@@ -111,6 +113,8 @@ def negative_share(
         float(np.abs(strained).max()), NOISE_FACTOR * float(np.finfo(float).eps * np.abs(displacement).max())
     )
     round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * farthest
+    # strains are differences of displacements, and known no better than these are
+    round_off += _OF_DIFFERENCES * float(np.finfo(float).eps * np.sum(np.abs(displacement * force)))
     work = float(parts.sum())
     return -work / size if work < -round_off else 0.0
 
