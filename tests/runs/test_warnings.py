@@ -208,7 +208,8 @@ def test_a_load_history_keeps_the_warnings_of_all_its_steps() -> None:
     scene = bowl(load_factors=(1.0, 30.0))
     steps = run_history([scene])
     assert steps[0].warnings
-    assert set(run(scene).warnings) == {*steps[0].warnings, *steps[1].warnings}
+    # warnings that differ in numbers alone are said once, as of the last step
+    assert set(run(scene).warnings) == set(unlike((*steps[1].warnings, *steps[0].warnings)))
 
 
 @pytest.mark.parametrize(("elements", "degrees"), [(8, 90), (16, None)])

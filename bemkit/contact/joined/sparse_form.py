@@ -10,7 +10,8 @@ from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.contact.joined.sparse_solver import NotFactored, factored
+from bemkit.contact.joined.sparse_solver import factored
+from bemkit.operators.linear.dense import SingularMatrixError
 
 _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
@@ -146,7 +147,7 @@ def _refined(matrix: sparse.csr_array, right_sides: FloatArray, penalty: FloatAr
                 if residual > 0.5 * before or residual == 0.0:
                     break
                 before = residual
-    except NotFactored as error:
+    except SingularMatrixError as error:
         raise SingularResponse(f"the contact conditions do not hold the bodies ({error})") from error
     return solutions, before
 

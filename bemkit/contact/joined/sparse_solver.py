@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import printable
+from bemkit.operators.linear.dense import SingularMatrixError
 
 _MISSING = "SuperLU (pip install 'bemkit[pardiso]' brings PARDISO, which is faster)"
 _OPTIONS = {1: 1, 2: 2, 8: 0, 10: 13, 11: 0, 13: 0}
@@ -22,10 +23,6 @@ _OPTIONS = {1: 1, 2: 2, 8: 0, 10: 13, 11: 0, 13: 0}
 rows are scaled before. Refinement is left to the caller, who knows the matrix without its penalty."""
 
 Solve = Callable[[FloatArray], FloatArray]
-
-
-class NotFactored(ArithmeticError):  # noqa: N818 - an outcome, not a mistake
-    """A matrix that is singular to the last digit."""
 
 
 def sparse_solver_name() -> str:
@@ -49,7 +46,7 @@ def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
 
     Raises
     ------
-    NotFactored
+    SingularMatrixError
         If a pivot vanishes.
     """
     if uses_pardiso():
@@ -64,7 +61,7 @@ def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
             options={"SymmetricMode": True},
         )
     except RuntimeError as error:
-        raise NotFactored(str(error)) from error
+        raise SingularMatrixError(str(error)) from error
     yield factors.solve
 
 
@@ -80,7 +77,7 @@ def _factored_by_pardiso(matrix: sparse.csr_array) -> Iterator[Solve]:
         solver.factorize(plain)
         yield lambda right_side: np.asarray(solver.solve(plain, right_side))
     except pypardiso.pardiso_wrapper.PyPardisoError as error:
-        raise NotFactored(str(error)) from error
+        raise SingularMatrixError(str(error)) from error
     finally:
         solver.free_memory(everything=True)
 

@@ -7,7 +7,8 @@ import pytest
 from scipy import sparse
 
 from bemkit.contact.joined import sparse_solver
-from bemkit.contact.joined.sparse_solver import NotFactored, factored, sparse_solver_name, uses_pardiso
+from bemkit.contact.joined.sparse_solver import factored, sparse_solver_name, uses_pardiso
+from bemkit.operators.linear.dense import SingularMatrixError
 
 MATRIX = sparse.csr_array(np.array([[2.0, 1.0, 0.0], [0.0, 4.0, -1.0], [1.0, 0.0, -1e-8]]))
 """With a diagonal as small as the penalty of motions."""
@@ -32,7 +33,7 @@ def test_factors_solve_for_several_right_sides():
 
 def test_a_singular_matrix_is_refused(asked_anew, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(NotFactored, match="singular"), factored(sparse.csr_array(np.ones((2, 2)))):
+    with pytest.raises(SingularMatrixError, match="singular"), factored(sparse.csr_array(np.ones((2, 2)))):
         pass
 
 

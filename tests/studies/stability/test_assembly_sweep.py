@@ -48,6 +48,17 @@ def test_the_ends_of_every_axis_are_right_or_named(pin, name):
             assert row.drift < 1e-10  # 1e-12 found: round-off of coordinates
 
 
+@pytest.mark.parametrize("name", SIMILAR)
+def test_parts_chosen_by_a_region_follow_the_body(name):
+    cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
+    assert isinstance(cylinders, Assembly)
+    assert any(part.where for body in cylinders.bodies for part in body.parts)
+    (axis,) = find_axes([name], ASSEMBLY_AXES)
+    (row,) = sweep(cylinders, [dataclasses.replace(axis, values=EXTREMES[name][-1:])])
+    assert row.verdict == Verdict.RIGHT
+    assert row.drift < 1e-10
+
+
 def test_a_twin_that_is_not_similar_is_seen(pin):
     from bemkit.runs.run import run
 

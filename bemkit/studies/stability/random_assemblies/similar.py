@@ -17,14 +17,16 @@ from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
+from bemkit.scene.transform import AffineMap, TransformedRegion
 
 
 @dataclass(frozen=True)
 class AssemblySimilarity:
     """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
 
-    Assemblies are changed number by number, so that the result can be written to a file: fields have to be numbers, and
-    copies in a grid stay as they are turned only by way of a list of places.
+    Assemblies are changed number by number, so that the result can be written to a file (but for parts chosen by a
+    region, if the length changes): fields have to be numbers, and copies in a grid stay as they are turned only by way
+    of a list of places.
 
     Parameters
     ----------
@@ -143,9 +145,10 @@ class AssemblySimilarity:
         raise InputError(f"shape is {type(shape).__name__}: give one of those that random assemblies are made of")
 
     def _part(self, part: Part) -> Part:
-        if part.where is not None:
-            raise InputError(f"part {part.name!r} is chosen by a region: choose it by sides")
-        return replace(part, condition=self._condition(part.condition))
+        where = part.where
+        if where is not None and self.length != 1.0:  # regions are in the coordinates of the shape
+            where = TransformedRegion(where, AffineMap((self.length, self.length)))
+        return replace(part, where=where, condition=self._condition(part.condition))
 
     def _condition(self, condition: Condition) -> Condition:
         match condition:
