@@ -55,7 +55,7 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     assert any(part.where for body in cylinders.bodies for part in body.parts)
     (axis,) = find_axes([name], ASSEMBLY_AXES)
     (row,) = sweep(cylinders, [dataclasses.replace(axis, values=EXTREMES[name][-1:])])
-    assert row.verdict == Verdict.RIGHT
+    assert Verdict(row.verdict) is Verdict.RIGHT
     assert row.drift < 1e-10
 
 
