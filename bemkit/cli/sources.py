@@ -28,15 +28,12 @@ def solved(source: str, callback: Callable[[StepRecord], None] | None) -> Result
 
 
 def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> Sequence[Result]:
-    """Return the solutions of all load steps of a scene.
-
-    Raises
-    ------
-    InputError
-        If the source is a result file, which holds the fields of the last step alone.
-    """
+    """Return the solutions of all load steps of a scene, or of the finished ones in a result file."""
     if Path(source).suffix.lower() in RESULT_ENDINGS:
-        raise InputError(f"{source}: a result file holds the fields of the last step alone: give the scene to animate")
+        solution = read_result(source)
+        if solution.loading is None:
+            raise InputError(f"{source}: the result has no load steps: give a scene with [[steps]] or load_factors")
+        return [solution.at_step(number) for number, _ in enumerate(solution.loading.steps, start=1)]
     scene = load_scene(source)
     with concerning(source):
         if isinstance(scene, Assembly):

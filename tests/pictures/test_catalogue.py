@@ -123,6 +123,11 @@ def test_the_command_draws_results_and_scenes(
     Path("s.toml").write_text(scene_to_toml(scene), encoding="utf-8")
     assert call("plot", "s.toml", "-o", "s.gif", "-q") == 0
     assert Path("s.gif").read_bytes().startswith(b"GIF8")
+    assert call("run", "s.toml", "-o", "s.h5", "-q") == 0
+    assert call("plot", "s.h5", "-o", "again.gif", "-q") == 0
+    assert Path("again.gif").read_bytes() == Path("s.gif").read_bytes()
+    assert call("plot", "r.h5", "-o", "none.gif") == 2
+    assert "r.h5: the result has no load steps: give a scene with [[steps]] or load_factors" in capsys.readouterr().err
     assert call("plot", "s.toml", "--what", "status-over-time,animation", "-o", "h") == 0
     assert sorted(path.name for path in Path("h").iterdir()) == ["animation.gif", "status-over-time.png"]
     assert call("show", "r.h5", "--plot", "z", "--what", "friction-cone") == 0
@@ -134,7 +139,6 @@ def test_the_command_draws_results_and_scenes(
     [
         (("plot", "paper-1", "--what", "tension"), "'tension' is no picture: the pictures are deformation, zoom"),
         (("plot", "nothing.h5"), "nothing.h5"),
-        (("plot", "nothing.h5", "-o", "x.gif"), "a result file holds the fields of the last step alone"),
         (("plot", "paper-1", "-o", "x.png"), "one file takes one picture"),
         (("run", "paper-1", "--what", "traction"), "--what names figures: add --plot DIR"),
         (("run", "paper-1", "--plot", "p", "--what", "tension"), "'tension' is no picture"),
