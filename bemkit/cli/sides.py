@@ -55,7 +55,7 @@ def print_sides(shape: Shape, sides: Outline) -> None:
     points = np.concatenate([side.curve.point(_SEEN) for side in sides.sides])
     width, height = np.ptp(points, axis=0).tolist()
     unit = f" {drawn.unit}" if drawn is not None and drawn.unit else ""
-    console.print(Text(f"about {width:.6g} by {height:.6g}{unit}; the body lies on the left of every side"))
+    console.print(Text(f"about {width:.4g} by {height:.4g}{unit}; the body lies on the left of every side"))
     for note in drawn.notes if drawn is not None else ():
         console.print(Text(f"note: {note}", style="yellow"))
 

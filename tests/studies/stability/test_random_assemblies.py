@@ -58,7 +58,7 @@ def test_many_random_assemblies(seed: int) -> None:
     assert_honest(trials_of(seed, 300, processes=2))
 
 
-@pytest.mark.parametrize("index", [295, 391])
+@pytest.mark.parametrize("index", [295, pytest.param(391, marks=pytest.mark.slow)])
 def test_histories_of_several_bodies_are_judged_by_what_they_promise(index: int) -> None:
     """The work of collocation does not balance, and slip counts from the last increment of a step, not from none."""
     (assembly,) = random_assembly(81, index).scenes
