@@ -15,6 +15,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
+from bemkit.results.between_bodies import violations_between_bodies
+from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, at_step, step_rows
 from bemkit.results.part_forces import ContactForce
@@ -193,6 +195,17 @@ class AssemblySolution(ShownInNotebooks):
         """What squared errors in the energy norm are measured by [J/m]; see `SolvedBody.error_unit`."""
         return sum(body.error_unit for body in self.bodies.values())
 
+    @cached_property
+    def between_nodes(self) -> BetweenNodes | None:
+        """Largest violations of the contact conditions between the nodes, of which the certificate says nothing."""
+        return BetweenNodes.largest(self.contacts_between_nodes.values())
+
+    @cached_property
+    def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
+        """The same of each contact, by name."""
+        motion = None if self.loading is None else self.loading.motion
+        return violations_between_bodies(self.assembly, self.bodies, self.rigid, self.contact, motion)
+
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies."""
         mesh = self.bodies[body].mesh
@@ -220,6 +233,7 @@ class AssemblySolution(ShownInNotebooks):
             "rigid": {name: body.as_dict() for name, body in self.rigid.items()},
             "transitions": [transition.as_dict() for transition in self.transitions],
             "certificate": self.certificate.as_dict(),
+            "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
             "timings": dict(self.timings),
             "plan": self.plan.as_dict(),
             "work": self.work.as_dict(),

@@ -205,9 +205,13 @@ class Solution(ShownInNotebooks, SolvedBody):
 
         None without contact.
         """
-        displacement, traction_dofs = self.boundary.displacement, self.boundary.traction_dofs
+        return BetweenNodes.largest(self.contacts_between_nodes.values())
+
+    @cached_property
+    def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
+        """The same of each contact part, by name."""
         motion = None if self.loading is None else self.loading.motion
-        return violations_between_nodes(self.scene, self.mesh, self.contact, displacement, traction_dofs, motion)
+        return violations_between_nodes(self, self.contact, motion)
 
     def with_warnings(self, warnings: tuple[str, ...]) -> Solution:
         """Return the same solution with other warnings, and with all that has been estimated of it."""
