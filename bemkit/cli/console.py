@@ -175,10 +175,7 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
         yield "transitions", "\n".join(_transition_lines(solution))
         solver = SOLVERS.word_of(solution.scene.solver)
         yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
-    round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
-    yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
-    if (between := solution.between_nodes) is not None:
-        yield "between nodes", f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
+    yield from _violation_rows(solution)
     yield "time", _time(solution)
 
 
@@ -216,9 +213,15 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
     yield "transitions", "\n".join(_transition_lines(solution))
     solver = SOLVERS.word_of(solution.assembly.solver)
     yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
+    yield from _violation_rows(solution)
+    yield "time", _time(solution)
+
+
+def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
     round_off = f"round-off of the forces up to {solution.certificate.round_off:.1e}"
     yield "certificate", f"{_worst_entry(solution.certificate)}; {round_off}"
-    yield "time", _time(solution)
+    if (between := solution.between_nodes) is not None:
+        yield "between nodes", f"{_worst_entry(between)}; penetration up to {between.penetration_depth:.1e}"
 
 
 def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:

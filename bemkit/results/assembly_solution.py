@@ -10,20 +10,16 @@ from typing import Any, cast
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.notebook import ShownInNotebooks
-from bemkit.operators.counts import OperationCounts
-from bemkit.plan import Plan
-from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.load_history import LoadHistory, at_step, step_rows
+from bemkit.results.between_bodies import violations_between_bodies
+from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
+from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
-from bemkit.scene.unit_names import UnitNames
-from bemkit.solvers.base import Status, StepRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +57,13 @@ class BodyResult(SolvedBody):
         }
 
 
-@dataclass(frozen=True, eq=False)
-class AssemblySolution(ShownInNotebooks):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AssemblySolution(SolvedProblem):
     """What `bemkit.run` returns of an assembly.
+
+    How it was solved is said by the entries of `SolvedProblem`. The contact table has one row for each multiplier node;
+    `part` is the name of the contact, displacements are relative ones: those of the body with the node less those of
+    its partner.
 
     Parameters
     ----------
@@ -72,93 +72,41 @@ class AssemblySolution(ShownInNotebooks):
         step.
     bodies : mapping of str to BodyResult
         By name, in the order of the assembly.
-    status : Status
-    certificate : Certificate
-    contact : ContactTable
-        One row for each multiplier node; `part` is the name of the contact, displacements are relative ones: those of
-        the body with the node less those of its partner.
     contact_directions : (n_contact, 2) array
         Unit vectors of u_n and sigma_n, out of the body with the node.
     friction_bound : (n_contact,) array or None [Pa]
         The largest friction at each contact node; None if there is none anywhere.
     contacts : tuple of ContactForce
         What each contact transmits.
-    history : tuple of StepRecord
-    linear_solves, outer_steps : int
-    transitions : tuple of Transition
-    timings : mapping of str to float [s]
-    plan : Plan
-    work : OperationCounts
-        What was computed; equal to ``plan.work``.
-    message : str
-    memory : mapping of str to int [bytes]
     rigid : mapping of str to RigidResult
         How each rigid body moved and what acts on it, by name.
-    warnings : tuple of str
-    loading : LoadHistory, optional
-        Of a load history the steps up to this one.
     """
 
     assembly: Assembly
     bodies: Mapping[str, BodyResult]
-    status: Status
-    certificate: Certificate
-    contact: ContactTable
     contact_directions: FloatArray
     friction_bound: FloatArray | None
     contacts: tuple[ContactForce, ...]
-    history: tuple[StepRecord, ...]
-    linear_solves: int
-    outer_steps: int
-    transitions: tuple[Transition, ...]
-    timings: Mapping[str, float]
-    plan: Plan
-    work: OperationCounts
-    message: str = ""
-    memory: Mapping[str, int] = field(default_factory=dict)
     rigid: Mapping[str, RigidResult] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-    loading: LoadHistory | None = None
 
     def __repr__(self) -> str:
         """Return one line; the fields hold thousands of numbers."""
-        status = self.status.name.lower().replace("_", " ")
         sizes = f"{len(self.bodies)} bodies, {self.n_elements} elements, {self.contact.n_contact} contact nodes"
-        return f"AssemblySolution({self.assembly.title!r}: {status}, {sizes})"
+        return f"AssemblySolution({self.assembly.title!r}: {self.status_words}, {sizes})"
 
     @property
     def stated(self) -> Assembly:
         """What was asked: the assembly, with all its load steps."""
         return self.assembly if self.loading is None else cast(Assembly, self.loading.asked)
 
-    def at_step(self, number: int) -> AssemblySolution:
-        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
-        return at_step(self, number)
-
     @property
-    def units(self) -> UnitNames | None:
-        """Names of units, if the assembly has them."""
-        return self.assembly.units
-
-    @property
-    def title(self) -> str:
-        """The title of the assembly."""
-        return self.assembly.title
+    def _problem(self) -> Assembly:
+        return self.assembly
 
     def part_length(self, contact: str) -> float:
         """Return the length of boundary that can touch in a contact [m]."""
         own = self.contact.rows(contact)
         return float(self.contact.weight[own].sum()) + max(float(self.contact.s[own][0]), 0.0)
-
-    @property
-    def is_converged(self) -> bool:
-        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
-        return self.status is Status.CONVERGED
-
-    @property
-    def is_certified(self) -> bool:
-        """Whether contact, friction and equilibrium hold on the meshes, be they fine enough or not."""
-        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     @property
     def n_elements(self) -> int:
@@ -193,6 +141,9 @@ class AssemblySolution(ShownInNotebooks):
         """What squared errors in the energy norm are measured by [J/m]; see `SolvedBody.error_unit`."""
         return sum(body.error_unit for body in self.bodies.values())
 
+    def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
+        return violations_between_bodies(self.assembly, self.bodies, self.rigid, self.contact, motion)
+
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies."""
         mesh = self.bodies[body].mesh
@@ -200,29 +151,12 @@ class AssemblySolution(ShownInNotebooks):
         parts = dict.fromkeys(part for owner, part in sides if owner == body)
         return np.concatenate([np.zeros(0, np.intp), *(mesh.part(part) for part in parts)])
 
-    def summary(self) -> dict[str, Any]:
-        """Return the result without its fields, under the names of the JSON output; see `Solution.summary`."""
+    def _sizes(self) -> dict[str, int]:
+        return {"n_bodies": len(self.bodies)}
+
+    def _parts(self) -> dict[str, Any]:
         return {
-            "title": self.assembly.title,
-            "units": None if self.units is None else self.units.as_dict(),
-            "status": self.status.name.lower(),
-            "message": self.message or self.status.value,
-            "converged": self.is_converged,
-            "certified": self.is_certified,
-            "warnings": list(self.warnings),
-            "n_bodies": len(self.bodies),
-            "n_elements": self.n_elements,
-            "n_contact": self.contact.n_contact,
-            **{name: getattr(self, name) for name in ("linear_solves", "outer_steps", "force_normal")},
-            **{name: getattr(self, name) for name in ("force_tangential", "energy", "estimated_error")},
             "contacts": [contact.as_dict() for contact in self.contacts],
             "bodies": {name: body.summary() for name, body in self.bodies.items()},
             "rigid": {name: body.as_dict() for name, body in self.rigid.items()},
-            "transitions": [transition.as_dict() for transition in self.transitions],
-            "certificate": self.certificate.as_dict(),
-            "timings": dict(self.timings),
-            "plan": self.plan.as_dict(),
-            "work": self.work.as_dict(),
-            "memory": dict(self.memory),
-            "steps": step_rows(self.loading),
         }

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.local_values import values_on_elements
-from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.results.contact_table import ContactTable
+from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
-from bemkit.scene.scene import Scene
 
 _POINTS_PER_NODE = 4
 """Points of an element for each of its nodes: between them a polynomial grows by a few per cent more at most."""
@@ -65,32 +65,29 @@ class BetweenNodes:
         """Return all numbers by name."""
         return asdict(self)
 
+    @classmethod
+    def largest(cls, measured: Iterable[BetweenNodes]) -> BetweenNodes | None:
+        """Return the largest of each; None of none."""
+        rows = [list(each.as_dict().values()) for each in measured]
+        return cls(*np.max(rows, axis=0).tolist()) if rows else None
+
 
 def violations_between_nodes(
-    scene: Scene,
-    mesh: BoundaryMesh,
-    contact: ContactTable,
-    displacement: FloatArray,
-    traction_dofs: FloatArray,
-    motion: SlipHistory | None = None,
-) -> BetweenNodes | None:
-    """Measure the displacements and tractions of a result along its contact boundary, without running anything again.
+    body: SolvedBody, contact: ContactTable, motion: SlipHistory | None = None
+) -> dict[str, BetweenNodes]:
+    """Measure the displacements and tractions of one body along its contact parts, without running anything again.
 
     Parameters
     ----------
-    scene : Scene
-        With a single load.
-    mesh : BoundaryMesh
+    body : SolvedBody
     contact : ContactTable
-    displacement, traction_dofs : arrays [m], [Pa]
-        As in `bemkit.results.solution.BoundaryFields`.
     motion : SlipHistory, optional
         Of the contact nodes, for laws that depend on slip or time; interpolated between them.
 
     Returns
     -------
-    BetweenNodes or None
-        None without contact nodes.
+    dict of str to BetweenNodes
+        By contact part.
 
     Notes
     -----
@@ -98,72 +95,92 @@ def violations_between_nodes(
     elements are measured as the steps they are. Without any contact force displacements are measured by the largest.
     """
     if not contact.n_contact:
-        return None
+        return {}
+    scene, mesh = body.scene, body.mesh
     stress = float(np.maximum(np.abs(contact.sigma_n), np.abs(contact.sigma_t)).max()) or 1.0
     force = float(np.sum(contact.weight * np.hypot(contact.sigma_n, contact.sigma_t)))
-    length = force / scene.material.plane_modulus or float(np.abs(displacement).max()) or 1.0
-    with np.errstate(all="ignore"):  # results that are not finite are measured by nan
-        measured = [
-            _violations(
-                _values(scene, part.condition.obstacle, mesh, mesh.part(part.name), displacement, traction_dofs),
-                _law_between(scene, mesh, part.name, contact, motion),
-                stress,
-                length,
-            )
-            for part in scene.parts
-            if isinstance(part.condition, Contact) and mesh.part(part.name).size  # none beyond a symmetry line
-        ]
-    return BetweenNodes(*np.max([list(each.as_dict().values()) for each in measured], axis=0).tolist())
+    length = force / scene.material.plane_modulus or float(np.abs(body.boundary.displacement).max()) or 1.0
+    found = {}
+    for part in scene.parts:
+        if isinstance(part.condition, Contact) and (elements := mesh.part(part.name)).size:  # none beyond a symmetry
+            with np.errstate(all="ignore"):  # results that are not finite are measured by nan
+                points = points_at_obstacle(body, part.condition.obstacle, elements)
+                law = law_between(scene.laws[part.name], points, contact, part.name, motion)
+                found[part.name] = violations_at(points, law, stress, length)
+    return found
 
 
-def _law_between(
-    scene: Scene, mesh: BoundaryMesh, part: str, contact: ContactTable, motion: SlipHistory | None
-) -> FrictionLaw:
-    """Return the law of a contact part at the points of `_values`."""
-    elements, xi = mesh.part(part), _points_between(scene.discretisation.displacement_space(mesh).degree)
-    law = scene.laws[part].at(mesh.points(elements, xi).reshape(-1, 2))
-    if motion is None or not law.needs_history:
-        return law
-    ordered, begin = along_boundary(mesh, elements), np.zeros(mesh.n_elements)
-    begin[ordered] = np.cumsum(mesh.lengths[ordered]) - mesh.lengths[ordered]
-    s = (begin[elements, None] + 0.5 * mesh.lengths[elements, None] * (xi + 1.0)).ravel()
-    rows = np.flatnonzero(contact.rows(part))
-    rows = rows[np.argsort(contact.s[rows])]
-    slip, last = (np.interp(s, contact.s[rows], each[rows]) for each in (motion.slip, motion.last_slip))
-    return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last))
+class PointsBetween(NamedTuple):
+    """What is known at points of a contact; displacements and tractions in (n, t) components.
 
-
-class _Values(NamedTuple):
-    """What is known at (n, 2) points of a contact part; displacements and tractions in (n, t) components."""
+    Parameters
+    ----------
+    points : (n, 2) array [m]
+    s : (n,) array [m]
+        Arc length from the start of the side.
+    directions : (n, 2) array
+        Of contact, out of the body.
+    clearance : (n,) array [m]
+    sigma_n, sigma_t : (n,) arrays [Pa]
+    """
 
     points: FloatArray
+    s: FloatArray
+    directions: FloatArray
     clearance: FloatArray
     sigma_n: FloatArray
     sigma_t: FloatArray
 
+    def take(self, rows: BoolArray) -> PointsBetween:
+        """Return some of the points."""
+        return PointsBetween(*(column[rows] for column in self))
 
-def _values(
-    scene: Scene,
-    obstacle: Obstacle,
-    mesh: BoundaryMesh,
-    elements: IntArray,
-    displacement: FloatArray,
-    traction_dofs: FloatArray,
-) -> _Values:
-    discretisation = scene.discretisation
-    displacements, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
-    xi = _points_between(displacements.degree)
+
+def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> PointsBetween:
+    """Return what is known at points of elements (m,) that face a rigid obstacle where it stands before it moves."""
+    mesh = body.mesh
+    elements = along_boundary(mesh, elements)
+    xi = points_between(body.scene.discretisation.displacement_space(mesh).degree)
     points = mesh.points(elements, xi).reshape(-1, 2)
     gap, directions = measure_contact(obstacle, points, mesh.normals_at(elements, xi).reshape(-1, 2))
-    at_nodes = values_on_elements(displacements, displacement, elements)
-    motion = np.einsum("pq,epc->eqc", displacements.basis(xi), at_nodes).reshape(-1, 2)
-    at_dofs = traction_dofs.reshape(mesh.n_elements, -1, 2)[elements]
-    traction = np.einsum("lq,elc->eqc", tractions.basis(xi), at_dofs).reshape(-1, 2)
+    at = np.broadcast_to(xi, (elements.size, xi.size))
+    lengths = mesh.lengths[elements]
+    s = (np.cumsum(lengths) - lengths)[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)
+    u_n, _ = np.einsum("nkc,nc->kn", contact_frame(directions), displacement_at(body, elements, at).reshape(-1, 2))
+    traction = traction_at(body, elements, at).reshape(-1, 2)
     sigma_n, sigma_t = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
-    return _Values(points, gap - np.sum(motion * directions, axis=1), sigma_n, sigma_t)
+    return PointsBetween(points, s.ravel(), directions, gap - u_n, sigma_n, sigma_t)
 
 
-def _violations(values: _Values, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:
+def displacement_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
+    """Return displacements (m, q, 2) [m] at xi (m, q) of elements (m,)."""
+    space = body.scene.discretisation.displacement_space(body.mesh)
+    values = values_on_elements(space, body.boundary.displacement, elements)
+    return np.asarray(np.einsum("leq,elc->eqc", space.basis(xi.ravel()).reshape(-1, *xi.shape), values))
+
+
+def traction_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
+    """Return tractions (m, q, 2) [Pa] at xi (m, q) of elements (m,)."""
+    space = body.scene.discretisation.traction_space(body.mesh)
+    values = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements]
+    return np.asarray(np.einsum("leq,elc->eqc", space.basis(xi.ravel()).reshape(-1, *xi.shape), values))
+
+
+def law_between(
+    law: FrictionLaw, values: PointsBetween, contact: ContactTable, name: str, motion: SlipHistory | None
+) -> FrictionLaw:
+    """Return the law of a contact of the table at points between its nodes."""
+    law = law.at(values.points)
+    if motion is None or not law.needs_history:
+        return law
+    rows = np.flatnonzero(contact.rows(name))
+    rows = rows[np.argsort(contact.s[rows])]
+    slip, last = (np.interp(values.s, contact.s[rows], each[rows]) for each in (motion.slip, motion.last_slip))
+    return law.at_slip(SlipHistory(motion.time, motion.time_step, slip, last))
+
+
+def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length: float) -> BetweenNodes:
+    """Measure violations relative to a stress [Pa] and a length [m]."""
     bound = law.bound(np.minimum(values.sigma_n, 0.0))
     # friction given across the gap is no sign of contact
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
@@ -178,11 +195,11 @@ def _violations(values: _Values, law: FrictionLaw, stress: float, length: float)
     )
 
 
-def _points_between(degree: int) -> FloatArray:
-    """Return Chebyshev points in (-1, 1), which crowd at the ends as the nodes do, the middle among them."""
+def points_between(degree: int) -> FloatArray:
+    """Return Chebyshev's points of [-1, 1], which crowd at the ends as the nodes do; ends and middle are among them."""
     n = _POINTS_PER_NODE * (degree + 1) + 1
-    return -np.cos(np.pi * (np.arange(n) + 0.5) / n)
+    return -np.cos(np.pi * np.arange(n) / (n - 1))
 
 
 def _largest(values: FloatArray) -> float:
-    return float(np.maximum(values, 0.0).max())
+    return float(np.maximum(values, 0.0).max(initial=0.0))

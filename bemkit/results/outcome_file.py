@@ -57,6 +57,8 @@ def write_outcome(
     summary = {"status": solution.status.name, "message": solution.message, **counts, **numbers}
     file.create_group("summary").attrs.update(summary)
     file.create_group("certificate").attrs.update(solution.certificate.as_dict())
+    if solution.between_nodes is not None:
+        file.create_group("between_nodes").attrs.update(solution.between_nodes.as_dict())
     file.create_group("timings", track_order=True).attrs.update(solution.timings)
     contact = {"part": list(solution.contact.part), **solution.contact.columns(), **columns}
     write_table(file.create_group("contact"), contact)

@@ -84,8 +84,6 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
     with FORMAT.created(path) as file:
         write_text(file, "scene", text)
         write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
-        if solution.between_nodes is not None:
-            file.create_group("between_nodes").attrs.update(solution.between_nodes.as_dict())
         write_forces(file, "parts", solution.part_forces)
         write_forces(file, "contacts", solution.contacts)
         write_fields(file, solution.mesh, solution.boundary)

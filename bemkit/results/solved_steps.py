@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 from bemkit.notebook import ShownInNotebooks
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.solution import Solution
-
-AnySolution = TypeVar("AnySolution", bound=Solution | AssemblySolution)
+from bemkit.results.solved_problem import AnySolution
 
 
 class SolvedSteps(ShownInNotebooks, tuple[AnySolution, ...]):
@@ -19,5 +14,4 @@ class SolvedSteps(ShownInNotebooks, tuple[AnySolution, ...]):
     def __repr__(self) -> str:
         """Return one line."""
         last = self[-1]
-        status = last.status.name.lower().replace("_", " ")
-        return f"SolvedSteps({last.title!r}: {len(self)} steps, the last one {status})"
+        return f"SolvedSteps({last.title!r}: {len(self)} steps, the last one {last.status_words})"

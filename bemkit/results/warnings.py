@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 
 import numpy as np
@@ -14,11 +14,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, are_neighbours
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
-from bemkit.scene.unit_names import amount
+from bemkit.scene.unit_names import UnitNames, amount
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
@@ -31,6 +32,9 @@ LARGEST_STRAIN = 0.1
 """Strain or rotation [rad] of a share of the boundary above which displacements are not small."""
 STRAINED_SHARE = 0.05
 """That share; corners and ends of parts are strained without bound in theory, but over ever shorter lengths."""
+LARGEST_PENETRATION = 0.2
+"""Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
+pressed by constant elements on a zone of six of them comes to that."""
 _MOST_ALIKE = 3
 """Doubts of one kind about several bodies and contacts that are told."""
 FEWEST_NODES = 4
@@ -52,8 +56,9 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     laws = solution.scene.laws
     smooth = {part for part, law in laws.items() if law.is_frictionless}
     narrow = _narrow_zones(solution.contact, smooth, _remedy((solution,)))
+    overlaps = _hidden_overlaps(solution.contacts_between_nodes, solution.units, _remedy((solution,)))
     doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
-    return (*solution.plan.warnings, *chain(*doubts))
+    return (*solution.plan.warnings, *chain(*doubts, overlaps))
 
 
 def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
@@ -67,6 +72,7 @@ def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
         _narrow_zones(solution.contact, smooth, remedy),
+        _hidden_overlaps(solution.contacts_between_nodes, solution.units, remedy),
     ]
     return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
 
@@ -208,6 +214,18 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
                 yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
 
 
+def _hidden_overlaps(contacts: Mapping[str, BetweenNodes], units: UnitNames | None, remedy: str) -> Iterator[str]:
+    """Doubt contacts whose sides are in each other between the nodes, by more than what contact forces displace."""
+    for name, between in contacts.items():
+        if between.penetration > LARGEST_PENETRATION:
+            depth = amount(between.penetration_depth, "length", units, 2)
+            share = f"{100.0 * between.penetration:.0f} % of" if between.penetration < 1.0 else "more than"
+            yield (
+                f"Between its nodes part {name!r} is {depth} deep in what it touches, {share} the displacement that "
+                f"contact forces cause: {_there(remedy)}."
+            )
+
+
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     """Return the runs of chosen nodes that follow each other on one piece of a part."""
     nodes = np.flatnonzero(chosen)
@@ -219,5 +237,8 @@ def _narrow(part: str, kind: str, zones: Sequence[FloatArray], remedy: str) -> s
     nodes = "1 node" if zones[0].size == 1 else f"{zones[0].size} nodes"
     n_more, middle = len(zones) - 1, float(zones[0].mean())
     more = f", and {n_more} more {'zone' if n_more == 1 else 'zones'} like it" if n_more else ""
-    there = remedy.replace("more elements", "more elements there")
-    return f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {there}."
+    return f"A {kind} zone of part {part!r} at s = {middle:.4g} has only {nodes}{more}: {_there(remedy)}."
+
+
+def _there(remedy: str) -> str:
+    return remedy.replace("more elements", "more elements there")

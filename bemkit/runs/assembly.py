@@ -185,7 +185,7 @@ def assembly_solution(
         message=result.message,
         rigid=rigid,
     )
-    return replace(solution, warnings=find_assembly_warnings(solution))
+    return solution.with_warnings(find_assembly_warnings(solution))
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 
 from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.solution import AnySolution, with_totals
+from bemkit.results.solved_problem import AnySolution, with_totals
 from bemkit.scene.mesh_options import MOST_ELEMENTS, MeshOptions
 from bemkit.solvers.base import Status
 

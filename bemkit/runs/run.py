@@ -14,7 +14,8 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.plan import make_plan
-from bemkit.results.solution import Solution, with_times
+from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import with_times
 from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
 from bemkit.runs.timing import Stage

@@ -13,7 +13,8 @@ from bemkit.errors import InputError
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import LoadHistory, LoadStep
-from bemkit.results.solution import Solution, following
+from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly

@@ -65,6 +65,36 @@ def patch(degree: int, elements: tuple[int, int] = (28, 44), turn: float = 0.0) 
     )
 
 
+def test_a_body_that_touches_nothing_is_solved_beside_the_others() -> None:
+    """Held by supports of its own, under a load of its own, between the others in the list."""
+    pair = patch(2)
+    parts = (bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Traction(y=-1.0), ("top",)))
+    lone = bk.Body(
+        name="lone",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=STEEL,
+        parts=parts,
+        placement=bk.Placement((7.0, 0.0)),
+        mesh=bk.MeshOptions(elements=24),
+    )
+    solution = bk.run(replace(pair, bodies=(pair.bodies[0], lone, pair.bodies[1])))
+    assert solution.is_converged
+    np.testing.assert_allclose(solution.contact.sigma_n, -1.0, atol=1e-10)
+    scene = bk.Scene(
+        title="lone",
+        shape=lone.shape,
+        material=STEEL,
+        parts=parts,
+        discretisation=bk.Galerkin(2),
+        mesh=bk.MeshOptions(elements=24),
+    )
+    alone = bk.run(scene)
+    # round-off of a stiffness condensed to nothing, and of a load that is scaled by that of all bodies
+    expected = alone.boundary.displacement
+    np.testing.assert_allclose(solution.bodies["lone"].boundary.displacement, expected, atol=1e-11)
+    assert solution.bodies["lone"].energy == pytest.approx(alone.energy, rel=1e-11)
+
+
 @pytest.mark.parametrize("degree", [1, 2, 4])
 @pytest.mark.parametrize("turn", [0.0, 33.0])
 def test_uniform_pressure_and_shear_pass_a_joint_of_meshes_that_do_not_match(degree: int, turn: float) -> None:

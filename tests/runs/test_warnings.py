@@ -23,7 +23,8 @@ from bemkit.operators.material import Material
 from bemkit.plan import make_plan
 from bemkit.results import warnings as warnings_module
 from bemkit.results.result_file import read_result, write_result
-from bemkit.results.solution import Solution, unlike
+from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import unlike
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_assembly_warnings, find_warnings
 from bemkit.runs.history import run_history

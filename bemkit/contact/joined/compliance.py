@@ -9,7 +9,7 @@ from scipy import sparse
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.operators.linear.blocks import diagonal_blocks
+from bemkit.contact.joined.member import blocks_of_members
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +37,7 @@ class Compliance:
     @classmethod
     def of(cls, joined: CoupledMembers) -> Compliance:
         """Multiply the flexibilities of the members by their coupling."""
-        flexibilities: dict[int, FloatArray] = {}
-        for shape in joined.shapes:
-            flexibilities.update(dict.fromkeys(shape.rows[:, 0].tolist(), shape.flexibility))
-        blocks = [flexibilities[row] for row in sorted(flexibilities)]
-        of_members = diagonal_blocks(blocks)
+        of_members = blocks_of_members(joined.shapes, lambda shape: shape.flexibility)
         moduli = np.array([member.modulus for member in joined.members])
         return cls(
             sparse.csr_array(joined.relative @ of_members @ joined.relative.T),

@@ -12,10 +12,9 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.nodes import retained_tangents
-from bemkit.contact.joined.member import Member, Shape, deformation, shapes_of
+from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
 from bemkit.contact.rigid_motions import null_space
 from bemkit.errors import InputError
-from bemkit.operators.linear.blocks import diagonal_blocks
 
 _ROUNDS = 2
 """Times that rigid motions are fitted: the normal equations leave two stiff bodies apart by the digits they lose."""
@@ -116,11 +115,7 @@ class CoupledMembers:
     @cached_property
     def motions(self) -> sparse.csr_array:
         """(n, n_motions) sparse array: the rigid motions, orthonormal, member by member."""
-        of_member: dict[int, FloatArray] = {}
-        for shape in self.shapes:
-            of_member.update(dict.fromkeys(shape.rows[:, 0].tolist(), shape.motions))
-        first = np.cumsum([0, *(member.n_components for member in self.members)])[:-1].tolist()
-        return diagonal_blocks(of_member[number] for number in first)
+        return blocks_of_members(self.shapes, lambda shape: shape.motions)
 
     @cached_property
     def felt_motions(self) -> sparse.csr_array:

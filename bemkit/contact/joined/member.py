@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
+from bemkit.operators.linear.blocks import diagonal_blocks
 
 _MOTIONS_ARE_FREE = 1e-6
 """Share of its largest entry that a stiffness may leave of rigid motions: quadrature leaves less, a support more."""
@@ -79,11 +81,14 @@ class Shape:
     ----------
     member : Member
         One of the copies.
+    numbers : tuple of int
+        Which of the members are copies.
     rows : (n_copies, n) array
-        Numbers of their components among those of all members.
+        Numbers of their components among those of all members; none of bodies that touch nothing.
     """
 
     member: Member
+    numbers: tuple[int, ...]
     rows: IntArray
 
     @cached_property
@@ -116,6 +121,8 @@ class Shape:
             If the stiffness leaves more free than the motions.
         """
         stiffness, motions = self.member.stiffness, self.motions
+        if not self.member.n_components:
+            return stiffness
         spring = float(np.trace(stiffness)) / len(stiffness) or self.member.modulus
         held = stiffness + spring * motions @ motions.T
         try:
@@ -146,9 +153,17 @@ def shapes_of(members: Sequence[Member]) -> tuple[Shape, ...]:
     for number, member in enumerate(members):
         copies.setdefault((id(member.stiffness), id(member.motions)), []).append(number)
     return tuple(
-        Shape(members[numbers[0]], first[numbers][:, None] + np.arange(members[numbers[0]].n_components))
+        Shape(
+            members[numbers[0]], tuple(numbers), first[numbers][:, None] + np.arange(members[numbers[0]].n_components)
+        )
         for numbers in copies.values()
     )
+
+
+def blocks_of_members(shapes: Sequence[Shape], block: Callable[[Shape], FloatArray]) -> sparse.csr_array:
+    """Return blocks along the diagonal, one for each member in its order: that of its shape."""
+    of_member = {number: own for shape in shapes for own in [block(shape)] for number in shape.numbers}
+    return diagonal_blocks(of_member[number] for number in sorted(of_member))
 
 
 def deformation(shapes: Sequence[Shape], forces: FloatArray) -> FloatArray:

@@ -136,9 +136,19 @@ def quadrature_on(
     otherwise four more points see what curves and directions add to them.
     """
     is_plane = non_mortar.is_straight and mortar.is_straight and bool(np.all(directions == directions[0]))
-    reference, reference_weights = gauss_legendre(
-        max(non_mortar.space.degree, mortar.space.degree) + (2 if is_plane else 6)
-    )
+    rule = gauss_legendre(max(non_mortar.space.degree, mortar.space.degree) + (2 if is_plane else 6))
+    return facing_points(segments, non_mortar, mortar, directions, *rule)
+
+
+def facing_points(
+    segments: Segments,
+    non_mortar: ContactSide,
+    mortar: ContactSide,
+    directions: FloatArray,
+    reference: FloatArray,
+    reference_weights: FloatArray,
+) -> MortarQuadrature:
+    """Return points of the covered pieces, given with their weights by (q,) places in [-1, 1], and what they face."""
     chosen = np.flatnonzero(segments.is_covered)
     row, partner, low, high = (
         segments.row[chosen],

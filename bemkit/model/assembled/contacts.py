@@ -15,6 +15,7 @@ from bemkit.contact.mortar.congruent import CongruentCouplings, PlacedSide
 from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
@@ -142,7 +143,7 @@ def body_rows(
         crossed = np.array([taken[first].get(node, part) != part for node in own_nodes.tolist()])
         without = own_nodes[held | crossed]
         try:
-            reach = _reach(pairs[k], bodies[first], bodies[second])
+            reach = reach_of(pairs[k], bodies[first].mesh, bodies[second].mesh)
             coupling = couplings.couple(
                 PlacedSide(side, bodies[first].own_mesh, bodies[first].turn),
                 PlacedSide(other_side, bodies[second].own_mesh, bodies[second].turn),
@@ -188,8 +189,12 @@ def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str,
         number = numbers[body]
         sides.append((number, part, ContactSide(bodies[number].space, bodies[number].part_elements(part))))
     one, two = sides
-    is_first = is_non_mortar(one[2], two[2]) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
-    return (one, two) if is_first else (two, one)
+    return (one, two) if carries_multipliers(pair, one[2], two[2]) else (two, one)
+
+
+def carries_multipliers(pair: ContactPair, one: ContactSide, two: ContactSide) -> bool:
+    """Whether the first side of a contact carries the multipliers, and not the second."""
+    return is_non_mortar(one, two) if pair.multipliers_on is None else pair.multipliers_on == pair.sides[0]
 
 
 def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fixed: BoolArray) -> BoolArray:
@@ -198,10 +203,9 @@ def approaches(nodes: IntArray, directions: FloatArray, frame: FloatArray, is_fi
     return np.asarray(np.abs(np.einsum("nkc,nc->nk", free, directions)).max(axis=1) > HELD_COSINE)
 
 
-def _reach(pair: ContactPair, one: PlacedBody, two: PlacedBody) -> float:
-    if pair.reach is not None:
-        return pair.reach
-    return 0.5 * min(one.mesh.diameter, two.mesh.diameter)
+def reach_of(pair: ContactPair, one: BoundaryMesh, two: BoundaryMesh) -> float:
+    """Return the largest distance [m] of points of two bodies that may come to touch."""
+    return 0.5 * min(one.diameter, two.diameter) if pair.reach is None else pair.reach
 
 
 def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: float) -> None:

@@ -142,6 +142,12 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     assert any("contact zone of part 'disc.low / plate.top'" in warning for warning in solution.warnings)
     assert judge([solution])[0] is Outcome.WARNED
     assert judge([replace(solution, warnings=())])[:2] == (Outcome.WRONG, "hidden_overlap")
+    belittled = replace(solution)
+    (said,) = solution.contacts_between_nodes.values()
+    belittled.__dict__["contacts_between_nodes"] = {
+        pair.name: replace(said, penetration_depth=said.penetration_depth / 2)
+    }
+    assert check_assembly(belittled).faults == ("between_nodes",)
 
 
 def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:

@@ -19,6 +19,7 @@ from bemkit.studies.stability.trials import (
     Outcome,
     Trial,
     drawn_case,
+    judge,
     save_trial,
     solved_steps,
     trial_tasks,
@@ -112,6 +113,23 @@ def test_every_kind_is_drawn() -> None:
     assert any(each.n_steps > 4 for each in assemblies)  # press, shear, reverse, unload
     moduli = [body.material.youngs_modulus for body in bodies]
     assert max(moduli) / min(moduli) > 1e10
+
+
+@pytest.mark.parametrize(
+    ("seed", "index", "outcome"),
+    [
+        (8204, 159, Outcome.WARNED),  # a disc of constant elements that touches between its nodes alone
+        (9311, 33, Outcome.WARNED),  # ends of both sides that differ by round-off
+        (9311, 57, Outcome.NAMED),  # a block that touches nothing, and two that nothing holds
+        (9312, 141, Outcome.WARNED),  # a ring that spins by more than its size
+    ],
+)
+def test_assemblies_that_were_judged_wrong(seed: int, index: int, outcome: Outcome) -> None:
+    try:
+        found = judge(solved_steps(random_assembly(seed, index)))
+    except bk.BemkitError as error:
+        found = (Outcome.NAMED, type(error).__name__, str(error))
+    assert found[0] is outcome, found
 
 
 def test_results_survive_a_file_and_plans_count_what_is_done(tmp_path: Path) -> None:

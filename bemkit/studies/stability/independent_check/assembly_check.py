@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.studies.stability.independent_check.boundary import largest
 from bemkit.studies.stability.independent_check.check import slip_opposition, status_mismatch
-from bemkit.studies.stability.independent_check.distances import gap_mismatch, hidden_overlap, mean_mismatch
+from bemkit.studies.stability.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
 from bemkit.studies.stability.independent_check.joints import Joints
 from bemkit.studies.stability.independent_check.resultants import energy_mismatch, largest_imbalance, reaction_mismatch
 from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Entries
@@ -39,6 +39,8 @@ class AssemblyCheck(Entries):
         Elastic energy of a body below zero; of all against half the work of loads and of contacts.
     elasticity : float
         Of half-planes, see `IndependentCheck`.
+    between_nodes : float
+        How much deeper points of one side are in the other one than the solution says of them.
     reciprocity, coarseness, hidden_overlap
         See `Entries`: the worst of the bodies, the moments on them among them; how deep points between nodes are in
         the partner, over the displacement that strains the body.
@@ -59,6 +61,7 @@ class AssemblyCheck(Entries):
     negative_energy: float
     energy: float
     elasticity: float
+    between_nodes: float
 
     @property
     def needs_warning(self) -> str:
@@ -80,6 +83,7 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
     joints = Joints.of(solution)
     measured = joints.measured(before)
     bodies = joints.bodies.values()
+    deepest, unsaid = hidden_overlaps(joints)
     has_history = before is None and solution.loading is not None and len(solution.loading.steps) > 1
     return AssemblyCheck(
         numbers=0.0,
@@ -97,9 +101,10 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
         negative_energy=max(body.negative_energy() for body in bodies),
         energy=energy_mismatch(joints),
         elasticity=max(body.elasticity() for body in bodies),
+        between_nodes=unsaid,
         reciprocity=max(max(body.reciprocity(), body.moment()) for body in bodies),
         coarseness=max(body.coarseness for body in bodies),
-        hidden_overlap=hidden_overlap(joints),
+        hidden_overlap=deepest,
     )
 
 

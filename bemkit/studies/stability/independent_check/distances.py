@@ -11,6 +11,12 @@ from bemkit.studies.stability.independent_check.joints import Joints
 from bemkit.studies.stability.independent_check.nodes import distance_to, mean_normals
 from bemkit.studies.stability.independent_check.sides import measure_flat, sampled_overlap
 
+_SAMPLED = 1.1
+"""How much deeper an overlap may be found at other points of the same elements."""
+
+_DIRECTIONS = 1e-2
+"""Angle [rad] by which directions of contact on curved sides may differ: a body that spins moves along them."""
+
 
 def gap_mismatch(joints: Joints) -> float:
     """Return the largest difference [-] of gaps from distances measured again."""
@@ -69,13 +75,27 @@ def mean_mismatch(joints: Joints) -> float:
     return float(np.max(worst))
 
 
-def hidden_overlap(joints: Joints) -> float:
-    """Return how deep points of one side are in the other one, over the displacement that strains the bodies."""
-    worst = [0.0]
+def hidden_overlaps(joints: Joints) -> tuple[float, float]:
+    """Return how deep points of one side are in the other one, over the displacement that strains the bodies.
+
+    Returns
+    -------
+    float
+        The deepest of all.
+    float
+        How much deeper they are than the solution says of its contact.
+    """
+    deepest, unsaid = [0.0], [0.0]
     for pair in joints.pairs.values():
         one, two = (joints.side(name) for name in pair.sides)
         flat = measure_flat(one, two, pair.gap)
         reach = 0.25 * min(one.body.result.mesh.diameter, two.body.result.mesh.diameter)
         overlap = sampled_overlap(one, two, pair.gap, reach) if flat is None else flat.overlap
-        worst.append(overlap / max(one.body.scales.length, two.body.scales.length))
-    return float(np.max(worst))
+        length = max(one.body.scales.length, two.body.scales.length)
+        said = joints.solution.contacts_between_nodes[pair.name].penetration_depth
+        moved = max(float(np.abs(side.body.result.boundary.displacement).max()) for side in (one, two))
+        coordinates = 64.0 * EPSILON * float(np.abs(one.body.result.mesh.nodes).max())
+        allowed = coordinates + (0.0 if flat is not None else _DIRECTIONS * moved)
+        deepest.append(overlap / length)
+        unsaid.append(beyond(np.array([overlap - _SAMPLED * said]), allowed, length))
+    return float(np.max(deepest)), float(np.max(unsaid))

@@ -16,6 +16,8 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.studies.stability.independent_check.bodies import MeasuredBody
 
 _PARALLEL = 1e-9
+_SLIVER = 1e-9
+"""Share of the common length of two sides below which a piece of it is round-off."""
 _STEP = 1e-4
 """Difference of local coordinates by which slopes are taken."""
 _N_SAMPLES = 33
@@ -101,9 +103,13 @@ def measure_flat(one: Side, two: Side, gap: float) -> Relative | None:
     low = max(float(np.min(place)) for place in places)
     high = min(float(np.max(place)) for place in places)
     knots = np.unique(np.concatenate([np.concatenate(p) for p in places]))
-    knots = np.concatenate([[low], knots[(knots > low) & (knots < high)], [high]])
     if not high > low:
         return None
+    # ends of both sides that differ by round-off are one
+    beside = _SLIVER * (high - low)
+    knots = knots[(knots > low + beside) & (knots < high - beside)]
+    knots = knots[np.diff(knots, prepend=low) > beside]
+    knots = np.concatenate([[low], knots, [high]])
     xi, weights = np.polynomial.legendre.leggauss(12)
     half = 0.5 * np.diff(knots)[:, None]
     at = (knots[:-1, None] + half * (1.0 + xi)).ravel()

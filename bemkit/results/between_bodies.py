@@ -1,0 +1,173 @@
+"""How far the bodies of a solved assembly violate the contact conditions between the nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bemkit.contact.condensation.nodes import contact_frame
+from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.mortar.projection import mean_directions
+from bemkit.contact.mortar.segments import common_refinement, facing_points
+from bemkit.contact.mortar.sides import ContactSide
+from bemkit.contact.slip_history import SlipHistory
+from bemkit.model.assembled.contacts import carries_multipliers, reach_of
+from bemkit.results.between_nodes import (
+    BetweenNodes,
+    PointsBetween,
+    displacement_at,
+    law_between,
+    points_at_obstacle,
+    points_between,
+    traction_at,
+    violations_at,
+)
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.rigid_result import RigidResult
+from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.assembly import Assembly, ContactPair
+from bemkit.scene.conditions import Contact
+from bemkit.scene.rigid_body import RigidBody
+
+_LIGHTEST = 1e-3
+"""A body that carries less than this share of what the others carry is measured by this share."""
+
+
+class _Measured(NamedTuple):
+    """A contact of an assembly, the elastic bodies that it joins, its law, and points of it."""
+
+    name: str
+    bodies: tuple[str, ...]
+    law: FrictionLaw
+    values: PointsBetween
+
+
+def violations_between_bodies(
+    assembly: Assembly,
+    bodies: Mapping[str, SolvedBody],
+    rigid: Mapping[str, RigidResult],
+    contact: ContactTable,
+    motion: SlipHistory | None = None,
+) -> dict[str, BetweenNodes]:
+    """Measure displacements and tractions of an assembly along its contacts, without running anything again.
+
+    Parameters
+    ----------
+    assembly : Assembly
+    bodies : mapping of str to SolvedBody
+        By name.
+    rigid : mapping of str to RigidResult
+        By name.
+    contact : ContactTable
+    motion : SlipHistory, optional
+        Of the contact nodes, for laws that depend on slip or time.
+
+    Returns
+    -------
+    dict of str to BetweenNodes
+        By contact of the table.
+
+    Notes
+    -----
+    Points of the pieces on which the functions of both sides are smooth, where they face each other along the mean of
+    both normals: tractions of both sides against the one clearance. Each contact is measured by the one of its bodies
+    that carries less, and lengths by the softer of them, so that a light block is not judged by the heaviest.
+    """
+    with np.errstate(all="ignore"):  # results that are not finite are measured by nan
+        stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies)]
+    forces = {name: 0.0 for name in bodies}
+    stresses = dict(forces)
+    size = np.hypot(contact.sigma_n, contact.sigma_t)
+    for name, partners, _, _ in stated:
+        rows = contact.rows(name)
+        for body in partners:
+            forces[body] += float(contact.weight[rows] @ size[rows])
+            stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
+    found: dict[str, BetweenNodes] = {}
+    longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies.values())
+    for name, partners, law, values in stated:
+        modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
+        force, stress = (
+            max(min(of[body] for body in partners), _LIGHTEST * max(of.values())) for of in (forces, stresses)
+        )
+        with np.errstate(all="ignore"):  # results that are not finite are measured by nan
+            found[name] = violations_at(
+                values,
+                law_between(law, values, contact, name, motion),
+                stress or 1.0,
+                force / modulus or longest or 1.0,
+            )
+    return found
+
+
+def _at_obstacles(
+    assembly: Assembly, bodies: Mapping[str, SolvedBody], rigid: Mapping[str, RigidResult]
+) -> Iterator[_Measured]:
+    """Yield the contacts with rigid obstacles, fixed and moving; each point belongs to the one that is nearest."""
+    stated: dict[str | None, RigidBody] = {body.name: body for body in assembly.rigid}
+    moving: dict[str, list[ContactPair]] = {}
+    for pair in assembly.contacts:
+        if pair.rigid_body is not None:
+            moving.setdefault(pair.elastic_sides[0].split(".", 1)[0], []).append(pair)
+    for owner, body in bodies.items():
+        scene = body.scene
+        facing: dict[str, list[_Measured]] = {}
+        for part in scene.parts:
+            if isinstance(part.condition, Contact):
+                values = points_at_obstacle(body, part.condition.obstacle, body.mesh.part(part.name))
+                name = f"{owner}.{part.name}"
+                facing.setdefault(part.name, []).append(_Measured(name, (owner,), scene.laws[part.name], values))
+        for pair in moving.get(owner, ()):
+            part_name = pair.elastic_sides[0].split(".", 1)[1]
+            values = points_at_obstacle(body, stated[pair.rigid_body].obstacle, body.mesh.part(part_name))
+            motion = rigid[str(pair.rigid_body)]
+            moved = stated[pair.rigid_body].motions_at(values.points) @ np.array([motion.x, motion.y, motion.turn])
+            clearance = values.clearance + pair.gap + np.sum(moved * values.directions, axis=1)
+            values = values._replace(clearance=clearance)
+            facing.setdefault(part_name, []).append(_Measured(pair.name, (owner,), assembly.law_of(pair), values))
+        for rivals in facing.values():
+            nearest = np.argmin([each.values.clearance for each in rivals], axis=0)
+            for k, each in enumerate(rivals):
+                yield each._replace(values=each.values.take(nearest == k))
+
+
+def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator[_Measured]:
+    """Yield the contacts between elastic bodies, the tractions of both sides one after the other."""
+    for pair in assembly.elastic_contacts:
+        names = [side.split(".", 1) for side in pair.sides]
+        bodies = [solved[name] for name, _ in names]
+        spaces = [body.scene.discretisation.displacement_space(body.mesh) for body in bodies]
+        one, two = (
+            ContactSide(space, body.mesh.part(part))
+            for space, body, (_, part) in zip(spaces, bodies, names, strict=True)
+        )
+        if not carries_multipliers(pair, one, two):
+            one, two, bodies = two, one, bodies[::-1]
+        reach = reach_of(pair, bodies[0].mesh, bodies[1].mesh)
+        law, partners = assembly.law_of(pair), tuple(name for name, _ in names)
+        yield _Measured(pair.name, partners, law, _facing(bodies, one, two, pair.gap, reach))
+
+
+def _facing(
+    bodies: Sequence[SolvedBody], one: ContactSide, two: ContactSide, gap: float, reach: float
+) -> PointsBetween:
+    """Return what is known at points of two sides, with the tractions of the first and then those of the second."""
+    directions = mean_directions(one, two, reach)
+    segments = common_refinement(one, two, directions, reach)
+    xi = points_between(max(one.space.degree, two.space.degree))
+    places = facing_points(segments, one, two, directions, xi, np.ones_like(xi))
+    (first, xi), (second, eta) = (one.elements[places.row], places.xi), (two.elements[places.partner], places.eta)
+    along = np.asarray(one.directions(directions, places.row, xi)).reshape(-1, 2)
+    apart = places.gap - displacement_at(bodies[0], first, xi) + displacement_at(bodies[1], second, eta)
+    before, half = np.cumsum(one.lengths) - one.lengths, 0.5 * one.lengths[places.row, None]
+    traction = np.concatenate([traction_at(bodies[0], first, xi), -traction_at(bodies[1], second, eta)])
+    both = np.tile(along, (2, 1))
+    return PointsBetween(
+        np.tile(one.points(places.row, xi).reshape(-1, 2), (2, 1)),
+        np.tile((before[places.row, None] + half * (1.0 + xi)).ravel(), 2),
+        both,
+        np.tile(gap + np.sum(apart.reshape(-1, 2) * along, axis=1), 2),
+        *np.einsum("nkc,nc->kn", contact_frame(both), traction.reshape(-1, 2)),
+    )

@@ -1,0 +1,255 @@
+"""What results of one body and of several have in common: how the solve ended, and all steps that led there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from bemkit.contact.certificate import Certificate
+from bemkit.contact.slip_history import SlipHistory
+from bemkit.notebook import ShownInNotebooks
+from bemkit.operators.counts import OperationCounts
+from bemkit.plan import Plan
+from bemkit.results.between_nodes import BetweenNodes
+from bemkit.results.contact_table import ContactTable, Transition
+from bemkit.results.load_history import LoadHistory, at_step, step_rows
+from bemkit.scene.unit_names import UnitNames
+from bemkit.solvers.base import Status, StepRecord
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from bemkit.scene.assembly import Assembly
+    from bemkit.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SolvedProblem(ShownInNotebooks):
+    """How a scene or an assembly was solved.
+
+    Parameters
+    ----------
+    status : Status
+    certificate : Certificate
+    contact : ContactTable
+    history : tuple of StepRecord
+    linear_solves, outer_steps : int
+    transitions : tuple of Transition
+    timings : mapping of str to float [s]
+        Of each stage of the run, and of all.
+    plan : Plan
+    work : OperationCounts
+        What was computed; equal to ``plan.work`` if all load steps converged.
+    message : str
+        How the solver ended.
+    memory : mapping of str to int [bytes]
+        Largest memory of all arrays in each stage of the run; empty unless `tracemalloc` was tracing.
+    warnings : tuple of str
+        What is doubtful about the result, one sentence each; see `bemkit.results.warnings`.
+    loading : LoadHistory, optional
+        Of a load history the steps up to this one.
+    """
+
+    status: Status
+    certificate: Certificate
+    contact: ContactTable
+    history: tuple[StepRecord, ...]
+    linear_solves: int
+    outer_steps: int
+    transitions: tuple[Transition, ...]
+    timings: Mapping[str, float]
+    plan: Plan
+    work: OperationCounts
+    message: str = ""
+    memory: Mapping[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    loading: LoadHistory | None = None
+
+    if TYPE_CHECKING:  # fields of the one kind, properties of the other
+
+        @property
+        def n_elements(self) -> int:
+            """Number of elements."""
+
+        @property
+        def energy(self) -> float:
+            """Elastic energy [J/m]."""
+
+    @property
+    def _problem(self) -> Scene | Assembly:
+        """What was solved; of a load history that of its last step."""
+        raise NotImplementedError
+
+    def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
+        """Return what is measured between the nodes of each contact, with their slip for laws that depend on it."""
+        raise NotImplementedError
+
+    def _sizes(self) -> dict[str, int]:
+        """Return what the summary counts besides elements and contact nodes."""
+        return {}
+
+    def _parts(self) -> dict[str, Any]:
+        """Return what the summary says of bodies, parts and contacts."""
+        raise NotImplementedError
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether the result is what was asked for: certified, and as accurate as an accuracy demands."""
+        return self.status is Status.CONVERGED
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether contact, friction and equilibrium hold on the mesh, be it fine enough for the accuracy or not."""
+        return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
+
+    def at_step(self, number: int) -> Self:
+        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
+        return at_step(self, number)
+
+    @property
+    def units(self) -> UnitNames | None:
+        """Names of units, if what was solved has them."""
+        return self._problem.units
+
+    @property
+    def title(self) -> str:
+        """The title of what was solved."""
+        return self._problem.title
+
+    @property
+    def status_words(self) -> str:
+        """How the solve ended, in lower case."""
+        return self.status.name.lower().replace("_", " ")
+
+    @cached_property
+    def between_nodes(self) -> BetweenNodes | None:
+        """Largest violations of the contact conditions between the nodes, of which the certificate says nothing.
+
+        None without contact.
+        """
+        return BetweenNodes.largest(self.contacts_between_nodes.values())
+
+    @cached_property
+    def contacts_between_nodes(self) -> dict[str, BetweenNodes]:
+        """The same of each contact, by the name in the contact table."""
+        return self._measured_between(None if self.loading is None else self.loading.motion)
+
+    def with_warnings(self, warnings: tuple[str, ...]) -> Self:
+        """Return the same solution with other warnings, and with all that has been estimated of it."""
+        result = copy(self)
+        object.__setattr__(result, "warnings", warnings)
+        return result
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result without its fields, under the stable names of the JSON output.
+
+        Returns
+        -------
+        dict
+            ``title``, ``units`` (names, None without), ``status`` (a word), ``message`` (how the solver ended),
+            ``converged``, ``certified``, ``warnings``, ``n_bodies`` (of an assembly),
+            ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
+            of one body ``estimated_traction_error`` (the same), ``parts`` (resultants of the tractions on each part)
+            and ``contacts`` (what each contact part feels), of an assembly ``contacts``, ``bodies`` and ``rigid``,
+            ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
+            ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`).
+        """
+        numbers = ("linear_solves", "outer_steps", "force_normal", "force_tangential", "energy", "estimated_error")
+        return {
+            "title": self.title,
+            "units": None if self.units is None else self.units.as_dict(),
+            "status": self.status.name.lower(),
+            "message": self.message or self.status.value,
+            "converged": self.is_converged,
+            "certified": self.is_certified,
+            "warnings": list(self.warnings),
+            **self._sizes(),
+            "n_elements": self.n_elements,
+            "n_contact": self.contact.n_contact,
+            **{name: getattr(self, name) for name in numbers},
+            **self._parts(),
+            "transitions": [transition.as_dict() for transition in self.transitions],
+            "certificate": self.certificate.as_dict(),
+            "between_nodes": None if self.between_nodes is None else self.between_nodes.as_dict(),
+            "timings": dict(self.timings),
+            "plan": self.plan.as_dict(),
+            "work": self.work.as_dict(),
+            "memory": dict(self.memory),
+            "steps": step_rows(self.loading),
+        }
+
+
+AnySolution = TypeVar("AnySolution", bound="SolvedProblem")
+
+
+def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Sequence[str]) -> AnySolution:
+    """Return a solution with the steps, linear solves, times and memory of all that led to it, in their order.
+
+    The names say what each of them is, for the remarks of its steps: "load step 1 of 3".
+    """
+    records: list[StepRecord] = []
+    for name, solution in zip(names, solutions, strict=True):
+        first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
+        for record in solution.history:
+            message = "; ".join(filter(None, (name, record.message)))
+            total = spent + record.linear_solves
+            records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
+    return replace(
+        with_times(result, solutions),
+        history=tuple(records),
+        linear_solves=sum(solution.linear_solves for solution in solutions),
+        outer_steps=sum(solution.outer_steps for solution in solutions),
+    )
+
+
+def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolution:
+    """Return a solution with the times and the memory of all that led to it."""
+    return replace(
+        result,
+        timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
+        memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
+    )
+
+
+def following(
+    so_far: AnySolution | None, solution: AnySolution, asked: Scene | Assembly, number: int, n_steps: int
+) -> AnySolution:
+    """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
+
+    Of warnings that differ in numbers alone the last one stands for all; `at_step` keeps those of a step.
+
+    Parameters
+    ----------
+    so_far : Solution or AssemblySolution, optional
+        What this function returned for the step before.
+    solution : Solution or AssemblySolution
+        Of the step.
+    asked : Scene or Assembly
+        With all steps.
+    number, n_steps : int
+        Of the step, counted from 1, and of all.
+    """
+    if n_steps == 1:
+        return solution
+    name = f"load step {number} of {n_steps}"
+    before = () if so_far is None else (so_far,)
+    total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
+    warnings = unlike((*solution.warnings, *(text for each in before for text in each.warnings)))
+    loading = None if solution.loading is None else replace(solution.loading, asked=asked)
+    message = f"{name}: {solution.message}"
+    whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
+    return whole
+
+
+def unlike(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return the first of all sentences that differ in numbers, and in what else these count, alone."""
+    first: dict[str, str] = {}
+    for text in texts:
+        kind = re.sub(r", and \d+ more [a-z]+ like it|(?<=node)s|\d+(\.\d+)?(e[-+]?\d+)?", "", text)
+        first.setdefault(kind, text)
+    return tuple(first.values())
