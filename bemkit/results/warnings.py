@@ -56,8 +56,15 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
     return (*solution.plan.warnings, *chain(*doubts))
 
 
-def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
-    """Say what is doubtful about a solution of several bodies; see `find_warnings`. Of many alike doubts, the first."""
+def find_assembly_warnings(solution: AssemblySolution, unevenness: FloatArray) -> tuple[str, ...]:
+    """Say what is doubtful about a solution of several bodies; see `find_warnings`. Of many alike doubts, the first.
+
+    Parameters
+    ----------
+    solution : AssemblySolution
+    unevenness : (n_contact,) array [m]
+        How much less than its mean the gap is somewhere on the elements at a contact node.
+    """
     if not solution.is_certified:
         return solution.plan.warnings
     smooth = {pair.name for pair in solution.assembly.contacts if solution.assembly.law_of(pair).is_frictionless}
@@ -67,6 +74,7 @@ def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
         (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
         _narrow_zones(solution.contact, smooth, remedy),
+        _unseen_contacts(solution.contact, unevenness, remedy),
     ]
     return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
 
@@ -206,6 +214,20 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
             if narrow:
                 reported[np.concatenate(narrow)] = True
                 yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
+
+
+def _unseen_contacts(contact: ContactTable, unevenness: FloatArray, remedy: str) -> Iterator[str]:
+    """Doubt open contacts whose sides overlap between nodes: gaps there are means, which coarse elements round up."""
+    is_open = np.array(contact.status_words(), dtype=object) == "separated"
+    for part in contact.parts:
+        own = contact.rows(part)
+        depth = (unevenness - contact.clearance)[own]
+        if is_open[own].all() and depth.max() > _CLOSED * unevenness.max():
+            s = float(contact.s[own][np.argmax(depth)])
+            yield (
+                f"Contact {part!r} is open at its nodes, but between them, near s = {s:.4g}, the sides overlap by "
+                f"{depth.max():.2g}: {remedy.replace('more elements', 'more elements there')}."
+            )
 
 
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:

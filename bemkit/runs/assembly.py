@@ -185,7 +185,7 @@ def assembly_solution(
         message=result.message,
         rigid=rigid,
     )
-    return replace(solution, warnings=find_assembly_warnings(solution))
+    return replace(solution, warnings=find_assembly_warnings(solution, prepared.column("unevenness")))
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

@@ -72,10 +72,29 @@ def test_large_rotations_are_warned_of() -> None:
 def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None:
     solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
     assert isinstance(solution, bk.AssemblySolution)
-    assert not any(LARGE in words for words in find_assembly_warnings(solution))
+    even = np.zeros(solution.contact.n_contact)
+    assert not any(LARGE in words for words in find_assembly_warnings(solution, even))
     monkeypatch.setattr(warnings_module, "LARGEST_STRAIN", 1e-4)
-    doubts = [words for words in find_assembly_warnings(solution) if LARGE in words]
+    doubts = [words for words in find_assembly_warnings(solution, even) if LARGE in words]
     assert [words.split(":")[0] for words in doubts] == [f"Body '{name}'" for name in solution.bodies]
+
+
+@pytest.mark.parametrize(("elements", "approach", "is_unseen"), [(8, 2e-4, True), (8, -2e-4, False), (96, 2e-4, False)])
+def test_contact_that_falls_between_coarse_nodes_is_warned_of(elements: int, approach: float, is_unseen: bool) -> None:
+    scene = with_overrides(load_scene("two-cylinders"), elements=elements, discretisation="linear")
+    assert isinstance(scene, bk.Assembly)
+    upper, lower = scene.bodies
+    pushed, tip = upper.parts
+    pushed = dataclasses.replace(pushed, condition=PrescribedDisplacement(x=0.0, y=-approach))
+    solution = run(dataclasses.replace(scene, bodies=(dataclasses.replace(upper, parts=(pushed, tip)), lower)))
+    assert solution.is_converged
+    is_open = (solution.contact.status == NodeStatus.SEPARATED).all()
+    assert is_open == (is_unseen or approach < 0.0)
+    doubts = [words for words in solution.warnings if "is open at its nodes, but between them" in words]
+    assert len(doubts) == is_unseen
+    assert not doubts or doubts[0].endswith(
+        "the sides overlap by 0.0002: use more elements there, or give an accuracy."
+    )
 
 
 def test_a_file_keeps_warnings(tmp_path: Path, solution: Solution) -> None:

@@ -50,6 +50,8 @@ class MortarCoupling:
         Positive: ``int psi_i`` over the covered part of the non-mortar side.
     gap : (n,) array [m]
         Mean of the distance along d, weighted by psi_i.
+    unevenness : (n,) array [m]
+        How much less than this mean the smallest distance on the elements at the node is.
     overlap : float [m]
         How deep the sides lie in each other at the deepest place, not a mean; zero if they do not.
     deepest : (2,) array [m]
@@ -68,6 +70,7 @@ class MortarCoupling:
     frame: FloatArray
     weights: FloatArray
     gap: FloatArray
+    unevenness: FloatArray
     overlap: float
     deepest: FloatArray
     facing: FloatArray
@@ -175,6 +178,8 @@ def _integrate(
     distance[np.abs(distance) <= max(side.resolution, mortar.resolution)] = 0.0
     depth = -np.einsum("sqc,sqc->sq", quadrature.gap, side.directions(directions, quadrature.row, quadrature.xi))
     piece, place = np.divmod(int(np.argmax(depth)), depth.shape[1])
+    nearest = np.full(dofs.size, np.inf)
+    np.minimum.at(nearest, number_of[quadrature.row], -depth.max(axis=1)[:, None])
     coupling = MortarCoupling(
         nodes=dofs[order],
         points=side.points(element, xi)[:, 0],
@@ -182,6 +187,7 @@ def _integrate(
         frame=np.stack([direction, np.stack([-direction[:, 1], direction[:, 0]], axis=1)], axis=1),
         weights=nodal_weights,
         gap=distance,
+        unevenness=distance - nearest[order],
         overlap=max(float(depth[piece, place]), 0.0),
         deepest=side.points(quadrature.row[[piece]], quadrature.xi[piece, [place]])[0, 0],
         facing=np.einsum("nc,nc->n", direction, side.directions(side.normals, element, xi)[:, 0]),

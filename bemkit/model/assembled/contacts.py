@@ -56,6 +56,8 @@ class ContactRows:
     frame : (n, 2, 2) array
         Direction of contact, out of the body, and tangent.
     weights, gap : (n,) arrays [m]
+    unevenness : (n,) array [m]
+        How much less than `gap`, where that is a mean, the smallest gap on the elements at the node is.
     on_body : sparse (n, n_nodes) array
         The relative displacement of row i is ``frame[i] @ (on_body[i] @ u - on_other[i] @ u_other)``.
     on_other : sparse (n, n_nodes) array, (n, 2, 3) array or None
@@ -77,6 +79,7 @@ class ContactRows:
     frame: FloatArray
     weights: FloatArray
     gap: FloatArray
+    unevenness: FloatArray
     on_body: sparse.csr_array
     on_other: sparse.csr_array | FloatArray | None
     elements: IntArray
@@ -168,6 +171,7 @@ def body_rows(
             coupling.frame,
             coupling.weights,
             coupling.gap + pairs[k].gap,
+            coupling.unevenness,
             sparse.csr_array(coupling.on_non_mortar),
             sparse.csr_array(coupling.on_mortar),
             side.elements,

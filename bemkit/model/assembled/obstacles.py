@@ -63,6 +63,7 @@ def obstacle_rows(
                 nodes.frame,
                 nodes.weights * body.mesh.diameter,
                 gap,
+                np.zeros(gap.size),
                 sparse.csr_array((np.ones(nodes.nodes.size), where), shape),
                 on_other,
                 body.part_elements(part),
