@@ -81,6 +81,11 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     allowed = np.where(_of_curves(mesh, is_analytic)[curved], UNRESOLVED * noise, FOLLOWED)
     is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > allowed[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
+    # what is left of a series meets the nodes again: between tiny elements a gap of the noise would be a crack
+    ends = np.column_stack([series.sum(axis=1), series @ (-1.0) ** np.arange(series.shape[1])])
+    mismatch = local[:, [0, -1]] - ends
+    series[:, 0] += 0.5 * (mismatch[:, 0] + mismatch[:, 1])
+    series[:, 1] += 0.5 * (mismatch[:, 0] - mismatch[:, 1])
     n_powers = int(degree.max()) + 1
     about_centre = np.zeros((n_powers, mesh.n_elements), complex)
     about_centre[1] = 1.0

@@ -80,6 +80,16 @@ def test_curved_bodies_far_away_are_what_they_are_at_home(elements: int) -> None
     assert "times its size from the origin" in rows[-1].message
 
 
+def test_a_case_that_cannot_be_made_is_a_named_row_and_the_sweep_goes_on() -> None:
+    def make(baseline: bk.Solution, value: float) -> Case:
+        return Case(value, dataclasses.replace(baseline.scene, material=bk.Material(value, 0.3)))
+
+    bad, good = sweep(small_paper_scene(1), [Axis("modulus", "modulus", "any", (-1.0, 1e4), make)])
+    assert (bad.verdict, bad.status) == ("named", "refused")
+    assert "youngs_modulus is -1" in bad.message
+    assert good.verdict == "right"
+
+
 def test_answers_approach_the_incompressible_one_smoothly() -> None:
     axis = dataclasses.replace(shortened("poisson-ratio"), values=(0.49, 0.499, 0.4999, 0.49999))
     drifts = [row.drift for row in sweep(small_paper_scene(1), [axis])]
