@@ -31,7 +31,7 @@ class PolygonalObstacle:
     Notes
     -----
     At a corner that a point is nearest to, contact acts along the line from the point to the corner; a point inside is
-    pushed out through the nearest side.
+    pushed out through the nearest side, the first one of several that are equally near.
     """
 
     vertices: tuple[tuple[float, float], ...]
@@ -72,16 +72,21 @@ class PolygonalObstacle:
         offset = start - points[:, None, :]
         share = np.clip(-np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
         to_side = offset + share[:, :, None] * along
-        rows, nearest = np.arange(len(points)), np.argmin(np.sum(to_side**2, axis=2), axis=1)
+        distance, is_beside = np.hypot(*np.moveaxis(to_side, -1, 0)), (share > 0.0) & (share < 1.0)
+        # in the middle of a wedge round-off shall not decide through which side
+        is_as_near = distance <= distance.min(axis=1, keepdims=True) + self._round_off(points)
+        rows, nearest = np.arange(len(points)), np.argmin(np.where(is_as_near & is_beside, -1.0, distance), axis=1)
         unit = along[nearest] / np.hypot(*along[nearest].T)[:, None]
-        chosen = share[rows, nearest]
-        return to_side[rows, nearest], np.stack([-unit[:, 1], unit[:, 0]], axis=1), (chosen > 0.0) & (chosen < 1.0)
+        return to_side[rows, nearest], np.stack([-unit[:, 1], unit[:, 0]], axis=1), is_beside[rows, nearest]
 
     def _is_at_corner(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: points so near to a corner that round-off decides which of its sides is nearest."""
         corners = np.array(self.vertices, dtype=float)
         distance = np.hypot(*np.moveaxis(corners - points[:, None], -1, 0))
-        return np.asarray(distance.min(axis=1) <= _ROUND_OFF * np.abs(np.concatenate([corners, points])).max())
+        return np.asarray(distance.min(axis=1) <= self._round_off(points))
+
+    def _round_off(self, points: FloatArray) -> float:
+        return _ROUND_OFF * float(np.abs(np.concatenate([np.array(self.vertices, dtype=float), points])).max())
 
     def _holds(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: points inside, by the number of sides that a ray to the right crosses."""

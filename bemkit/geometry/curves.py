@@ -14,6 +14,7 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
 
+_SAMPLES = np.linspace(0.0, 1.0, 17)
 _N_CHECK_INTERVALS = 8
 _N_CHECK_POINTS = 8
 _DERIVATIVE_TOLERANCE = 1e-2  # catches a wrong sign, factor or component; forgives the quadrature of a rough curve
@@ -140,6 +141,11 @@ class Arc:
         speed = self.radius * (self.end_angle - self.start_angle)
         return speed * np.column_stack([-np.sin(angle), np.cos(angle)])
 
+    @property
+    def magnitude(self) -> float:
+        """Largest length that its evaluation meets [m]; see `magnitude`."""
+        return float(np.abs(self.centre).max()) + self.radius
+
     def _angle(self, s: FloatArray) -> FloatArray:
         angle: FloatArray = (1.0 - s) * self.start_angle + s * self.end_angle
         return angle
@@ -247,6 +253,12 @@ class MovedCurve:
         derivative: FloatArray = self.curve.derivative(self._parameter(s)) * np.array(self.factor)
         return -derivative if self.is_reversed else derivative
 
+    @property
+    def magnitude(self) -> float:
+        """Largest length that its evaluation meets [m]; see `magnitude`."""
+        before = magnitude(self.curve) + float(np.abs(self.shift).max())
+        return before * float(np.abs(self.factor).max())
+
     def _parameter(self, s: FloatArray) -> FloatArray:
         return 1.0 - s if self.is_reversed else s
 
@@ -256,6 +268,16 @@ def is_analytic(curve: Curve) -> bool:
     while (original := getattr(curve, "curve", None)) is not None:
         curve = original
     return bool(getattr(curve, "is_analytic", True))
+
+
+def magnitude(curve: Curve) -> float:
+    """Return the largest length [m] met when a curve is evaluated: its points are known to eps times that.
+
+    A curve that has been moved keeps the round-off of where it was. Such curves say so by a property of this name; of
+    others, which need none, points tell.
+    """
+    stated = getattr(curve, "magnitude", None)
+    return float(np.abs(curve.point(_SAMPLES)).max() if stated is None else stated)
 
 
 def reverse_curve(curve: Curve) -> Curve:

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
-from bemkit.geometry.curves import Curve, as_point
+from bemkit.geometry.curves import Curve, as_point, magnitude
 from bemkit.geometry.mesh import BoundaryMesh
 
 
@@ -106,3 +106,8 @@ class PlacedCurve:
     def derivative(self, s: FloatArray) -> FloatArray:
         """Differentiate the curve with respect to s."""
         return self.placement.turned(self.curve.derivative(s))
+
+    @property
+    def magnitude(self) -> float:
+        """Largest length that its evaluation meets [m]; see `bemkit.geometry.curves.magnitude`."""
+        return magnitude(self.curve) + float(np.abs(self.placement.shift).max())

@@ -333,7 +333,7 @@ def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Pre
     ValueError
         If the scene lacks its symmetry, or an expression is not finite somewhere.
     """
-    _check_position(mesh)
+    check_position(mesh)
     check_symmetry(scene, mesh)
     units = find_units(scene, mesh) if units is None else units
     space = scene.discretisation.displacement_space(mesh.unit)
@@ -358,13 +358,13 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
     return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
 
 
-def _check_position(mesh: BoundaryMesh) -> None:
-    """Refuse a body so far from the origin that its coordinates hold too few digits of its shape."""
+def check_position(mesh: BoundaryMesh, owner: str = "the body") -> None:
+    """Refuse a body so far from the origin that its coordinates hold too few digits of its shape; `owner` names it."""
     distance = float(np.abs(mesh.nodes).max()) / mesh.diameter
     if distance > _FARTHEST:
         x, y = mesh.centre.tolist()
         raise TooFarError(
-            f"the body lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
+            f"{owner} lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
             f"of its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
         )
 

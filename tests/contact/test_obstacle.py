@@ -20,6 +20,7 @@ from bemkit.contact.obstacle import (
 )
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.formulas import Expression
+from bemkit.studies.stability.independent_check.nodes import distance_to
 
 coordinates = st.floats(-10.0, 10.0)
 points = st.tuples(coordinates, coordinates)
@@ -231,3 +232,14 @@ def test_an_obstacle_of_ones_own_need_not_know_directions() -> None:
 def test_obstacles_check_what_they_are_given(make: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("off", [-1e-15, 0.0, 1e-15])
+def test_in_the_middle_of_a_wedge_the_first_side_counts_whatever_the_round_off(off: float) -> None:
+    wedge = PolygonalObstacle(((0.0, -1e-4), (0.3, 1.0), (-0.3, 1.0)))
+    at, up = np.array([[off, 0.0]]), np.array([[0.0, 1.0]])
+    side = np.array([0.3, 1.0001]) / np.hypot(0.3, 1.0001)
+    into_first = [-side[1], side[0]]
+    for gap, direction in (measure_contact(wedge, at, up), distance_to(wedge, at, up)):
+        np.testing.assert_allclose(gap, -1e-4 * side[0], rtol=1e-10)
+        np.testing.assert_allclose(direction[0], into_first, atol=1e-12)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
-from bemkit.geometry.meshing.transition import LARGEST_STRETCH, gradual_positions
+from bemkit.geometry.meshing.transition import ALIKE, LARGEST_STRETCH, gradual_positions
 
 sizes = st.floats(1e-6, 1e3)
 
@@ -27,6 +27,15 @@ def test_positions_increase_and_no_element_is_much_longer_than_the_mean(n: int, 
 @given(st.integers(1, 200), st.floats(0.84, 10.0), st.floats(0.84, 10.0))
 def test_neighbours_of_about_the_same_length_change_nothing(n: int, before: float, after: float) -> None:
     np.testing.assert_array_equal(gradual_positions(n, before / n, after / n), np.arange(n + 1) / n)
+
+
+@pytest.mark.parametrize("length", [1.0, 1.0 / ALIKE])
+def test_neighbours_as_long_up_to_round_off_are_settled_alike(length: float) -> None:
+    n = 8
+    shorter, longer = (gradual_positions(n, 0.2 / n, length * (1.0 + off) / n) for off in (-1e-9, 1e-9))
+    np.testing.assert_allclose(shorter, longer, atol=1e-8)
+    before, after = (gradual_positions(n, length * (1.0 + off) / n, np.inf) for off in (-1e-9, 1e-9))
+    np.testing.assert_allclose(before, after, atol=1e-8)
 
 
 @pytest.mark.parametrize("ratio", [4.0, 10.0, 100.0])

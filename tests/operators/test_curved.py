@@ -22,12 +22,14 @@ from bemkit.geometry import (
     ParametricCurve,
     PlateWithHole,
     Ring,
+    Sector,
     Segment,
     Side,
     Uniform,
     discretise,
 )
 from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.placement import Placement
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
@@ -281,6 +283,29 @@ def test_the_boundary_is_seen_under_half_a_turn(make: Callable[[], BoundaryMesh]
     # of the thin ring, a millionth of the coordinates' size apart, the angle is known to 1e-16 / 1e-3
     np.testing.assert_allclose(seen[0], expected * mesh.lengths, rtol=1e-12)
     np.testing.assert_allclose(seen[1], 0.0, atol=1e-12 * mesh.lengths.max())
+
+
+def test_tiny_curved_elements_leave_no_cracks_between_them() -> None:
+    mesh = discretise(Sector(1.0, -90.0, 0.0).outline(), n_elements=16)
+    for _ in range(25):
+        mesh = mesh.refined(np.unique(mesh.node_elements[corner_nodes(mesh)]))
+    assert mesh.lengths.min() < 1e-8
+    seen = swept(mesh).double[0, 0].sum(axis=1)
+    # coordinates hold 1e-16 / 1e-8 of the shape of an element, and gaps of that would be seen
+    np.testing.assert_allclose(seen, -0.5 * mesh.lengths, rtol=1e-13)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (3e5, -4e5), (6e6, 8e6)])
+def test_curves_are_known_to_the_round_off_of_where_they_were_evaluated(centre: tuple[float, float]) -> None:
+    distance = 1.0 + abs(centre[1])
+    at_home = discretise(Disk(0.5).outline(), n_elements=96)
+    drawn, placed = Disk(0.5, centre), Placement(centre, 30.0).mesh(at_home)
+    moved = BoundaryMesh.transformed(at_home, shift=(-centre[0], -centre[1]))
+    for far in (discretise(drawn.outline(), n_elements=96), placed, moved):
+        panels = Panels(far.unit)
+        assert panels.curved is not None
+        np.testing.assert_allclose(panels.half, Panels(at_home.unit).half, rtol=1e-13 * distance)
+        np.testing.assert_allclose(np.abs(panels.point(np.arange(96), 0.3)), 0.125**0.5, atol=1e-15 * distance)
 
 
 @pytest.mark.parametrize("make", MESHES.values(), ids=MESHES)

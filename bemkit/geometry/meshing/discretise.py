@@ -97,7 +97,8 @@ def share_elements(n_elements: int, lengths: FloatArray) -> IntArray:
         rest = lengths[~is_short]
         quota[~is_short] = (n_elements - np.count_nonzero(is_short)) * rest / rest.sum()
     quota[is_short] = 1.0
-    quota = np.round(quota, 9)  # halves that differ by round-off are ties, settled by the order of pieces
+    # halves that differ by round-off, which is large far from the origin, are ties: the order of pieces settles them
+    quota = np.round(quota, 6)
     counts: IntArray = np.floor(quota).astype(np.intp)
     by_remainder = np.argsort(counts - quota, kind="stable")
     counts[by_remainder[: n_elements - int(counts.sum())]] += 1

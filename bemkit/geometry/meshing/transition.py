@@ -16,6 +16,8 @@ ALIKE = 1.2
 """Ratio of two neighbouring element lengths up to which nothing is done."""
 GROWTH = 0.3
 """Growth of the element length per length of boundary, unless there are too few elements for so little."""
+TIE = 1e-6
+"""A neighbour has shorter elements if they are shorter by more than this share: lengths hold few digits far away."""
 LARGEST_STRETCH = 2.0
 """No element is longer than this many times the mean of its piece."""
 
@@ -41,9 +43,10 @@ def gradual_positions(n: int, before: float, after: float) -> FloatArray:
     and b are those of the neighbours: with constant tractions, twice that length at a roller costs the pressure there
     an order.
     """
-    if n == 1 or min(before, after) >= 1.0 / (ALIKE * n):
+    own = (1.0 - TIE) / n
+    if n == 1 or min(before, after) >= own / ALIKE:
         return np.arange(n + 1) / n
-    start, end = (length if length < 1.0 / n else LARGEST_STRETCH / n for length in (before, after))
+    start, end = (length if length < own else LARGEST_STRETCH / n for length in (before, after))
     growth = GROWTH
     while _count(LARGEST_STRETCH / n, start, end, growth) > n:
         growth *= 1.5

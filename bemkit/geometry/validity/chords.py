@@ -20,7 +20,7 @@ LARGEST_TURNING = np.pi / 4
 """Pieces are split until they turn by less, so that none can meet itself."""
 _N_TANGENTS = 9
 _TURNING_SAFETY = 1.25  # the turning is sampled, not bounded
-_MOST_SPLITS = 12  # a smooth side turns by less than LARGEST_TURNING on 1/4096 of its length
+_MOST_SPLITS = 24  # the tip of a thin ellipse turns on as little of its length as the square of its slenderness
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
 

@@ -13,7 +13,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.prepared import Units
+from bemkit.model.prepared import Units, check_position
 from bemkit.operators.material import Material
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
@@ -119,6 +119,8 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
     ------
     GeometryError
         If a body cannot be divided.
+    TooFarError
+        If a body lies more than 1e7 diameters from the origin.
     """
     divided: dict[int, BoundaryMesh] = {}
     placed = []
@@ -129,6 +131,8 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
         else:
             drawn = divided.setdefault(id(scene), divided.get(id(scene)) or _divided(scene, assembly, body))
         mesh = body.placement.mesh(drawn)
+        check_position(drawn, f"body {body.name!r}, where it is drawn,")
+        check_position(mesh, f"body {body.name!r}")
         placed.append(PlacedBody(body, scene, mesh, mesh if body.is_held else drawn))
     return tuple(placed)
 

@@ -13,14 +13,17 @@ quadrature [AfKlintebergBarnett2021], with remainders instead of swapped densiti
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from bemkit.geometry.curves import is_analytic
+from bemkit.geometry.curves import Curve, is_analytic, magnitude
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 
@@ -71,13 +74,18 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     places[:, 0], places[:, -1] = mesh.end[curved], mesh.start[curved]  # neighbours meet in the very same node
     local = ((places @ np.array([1.0, 1j])) - centre[curved, None]) * (tangent[curved].conj() / half[curved])[:, None]
     series = local @ to_series.T
-    # a short element is known to the round-off of its coordinates only: what is below that is noise
-    noise = ROUND_OFF * (1.0 + np.abs(places).max(axis=(1, 2)) / half[curved])
+    # a short element is known to the round-off of its coordinates where they were evaluated: what is below is noise
+    noise = ROUND_OFF * (1.0 + _of_curves(mesh, magnitude)[curved] / half[curved])
     is_noise = np.logical_and.accumulate((np.abs(series) <= noise[:, None])[:, ::-1], axis=1)[:, ::-1]
     degree = np.clip(series.shape[1] - 1 - is_noise.sum(axis=1), 1, MAX_DEGREE)
-    allowed = np.where(_is_analytic(mesh)[curved], UNRESOLVED * noise, FOLLOWED)
+    allowed = np.where(_of_curves(mesh, is_analytic)[curved], UNRESOLVED * noise, FOLLOWED)
     is_unresolved = (np.abs(series[:, MAX_DEGREE + 1 :]) > allowed[:, None]).any(axis=1)
     series[np.arange(series.shape[1]) > degree[:, None]] = 0.0
+    # what is left of a series meets the nodes again: between tiny elements a gap of the noise would be a crack
+    ends = np.column_stack([series.sum(axis=1), series @ (-1.0) ** np.arange(series.shape[1])])
+    mismatch = local[:, [0, -1]] - ends
+    series[:, 0] += 0.5 * (mismatch[:, 0] + mismatch[:, 1])
+    series[:, 1] += 0.5 * (mismatch[:, 0] - mismatch[:, 1])
     n_powers = int(degree.max()) + 1
     about_centre = np.zeros((n_powers, mesh.n_elements), complex)
     about_centre[1] = 1.0
@@ -95,10 +103,10 @@ def fit(mesh: BoundaryMesh, tangent: ComplexArray, half: FloatArray, centre: Com
     return CurvedPanels(about_centre, _shifted(about_centre, -1.0), _shifted(about_centre, 1.0), bend)
 
 
-def _is_analytic(mesh: BoundaryMesh) -> BoolArray:
-    """Tell of each element (n_elements,) whether its curve is smooth to all orders; straight ones are."""
-    of_curves = np.array([*(is_analytic(curve) for curve in mesh.curves), True])
-    return np.ones(mesh.n_elements, bool) if mesh.element_curve is None else of_curves[mesh.element_curve]
+def _of_curves(mesh: BoundaryMesh, ask: Callable[[Curve], Any]) -> NDArray[Any]:
+    """Return for each element (n_elements,) what its curve answers; of straight ones the answer means nothing."""
+    answers = np.array([ask(curve) for curve in mesh.curves])
+    return answers[mesh.element_curve]
 
 
 def _check(mesh: BoundaryMesh, curved: IntArray, bend: FloatArray, is_unresolved: BoolArray) -> None:

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from bemkit.errors import InputError
+from bemkit.errors import BemkitError, InputError
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
@@ -18,7 +18,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
-from bemkit.studies.engine import Attempt, Task, attempt, compute
+from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis, Baseline
 from bemkit.studies.stability.case import Case, Similarity
 from bemkit.studies.stability.independent_check import check_assembly, check_solution
@@ -72,7 +72,12 @@ def _tasks(axis: Axis[Baseline], baseline: Baseline) -> list[Task[StabilityRecor
     reference = cache(lambda: _reference(axis, baseline))
 
     def record(value: float) -> StabilityRecord:
-        return solve_and_judge(axis.name, axis.make(baseline, value), reference())
+        try:
+            case = axis.make(baseline, value)
+        except BemkitError as error:  # a body that cannot be, such as one that is stretched until it is flat
+            none = (math.nan,) * 6
+            return StabilityRecord(axis.name, value, Verdict.NAMED.value, REFUSED, 0, *none, 0.0, str(error))
+        return solve_and_judge(axis.name, case, reference())
 
     return [Task((axis.name, value), f"{axis.name} {value:.6g}", partial(record, value)) for value in axis.values]
 

@@ -5,6 +5,9 @@ import dataclasses
 import pytest
 
 from bemkit.errors import InputError
+from bemkit.geometry.placement import Placement
+from bemkit.model.prepared import TooFarError
+from bemkit.runs.run import run
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.studies.stability.assembly_axes import ASSEMBLY_AXES
@@ -59,9 +62,20 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
     assert row.drift < 1e-10
 
 
-def test_a_twin_that_is_not_similar_is_seen(pin):
-    from bemkit.runs.run import run
+def test_curved_bodies_far_away_are_what_they_are_at_home():
+    cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
+    (axis,) = find_axes(["position"], ASSEMBLY_AXES)
+    rows = list(sweep(cylinders, [dataclasses.replace(axis, values=(1.0, 1e6, 1e8))]))
+    assert [row.verdict for row in rows] == ["right", "right", "named"]
+    assert "body 'upper' lies" in rows[-1].message
+    upper, *others = cylinders.bodies
+    drawn_afar = dataclasses.replace(upper.shape, centre=(1e9, 0.0))
+    upper = dataclasses.replace(upper, shape=drawn_afar, placement=Placement((-1e9, 1.0)), parts=())
+    with pytest.raises(TooFarError, match="body 'upper', where it is drawn, lies"):
+        run(dataclasses.replace(cylinders, bodies=(upper, *others), contacts=()))
 
+
+def test_a_twin_that_is_not_similar_is_seen(pin):
     one, other = run(pin), run(dataclasses.replace(ASSEMBLY_TWIN, stress=1.0).apply(pin))
     assert difference(one, other, ASSEMBLY_TWIN) > 0.1
     assert difference(one, other, dataclasses.replace(ASSEMBLY_TWIN, stress=1.0)) < 1e-9

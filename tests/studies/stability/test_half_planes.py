@@ -84,6 +84,15 @@ def test_right_answers_pass(name: str) -> None:
     assert not check.needs_warning
 
 
+def test_round_off_along_a_motion_that_no_force_drives_is_no_imbalance() -> None:
+    floor = bk.Part("floor", bk.Contact(bk.Gap(direction=(-0.18173651760084097, 1.0))))
+    scene = replace(WAVY, parts=(floor,), law=bk.Coulomb(0.2), far=bk.FarField(force_x=0.0, force_y=3434.5553035285857))
+    solution = bk.run(replace(scene, mesh=bk.MeshOptions(elements=32)))
+    assert np.abs(solution.boundary.traction[:, 0]).max() > 0.0  # round-off, which alone would be all out of balance
+    assert check_solution(solution).worst <= 1e-11
+    assert changed(solution, scene=replace(scene, far=replace(scene.far, force_x=1.0))).equilibrium > 1e-5
+
+
 @pytest.mark.parametrize(
     "place",
     [np.linspace(0.0, 1.0, 30), np.cumsum(0.4 ** np.arange(12.0)), np.array([0.0, 1.0, 1.001, 1.5, 1.5001, 7.0])],

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.stability import sweep as sweep_module
 from bemkit.studies.stability.axes import AXES, Axis, UnknownAxisError, find_axes
@@ -65,6 +66,28 @@ def test_the_ends_of_every_axis_are_right_or_named(
             assert row.condition >= 1.0
         else:
             assert row.message
+
+
+@pytest.mark.parametrize("elements", [64, 65])
+def test_curved_bodies_far_away_are_what_they_are_at_home(elements: int) -> None:
+    # equal sides stay equal whatever the round-off of their lengths; curves are known to that of where they were
+    disc = with_overrides(load_scene("disc-between-plates"), elements=elements)
+    assert isinstance(disc, bk.Scene)
+    axis = dataclasses.replace(shortened("position"), values=(1.0, 1e4, 1e6, 1e8))
+    rows = list(sweep(disc, [axis]))
+    assert [row.verdict for row in rows] == ["right"] * 3 + ["named"]
+    assert rows[0].drift <= 1e-12
+    assert "times its size from the origin" in rows[-1].message
+
+
+def test_a_case_that_cannot_be_made_is_a_named_row_and_the_sweep_goes_on() -> None:
+    def make(baseline: bk.Solution, value: float) -> Case:
+        return Case(value, dataclasses.replace(baseline.scene, material=bk.Material(value, 0.3)))
+
+    bad, good = sweep(small_paper_scene(1), [Axis("modulus", "modulus", "any", (-1.0, 1e4), make)])
+    assert (bad.verdict, bad.status) == ("named", "refused")
+    assert "youngs_modulus is -1" in bad.message
+    assert good.verdict == "right"
 
 
 def test_answers_approach_the_incompressible_one_smoothly() -> None:

@@ -210,14 +210,14 @@ class Surface:
         return float(np.abs(self._fitted[1]).max()) / unit if unit > 0.0 else 0.0
 
     def imbalance(self) -> float:
-        """Return the work of tractions and of loads far away on the motions that these drive, over its size [-]."""
+        """Return the work of tractions and of loads far away on the motions that these drive, over that of all [-]."""
         worst = [0.0]
         for k in np.flatnonzero(self.far.is_driven):
-            work, load = self.force * self.motions[:, :, k], float(self.far.load[k])
-            size = (
-                float(np.abs(work).sum()) + abs(load) + self.trusted_force * float(np.abs(self.motions[..., k]).max())
-            )
-            worst.append(abs(float(work.sum()) + load) / size if size > 0.0 else 0.0)
+            motions, load = self.motions[:, :, k], float(self.far.load[k])
+            # by all forces: along a motion that none of them drives there is round-off alone
+            size = float(np.hypot(*self.force.T) @ np.hypot(*motions.T)) + abs(load)
+            size += self.trusted_force * float(np.abs(motions).max())
+            worst.append(abs(float(np.sum(self.force * motions)) + load) / size if size > 0.0 else 0.0)
         return max(worst)
 
     def energy_mismatch(self) -> float:

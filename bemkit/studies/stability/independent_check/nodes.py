@@ -187,8 +187,10 @@ def distance_to(obstacle: Obstacle, points: FloatArray, normals: FloatArray) -> 
 def _to_polygon(vertices: FloatArray, points: FloatArray, normals: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return distance and direction to the nearest side or corner of a polygon, side by side.
 
-    At a corner itself any direction between the normals of its sides is right; the body's normal is taken.
+    At a corner itself any direction between the normals of its sides is right; the body's normal is taken. Of sides
+    that are equally near inside, such as those of a wedge, the first one counts.
     """
+    round_off = _ROUND_OFF * np.abs(np.concatenate([vertices, points])).max()
     x, y = (vertices - vertices[0]).T
     if np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) < 0.0:
         vertices = vertices[::-1]
@@ -203,12 +205,13 @@ def _to_polygon(vertices: FloatArray, points: FloatArray, normals: FloatArray) -
         inward = np.array([-along[1], along[0]])
         place, beside = (points - start) @ along, np.abs((points - start) @ inward)
         is_beside = (place >= 0.0) & (place <= length)
+        is_beside &= beside < nearest - round_off
         _keep_nearer(nearest, direction, beside, np.broadcast_to(inward, points.shape), is_beside)
+    for start in vertices:
         to_start = np.hypot(*(start - points).T)
         sign = np.where(is_inside, -1.0, 1.0)[:, None]
         towards = sign * (start - points) / np.where(to_start > 0.0, to_start, 1.0)[:, None]
         _keep_nearer(nearest, direction, to_start, towards, to_start > 0.0)
-    round_off = _ROUND_OFF * np.abs(np.concatenate([vertices, points])).max()
     is_corner = np.hypot(*np.moveaxis(to_corners, -1, 0)).min(axis=1) <= round_off
     return np.where(is_inside, -nearest, nearest), np.where(is_corner[:, None], normals, direction)
 

@@ -19,7 +19,7 @@ def pressed_and_sheared(seed: int, index: int, scene: Scene) -> tuple[Scene, ...
     """
     draw = Draw(np.random.PCG64([seed, index, 2]))
     place_and_size = next((found for part in scene.parts if (found := shear_of(part))), None)
-    is_taken = scene.mesh.accuracy is not None or scene.symmetry is not None or len(scene.load_factors) > 1
+    is_taken = scene.mesh.accuracy is not None or scene.symmetry is not None or scene.load_factors != (1.0,)
     if is_taken or place_and_size is None or not scene.contact_parts or not draw.chance(0.12):
         return ()
     return (replace(scene, steps=sheared_steps(draw, *place_and_size)),)
