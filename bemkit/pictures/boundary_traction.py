@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.pictures.contact_axes import axes_with_strip
+from bemkit.pictures.contact_axes import axes_with_strip, cut_peaks
 from bemkit.pictures.traction_curves import boundary_curve
 from bemkit.results.drawing import BLUE, VERMILION, axes_or_new, label_values
 from bemkit.results.solution import Solution
@@ -24,7 +24,8 @@ _READABLE = 0.06
 def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
     """Draw the normal and the tangential traction along the boundary, above the parts it belongs to.
 
-    Closed curves of the boundary follow each other; a line marks where each of them begins.
+    Closed curves of the boundary follow each other; a line marks where each of them begins. Peaks that would flatten
+    all else are cut, and the picture says so.
 
     Parameters
     ----------
@@ -45,6 +46,7 @@ def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, unit
         axes.axvline(place, color="black", linewidth=0.8)
     scale = max(float(np.abs(each).max()) for each in (curve.normal, curve.tangential))
     label_values(axes, with_unit("traction", "stress", units), scale)
+    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units)
     _draw_parts(strip, solution, order.tolist(), ends.tolist())
     return axes
 

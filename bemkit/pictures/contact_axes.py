@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.pictures.shown import Result
 from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, axes_or_new
-from bemkit.scene.unit_names import UnitNames, with_unit
+from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +24,8 @@ SECOND: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": "
 LIMIT: Mapping[str, Any] = MappingProxyType({"color": "black", "linestyle": ":", "linewidth": 1.2})
 _MOST_LINES = 40
 """Places of change that lines mark; of a rough surface the strip of its status tells more than a forest of them."""
+_PEAKED, _SHORT = 2.5, 0.015
+"""How much larger the range of tractions must be than that on all but a short share of the length, and the share."""
 _NAMED = 0.12
 """Share of the length of a contact from which on a zone has room for its name."""
 
@@ -89,6 +91,35 @@ def _draw_status(strip: Axes, solution: Result, part: str) -> None:
         place = (1.0, -1.8)  # below the name of the abscissa
         strip.legend(handles=handles, loc="upper right", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
     strip.set_xlim(0.0, length)
+
+
+def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: UnitNames | None) -> None:
+    """Leave peaks out that flatten all else, such as those at corners, where tractions are infinite, and say so.
+
+    Parameters
+    ----------
+    axes : Axes
+    s : (n,) array [m]
+    curves : sequence of (n,) arrays [Pa]
+        Tractions there.
+    units : UnitNames or None
+    """
+    weights = np.gradient(s)
+    low, high, least, largest = 0.0, 0.0, 0.0, 0.0
+    for values in curves:
+        order = np.argsort(values)
+        share = np.cumsum(weights[order]) / weights.sum()
+        first, last = np.minimum(np.searchsorted(share, [_SHORT, 1.0 - _SHORT]), values.size - 1).tolist()
+        low, high = min(low, float(values[order[first]])), max(high, float(values[order[last]]))
+        least, largest = min(least, float(values.min())), max(largest, float(values.max()))
+    if largest - least <= _PEAKED * (high - low) or high == low:
+        return
+    margin = 0.25 * (high - low)
+    axes.set_ylim(max(least, low) - margin, min(largest, high) + margin)
+    cut = [(least, "down to", low - margin), (largest, "up to", high + margin)]
+    words = [f"{way} {amount(peak, 'stress', units)}" for peak, way, end in cut if abs(peak) > abs(end)]
+    note = f"peaks {' and '.join(words)} are cut"
+    axes.text(0.99, 0.02, note, transform=axes.transAxes, ha="right", va="bottom", fontsize=9)
 
 
 def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from bemkit.pictures.contact_axes import FIRST, LIMIT, SECOND, contact_axes, traction_scale
+from bemkit.pictures.contact_axes import FIRST, LIMIT, SECOND, contact_axes, cut_peaks, traction_scale
 from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.results.drawing import BLUE, VERMILION, label_values
@@ -20,7 +20,8 @@ def draw_contact_traction(
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`.
 
     Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
-    where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold.
+    where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold. Peaks
+    that would flatten all else are cut, and the picture says so.
     """
     axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
@@ -33,4 +34,5 @@ def draw_contact_traction(
         axes.plot(s, solution.friction_bound[chosen], label="friction bound", **LIMIT)
         axes.plot(s, -solution.friction_bound[chosen], **LIMIT)
     label_values(axes, with_unit("traction", "stress", units), traction_scale(solution))
+    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units)
     return axes

@@ -10,6 +10,7 @@ from enum import Enum
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -143,7 +144,8 @@ def energy_fault(step: Solution | AssemblySolution) -> str:
     work = last.work
     missing = work.external_work - (last.elastic_energy - energy) - work.dissipation - work.increment_work
     size = max(abs(value) for value in (last.elastic_energy, energy, *vars(work).values()))
-    allowed = LOST * size + ROUND_OFF * _work_of_motion(step)
+    ends = [cast(Solution | AssemblySolution, each.end) for each in step.loading.steps[-2:]]
+    allowed = LOST * size + ROUND_OFF * max(map(_work_of_motion, ends))
     if work.friction_gain > allowed:
         return f"friction acts along slip, which gives {work.friction_gain / size:.1e} of the work"
     if work.dissipation < 0.0:
