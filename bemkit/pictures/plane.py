@@ -52,10 +52,10 @@ def draw_bodies(axes: Axes, shown: Shown, factor: float) -> None:
         fill(axes, body, after, shown.frame)
 
 
-def draw_initial(axes: Axes, shown: Shown, *, is_filled: bool = False) -> None:
-    """Draw the bodies where they are before they move."""
+def draw_initial(axes: Axes, shown: Shown, *, is_filled: bool = False, factor: float = 0.0) -> None:
+    """Draw the bodies where they are before they move, or after a multiple of their displacement."""
     for body in shown.bodies:
-        loops = body.outlines(0.0)
+        loops = body.outlines(factor)
         for loop in loops:
             axes.plot(*loop.T, color=BLUE if is_filled else GREY, linewidth=1.2 if is_filled else 0.8, zorder=1.5)
         if is_filled:

@@ -14,7 +14,7 @@ from bemkit.errors import InputError
 from bemkit.operators.material import Material
 from bemkit.operators.somigliana.stress import principal_stresses, von_mises
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
-from bemkit.pictures.plane import draw_initial, inside, plane_axes, set_frame
+from bemkit.pictures.plane import draw_initial, inside, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
 from bemkit.pictures.stress_points import StressPoints, stress_points
 from bemkit.results.assembly_solution import AssemblySolution
@@ -61,6 +61,8 @@ _ACROSS = 48
 _LEVELS = 18
 _SHOWN = 0.995
 """Share of the picture whose stresses have colours of their own: corners of supports have infinite ones."""
+_SEEN = 1e-3
+"""Displacement, in sizes of the picture, that is seen."""
 _FLAT = 1e-6
 """Variation of stresses, relative to the largest, that is drawn as none."""
 
@@ -68,7 +70,7 @@ _FLAT = 1e-6
 def draw_stress(
     solution: Result, axes: Axes | None = None, *, measure: str = "von-mises", units: UnitNames | None = None
 ) -> Axes:
-    """Draw a stress inside of all bodies, as they are before they move.
+    """Draw a stress inside of all bodies, where they are in the end.
 
     Parameters
     ----------
@@ -95,7 +97,11 @@ def draw_stress(
     chosen, scene, units = STRESSES[measure], shown(solution), units or solution.units
     bodies = list(solution.bodies.values()) if isinstance(solution, AssemblySolution) else [solution]
     spacing = float(np.ptp(scene.frame, axis=1).max()) / _ACROSS
-    found = [stress_points(body, spacing, scene.frame) for body in bodies]
+    # obstacles are where they are in the end: a body that is seen to move must be there, too
+    farthest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
+    is_seen = farthest > _SEEN * float(np.ptp(scene.frame, axis=1).max())
+    factor = 1.0 if is_seen else 0.0
+    found = [stress_points(body, spacing, scene.frame, moved=is_seen) for body in bodies]
     values = [chosen.of(each.stresses, body.scene.material) for each, body in zip(found, bodies, strict=True)]
     every = np.concatenate(values)
     extreme = float(every[np.argmax(np.abs(every))])
@@ -104,11 +110,12 @@ def draw_stress(
     largest = largest_shown(np.concatenate([each.points for each in found]), every, spacing)
     levels = _levels(largest, chosen.is_positive)
     for body, points, value in zip(scene.bodies, found, values, strict=True):
-        outline = inside(body, body.outlines(0.0), scene.frame)
+        outline = inside(body, body.outlines(factor), scene.frame)
         _draw_contours(axes, points, value, levels, chosen, outline)
-    draw_initial(axes, scene)
-    set_frame(axes, scene.frame, margin=0.05)
-    draw_rigid_bodies(axes, scene, 0.0)
+    draw_initial(axes, scene, factor=factor)
+    loops = [loop for body in scene.bodies for loop in body.outlines(factor)]
+    set_frame(axes, joined_frame(scene.frame.T, *loops), margin=0.05)
+    draw_rigid_bodies(axes, scene, factor)
     draw_obstacles(axes, scene)
     _draw_scale(axes, levels, chosen, units)
     return axes

@@ -33,13 +33,13 @@ _DIFFERENCE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class StressPoints:
-    """Stresses (n, 2, 2) [Pa] at points (n, 2) [m] on the boundary and inside of it."""
+    """Stresses (n, 2, 2) [Pa] at points (n, 2) [m] on the boundary and inside of it, which may have moved."""
 
     points: FloatArray
     stresses: FloatArray
 
 
-def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> StressPoints:
+def stress_points(body: SolvedBody, spacing: float, frame: FloatArray, *, moved: bool = False) -> StressPoints:
     """Evaluate the stress of a body.
 
     Parameters
@@ -49,6 +49,8 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> Stress
         Of points far from the boundary; closer to it they are as dense as its elements.
     frame : (2, 2) array [m]
         Where points are wanted, of bodies without an end.
+    moved : bool
+        Whether the points are where the displacement has carried them.
     """
     mesh = body.mesh.whole
     space, displacement, tractions, traction = whole_boundary(body)
@@ -66,9 +68,17 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray) -> Stress
     inner = _inner_points(on_boundary, normals, lengths, spacing, frame, mesh.is_exterior)
     inner = inner[fields.is_inside(inner)]
     corners, at_corners = _at_nodes(mesh, stresses.reshape(mesh.n_elements, n, 2, 2))
-    return StressPoints(
-        np.concatenate([on_boundary, corners, inner]), np.concatenate([stresses, at_corners, fields.stress(inner)])
-    )
+    points = np.concatenate([on_boundary, corners, inner])
+    if moved:
+        own = values_on_elements(space, displacement)
+        at_points, at_ends = (
+            np.einsum("pq,epc->eqc", space.basis(at), own).reshape(-1, 2) for at in (xi, np.array([-1.0]))
+        )
+        known = np.concatenate([at_points, at_ends[np.maximum(mesh.node_elements[:, 1], 0)]])
+        if body.particular is not None:
+            known = known + body.particular.displacement(points[: len(known)])
+        points = points + np.concatenate([known, fields.displacement(inner)])
+    return StressPoints(points, np.concatenate([stresses, at_corners, fields.stress(inner)]))
 
 
 def _on_boundary(
