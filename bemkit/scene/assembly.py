@@ -350,6 +350,10 @@ class Assembly(ShownInNotebooks):
         except InputError as error:
             raise type(error)(f"body {body.name!r}: {error}") from error
 
+    def rigid_body_of(self, pair: ContactPair) -> RigidBody:
+        """Return the rigid body of a contact that has one."""
+        return next(body for body in self.rigid if body.name == pair.rigid_body)
+
     def law_of(self, pair: ContactPair | Touching) -> FrictionLaw:
         """Return the friction law of a contact."""
         return self.law if pair.law is None else pair.law

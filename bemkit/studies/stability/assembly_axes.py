@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from bemkit.contact.laws import Coulomb
+from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Part
+from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.case import PRECISION, Case
@@ -38,46 +42,68 @@ def _moved(baseline: AssemblySolution, value: float) -> Case:
 
 
 def _similar_case(baseline: AssemblySolution, value: float, similarity: AssemblySimilarity, precision: float) -> Case:
-    scene = similarity.apply(baseline.assembly)
+    scene = _changed(baseline, similarity.apply)
     return Case(value, scene, similarity, precision=precision, drift_limit=precision)
 
 
+def _changed(baseline: AssemblySolution, change: Callable[[Assembly], Assembly]) -> Assembly:
+    """Return what was asked, all its steps with the contacts that were found, after a change of each step."""
+    contacts = baseline.assembly.contacts
+    return with_changed_steps(
+        baseline.stated, lambda step: change(step.with_contacts(contacts) if step.touching else step)
+    )
+
+
+def _against_turn(assembly: Assembly) -> str:
+    """Return why an assembly cannot be turned; empty if it can."""
+    try:
+        AssemblySimilarity(turn=30.0).apply(assembly)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 def _stiffened(baseline: AssemblySolution, value: float) -> Case:
-    first, *others = baseline.assembly.bodies
-    material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
-    bodies = (replace(first, material=material), *others)
+    def stiffened(assembly: Assembly) -> Assembly:
+        first, *others = assembly.bodies
+        material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
+        return replace(assembly, bodies=(replace(first, material=material), *others))
+
     # displacements of the soft bodies hold eps of themselves, forces of stiff pairs as much times the ratio
     precision = PRECISION * max(1.0, value, 1.0 / value) ** 0.5
-    return Case(value, replace(baseline.assembly, bodies=bodies), precision=precision)
+    return Case(value, _changed(baseline, stiffened), precision=precision)
 
 
 def _friction(baseline: AssemblySolution, value: float) -> Case:
-    assembly = baseline.assembly
-
     def without_law(part: Part) -> Part:
         is_contact = isinstance(part.condition, Contact)
         return replace(part, condition=Contact(part.condition.obstacle)) if is_contact else part  # type: ignore[union-attr]
 
-    scene = replace(
-        assembly,
-        bodies=tuple(replace(body, parts=tuple(map(without_law, body.parts))) for body in assembly.bodies),
-        contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
-        touching=None if assembly.touching is None else replace(assembly.touching, law=None),
-        law=Coulomb(value),
-    )
-    return Case(value, scene)
+    def rubbed(assembly: Assembly) -> Assembly:
+        return replace(
+            assembly,
+            bodies=tuple(replace(body, parts=tuple(map(without_law, body.parts))) for body in assembly.bodies),
+            contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
+            law=Coulomb(value),
+        )
+
+    return Case(value, _changed(baseline, rubbed))
 
 
 def _elements(baseline: AssemblySolution, value: float) -> Case:
-    assembly = baseline.assembly
+    common = baseline.assembly.mesh
 
     def divided(body: Body) -> Body:
-        options = assembly.mesh if body.mesh is None else body.mesh
+        options = common if body.mesh is None else body.mesh
         n_elements = baseline.bodies[next(iter(body.copied())).name].mesh.whole.n_elements
         return replace(body, mesh=MeshOptions(max(3, round(value * n_elements)), options.grading))
 
-    mesh = replace(assembly.mesh, accuracy=None)
-    return Case(value, replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies)))
+    mesh = replace(common, accuracy=None)
+
+    def of_step(assembly: Assembly) -> Assembly:
+        return replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies))
+
+    return Case(value, _changed(baseline, of_step))
 
 
 _DECADES = tuple(10.0**k for k in (-9, -6, -3, 3, 6, 9))
@@ -91,6 +117,7 @@ ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
         _SIMILAR,
         (30.0, 45.0, 90.0, 137.0, 180.0),
         partial(_similar, factor="turn"),
+        against_assembly=_against_turn,
     ),
     Axis(
         "position",

@@ -53,6 +53,8 @@ class Axis(Generic[Baseline]):
         Value whose row the others are compared with; the given scene if left out.
     beside_half_planes, beside_periodic : str
         Why the axis says nothing of half-planes, or of periodic ones; empty if it does.
+    against_assembly : callable (Assembly) -> str
+        The same of an assembly.
     """
 
     name: str
@@ -63,11 +65,12 @@ class Axis(Generic[Baseline]):
     reference: float | None = None
     beside_half_planes: str = ""
     beside_periodic: str = ""
+    against_assembly: Callable[[Assembly], str] = lambda _: ""
 
     def reason_against(self, scene: Scene | Assembly) -> str:
         """Return why the axis says nothing of a scene; empty if it does."""
         if isinstance(scene, Assembly):
-            return ""
+            return self.against_assembly(scene)
         surface = scene.shape.outline().surface
         if surface is None:
             return ""
