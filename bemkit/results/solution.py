@@ -105,6 +105,11 @@ class Solution(SolvedProblem, SolvedBody):
         return self.scene
 
     @property
+    def solved_bodies(self) -> tuple[Solution]:
+        """The one body: the solution itself."""
+        return (self,)
+
+    @property
     def n_elements(self) -> int:
         """Number of elements."""
         return self.mesh.n_elements

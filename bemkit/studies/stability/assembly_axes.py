@@ -6,18 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from bemkit.contact.laws import Coulomb
 from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
-from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.axes import Axis
-from bemkit.studies.stability.case import PRECISION, Case
+from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, without_own_laws
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 _SIMILAR = "results equal to 1e-9 after scaling"
@@ -30,14 +27,8 @@ def _similar(baseline: AssemblySolution, value: float, *, factor: str) -> Case:
 
 
 def _moved(baseline: AssemblySolution, value: float) -> Case:
-    bodies = baseline.bodies.values()
-    distance = value * max(body.mesh.diameter for body in bodies)
-    # as for one body: gaps are differences of coordinates, known to eps distance
-    longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
-    pressure = float(np.abs(baseline.contact.sigma_n).max())
-    stiffest = max(body.scene.material.plane_modulus / float(body.mesh.lengths.min()) for body in bodies)
-    loss = max(1.0 / longest, stiffest / pressure) if pressure and longest else 0.0
-    precision = PRECISION + 4.0 * np.finfo(float).eps * distance * loss
+    distance = value * max(body.mesh.diameter for body in baseline.solved_bodies)
+    precision = precision_elsewhere(baseline, distance)
     return _similar_case(baseline, value, AssemblySimilarity(shift=(0.8 * distance, -0.6 * distance)), precision)
 
 
@@ -75,14 +66,10 @@ def _stiffened(baseline: AssemblySolution, value: float) -> Case:
 
 
 def _friction(baseline: AssemblySolution, value: float) -> Case:
-    def without_law(part: Part) -> Part:
-        is_contact = isinstance(part.condition, Contact)
-        return replace(part, condition=Contact(part.condition.obstacle)) if is_contact else part  # type: ignore[union-attr]
-
     def rubbed(assembly: Assembly) -> Assembly:
         return replace(
             assembly,
-            bodies=tuple(replace(body, parts=tuple(map(without_law, body.parts))) for body in assembly.bodies),
+            bodies=tuple(replace(body, parts=without_own_laws(body.parts)) for body in assembly.bodies),
             contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
             law=Coulomb(value),
         )

@@ -31,7 +31,7 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.case import PRECISION, Case, Similarity
+from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, without_own_laws
 
 Baseline = TypeVar("Baseline", Solution, AssemblySolution)
 
@@ -114,12 +114,7 @@ def _similar(baseline: Solution, value: float, *, factor: str) -> Case:
 
 def _moved(baseline: Solution, value: float) -> Case:
     distance = value * baseline.mesh.diameter
-    # gaps are differences of coordinates, known to eps * distance; displacements are a small part of the size, and
-    # rough gaps make tractions as rough as E' times the roughness over the length of an element
-    longest = float(np.abs(baseline.boundary.displacement).max())
-    pressure = float(np.abs(baseline.contact.sigma_n).max())
-    rough = baseline.scene.material.plane_modulus / (float(baseline.mesh.lengths.min()) * pressure) if pressure else 0.0
-    precision = PRECISION + 4.0 * np.finfo(float).eps * distance * max(1.0 / longest, rough)
+    precision = precision_elsewhere(baseline, distance)
     return _similar_case(baseline, value, Similarity(shift=(0.8 * distance, -0.6 * distance)), precision)
 
 
@@ -148,11 +143,7 @@ def _friction(baseline: Solution, value: float) -> Case:
 
 
 def _with_friction(scene: Scene, coefficient: float) -> Scene:
-    parts = [
-        replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
-        for part in scene.parts
-    ]
-    return replace(scene, parts=tuple(parts), law=Coulomb(coefficient))
+    return replace(scene, parts=without_own_laws(scene.parts), law=Coulomb(coefficient))
 
 
 def _gap(baseline: Solution, value: float) -> Case:
