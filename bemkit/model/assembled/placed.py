@@ -18,6 +18,7 @@ from bemkit.operators.material import Material
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.scene import Scene
+from bemkit.scene.symmetry import check_symmetry
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +141,9 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
 def _divided(scene: Scene, assembly: Assembly, body: Body) -> BoundaryMesh:
     even = [*(part.name for part in scene.contact_parts), *assembly.contact_parts(body)]
     try:
-        return scene.mesh.divide(scene.shape.outline(), scene.selections, even, scene.symmetry)
+        mesh = scene.mesh.divide(scene.shape.outline(), scene.selections, even, scene.symmetry)
+        check_symmetry(scene, mesh)
+        return mesh
     except GeometryError as error:
         raise type(error)(f"body {body.name!r}: {error}") from error
 

@@ -45,10 +45,10 @@ def _changed(baseline: AssemblySolution, change: Callable[[Assembly], Assembly])
     )
 
 
-def _against_turn(assembly: Assembly) -> str:
-    """Return why an assembly cannot be turned; empty if it can."""
+def _against(assembly: Assembly, *, similarity: AssemblySimilarity) -> str:
+    """Return why an assembly has no similar one; empty if it has."""
     try:
-        AssemblySimilarity(turn=30.0).apply(assembly)
+        similarity.apply(assembly)
     except InputError as error:
         return str(error)
     return ""
@@ -104,7 +104,7 @@ ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
         _SIMILAR,
         (30.0, 45.0, 90.0, 137.0, 180.0),
         partial(_similar, factor="turn"),
-        against_assembly=_against_turn,
+        against_assembly=partial(_against, similarity=AssemblySimilarity(turn=30.0)),
     ),
     Axis(
         "position",
@@ -112,6 +112,7 @@ ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
         "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
         (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
         _moved,
+        against_assembly=partial(_against, similarity=AssemblySimilarity(shift=(1.0, 0.0))),
     ),
     Axis("stiffness", "factor of Young's modulus of the first body", _FREE, (*_DECADES[1:-1], 1e-8, 1e8), _stiffened),
     Axis("friction", "friction coefficient", _FREE, (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 3.0, 10.0, 100.0), _friction),

@@ -15,6 +15,7 @@ from bemkit.contact.spline import SplineObstacle
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
@@ -73,6 +74,8 @@ class AssemblySimilarity:
         InputError
             If something of it has no similar one; the message names it.
         """
+        if assembly.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
+            raise InputError("the assembly has a symmetry, whose bodies stay where they are drawn: leave it out")
         return with_changed_steps(assembly, self._applied)
 
     def _applied(self, assembly: Assembly) -> Assembly:
@@ -88,7 +91,11 @@ class AssemblySimilarity:
             contacts=tuple(self._pair(pair) for pair in assembly.contacts),
             touching=touching,
             law=self._law(assembly.law),
+            symmetry=None if assembly.symmetry is None else self._lines(assembly.symmetry),
         )
+
+    def _lines(self, symmetry: Symmetry) -> Symmetry:
+        return AffineMap((self.length, self.length)).transformed(symmetry)
 
     def _pair(self, pair: ContactPair) -> ContactPair:
         law = None if pair.law is None else self._law(pair.law)
