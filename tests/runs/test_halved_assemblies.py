@@ -206,5 +206,8 @@ def test_what_is_not_symmetric_is_refused() -> None:
     shear = bk.Part("load", bk.Traction(x=1e-4, y=-1e-3), ("top",))
     with pytest.raises(AsymmetricSceneError, match="the traction is"):
         bk.run(blocks(bodies=moved(1, parts=(shear,))))
+    bodies = tuple(replace(body, mesh=None) for body in moved(1, parts=(shear,)))
+    with pytest.raises(AsymmetricSceneError, match="the traction is"):
+        bk.run(blocks(bodies=bodies, mesh=bk.MeshOptions(accuracy=0.1)))
     with pytest.raises(AsymmetricSceneError, match="its law is not symmetric about x = 0"):
         bk.run(blocks(law=bk.Coulomb(bk.Expression("0.3 + 0.1 * x"))))
