@@ -147,6 +147,19 @@ class Solution(ShownInNotebooks, SolvedBody):
             squared += float(place_errors(self.contact, self.mesh, self.transitions).sum())
         return float(np.sqrt(squared)) / self.contact_traction_size
 
+    @cached_property
+    def estimated_local_traction_error(self) -> float | None:
+        """Estimated largest error of the tractions of a half-plane on an element; None of another body.
+
+        Relative to the traction there or to the mean of all, whichever is larger, and without the worst elements on an
+        equally small share of what carries tractions: at infinite ones no element is right.
+        """
+        if self.local_traction_errors is None or self.mean_traction_size == 0.0:
+            return None
+        from bemkit.results.error_indicators import largest_but_a_share
+
+        return largest_but_a_share(self.local_traction_errors, self.mesh.lengths)
+
     @property
     def stated(self) -> Scene:
         """What was asked: the scene, with all its load steps."""
@@ -224,8 +237,8 @@ class Solution(ShownInNotebooks, SolvedBody):
             ``title``, ``units`` (names, None without), ``status`` (a word), ``message`` (how the solver ended),
             ``converged``, ``certified``, ``warnings``,
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
-            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` and
-            ``estimated_traction_error`` (None without an estimate),
+            ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error``, ``estimated_traction_error`` and
+            ``estimated_local_traction_error`` (None without an estimate),
             ``parts`` (resultants of the tractions on each part), ``contacts`` (what each contact part feels),
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
             ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`).
@@ -241,10 +254,8 @@ class Solution(ShownInNotebooks, SolvedBody):
             "n_elements": self.n_elements,
             "n_contact": self.contact.n_contact,
             **{name: getattr(self, name) for name in ("linear_solves", "outer_steps", "force_normal")},
-            **{
-                name: getattr(self, name)
-                for name in ("force_tangential", "energy", "estimated_error", "estimated_traction_error")
-            },
+            **{name: getattr(self, name) for name in ("force_tangential", "energy", "estimated_error")},
+            **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
             "parts": [force.as_dict() for force in self.part_forces],
             "contacts": [contact.as_dict() for contact in self.contacts],
             "transitions": [transition.as_dict() for transition in self.transitions],

@@ -111,7 +111,8 @@ def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
     if isinstance(worst, Solution) and known_tractions:
         vars(worst)["mean_traction_errors"] = np.max(known_tractions, axis=0)
         vars(worst)["mean_traction_size"] = max(body.mean_traction_size for step in steps for body in _bodies(step))
-        vars(worst).pop("estimated_traction_error", None)
+        for name in ("estimated_traction_error", "local_traction_errors", "estimated_local_traction_error"):
+            vars(worst).pop(name, None)
     return worst
 
 
