@@ -170,6 +170,8 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
     if solution.estimated_error is not None:
         tractions = solution.estimated_traction_error
         of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
+        if (local := solution.estimated_local_traction_error) is not None:
+            of_tractions += f", {local:.1e} of single ones"
         yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
     if contact.n_contact:
         yield "transitions", "\n".join(_transition_lines(solution))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -190,6 +191,9 @@ class _System:
         n = reduced.n_unknowns
         if n == 0:
             return np.zeros(0), np.zeros(0)
+        # a travel that is long beside the deformation is taken out first, or nothing would be left of the deformation
+        columns = [reduced.rows(motion, np.zeros_like(known)) for motion in self._motions]
+        travel, right = _fitted(columns, right)
         rest = right = self._nearly_solved(np.concatenate([right, load]))
         operator = LinearOperator((right.size, right.size), lambda x: self._nearly_solved(self._left(x)), dtype=float)
         solution = np.zeros(right.size)
@@ -202,7 +206,7 @@ class _System:
             rest = right - operator.matvec(solution)
         else:
             raise SingularResponse(f"{_MOST_CORRECTIONS} corrections have not led to a response")
-        return solution[:n], solution[n:] / self._sizes
+        return solution[:n], travel + solution[n:] / self._sizes
 
     @cached_property
     def _motions(self) -> ComplexArray:
@@ -228,7 +232,8 @@ class _System:
     def _tractions_of(self, right: FloatArray) -> FloatArray:
         """Return about the unknowns that have the left-hand sides given while no motion is driven."""
         body, reduced = self.body, self.reduced
-        held = body._at_contact(body.elastic.held(body._on_surface(reduced.displacements(right))))
+        displacement = reduced.displacements(right, body.stiffness_scale)
+        held = body._at_contact(body.elastic.held(body._on_surface(displacement)))
         return reduced.unknowns(held, right, body.stiffness_scale)
 
     @cached_property
@@ -253,3 +258,12 @@ class _System:
         taken, inverse = self._for_motions
         motion = inverse @ (self._resultants(self.reduced.changes(unknowns)) - right[n:])
         return np.concatenate([unknowns - taken @ motion, self._sizes * motion])
+
+
+def _fitted(columns: Sequence[FloatArray], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the amounts of some columns (n,) that come nearest to values (n,), and what is left of these."""
+    if not columns:
+        return np.zeros(0), values
+    matrix = np.stack(columns, axis=1)
+    amounts: FloatArray = np.asarray(np.linalg.lstsq(matrix, values, rcond=None)[0], dtype=float)
+    return amounts, values - matrix @ amounts

@@ -133,9 +133,12 @@ class ReducedConditions:
     def _traction_factor(self) -> ComplexArray:
         return np.asarray(self.on_traction.conj())
 
-    def displacements(self, rows: FloatArray) -> ComplexArray:
-        """Return displacements (n_contact,) that have these left-hand sides, as small as they can be."""
-        return self._summed(self.on_displacement * rows)
+    def displacements(self, rows: FloatArray, stiffness: float) -> ComplexArray:
+        """Return about the displacements (n_contact,) of these left-hand sides, as small as they can be.
+
+        Of equations that involve tractions, too, those are small: the stiffness [Pa/m] is that of a node.
+        """
+        return self._summed(self.on_displacement * rows / (1.0 + self._softness * stiffness))
 
     def unknowns(self, traction: ComplexArray, rows: FloatArray, stiffness: float) -> FloatArray:
         """Return the unknowns (n_unknowns,) in tractions that hold displacements with the left-hand sides `rows`.
@@ -145,8 +148,13 @@ class ReducedConditions:
         own = (self._along * traction[self.node]).real
         if not self._traction_factor.any():
             return np.asarray(own)
-        softer = (self._traction_factor * self.direction).real
-        return np.asarray(np.where(softer == 0.0, own, rows * stiffness / (1.0 + np.abs(softer) * stiffness)))
+        softness = self._softness
+        return np.asarray(np.where(softness == 0.0, own, rows * stiffness / (1.0 + softness * stiffness)))
+
+    @cached_property
+    def _softness(self) -> FloatArray:
+        """(n_unknowns,) array [m/Pa]: how much an equation gives way to its own unknown."""
+        return np.asarray(np.abs((self._traction_factor * self.direction).real))
 
     @cached_property
     def _along(self) -> ComplexArray:

@@ -37,7 +37,7 @@ def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
             yield _words(name), str(summary[name])
     for name, quantity in _QUANTITIES.items():
         yield _words(name), _amount(summary[name], quantity, result.units)
-    for name in ("estimated_error", "estimated_traction_error"):
+    for name in ("estimated_error", "estimated_traction_error", "estimated_local_traction_error"):
         if summary.get(name) is not None:
             yield _words(name), number(summary[name], 2)
     yield "largest violation", number(result.certificate.worst, 2)

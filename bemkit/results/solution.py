@@ -95,6 +95,19 @@ class Solution(SolvedProblem, SolvedBody):
             squared += float(place_errors(self.contact, self.mesh, self.transitions).sum())
         return float(np.sqrt(squared)) / self.contact_traction_size
 
+    @cached_property
+    def estimated_local_traction_error(self) -> float | None:
+        """Estimated largest error of the tractions of a half-plane on an element; None of another body.
+
+        Relative to the traction there or to the mean of all, whichever is larger, and without the worst elements on an
+        equally small share of what carries tractions: at infinite ones no element is right.
+        """
+        if self.local_traction_errors is None or self.mean_traction_size == 0.0:
+            return None
+        from bemkit.results.error_indicators import largest_but_a_share
+
+        return largest_but_a_share(self.local_traction_errors, self.mesh.lengths)
+
     @property
     def stated(self) -> Scene:
         """What was asked: the scene, with all its load steps."""
@@ -147,7 +160,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     def _parts(self) -> dict[str, Any]:
         return {
-            "estimated_traction_error": self.estimated_traction_error,
+            **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
             "parts": [force.as_dict() for force in self.part_forces],
             "contacts": [contact.as_dict() for contact in self.contacts],
         }

@@ -155,6 +155,21 @@ class SolvedBody:
         sizes = np.linalg.norm(self.boundary.traction, axis=1)
         return float(self.mesh.lengths @ np.where(self._is_loaded, 0.0, sizes))
 
+    @cached_property
+    def local_traction_errors(self) -> FloatArray | None:
+        """(n_elements,) array [-]: the same over the length of each element, relative to its traction.
+
+        Tractions below the mean of those that there are count as that mean.
+        """
+        if self.mean_traction_errors is None:
+            return None
+        lengths, sizes = self.mesh.lengths, np.linalg.norm(self.boundary.traction, axis=1)
+        carrying = float(lengths @ ((sizes > 0.0) & ~self._is_loaded))
+        mean = self.mean_traction_size / carrying if carrying else 1.0
+        from bemkit.results.error_indicators import LOCAL_CALIBRATION
+
+        return np.asarray(LOCAL_CALIBRATION * self.mean_traction_errors / (lengths * np.maximum(sizes, mean)))
+
     @property
     def _is_loaded(self) -> BoolArray:
         loaded = np.zeros(self.mesh.n_elements, dtype=bool)

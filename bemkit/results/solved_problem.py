@@ -160,8 +160,9 @@ class SolvedProblem(ShownInNotebooks):
             ``converged``, ``certified``, ``warnings``, ``n_bodies`` (of an assembly),
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
-            of one body ``estimated_traction_error`` (the same), ``parts`` (resultants of the tractions on each part)
-            and ``contacts`` (what each contact part feels), of an assembly ``contacts``, ``bodies`` and ``rigid``,
+            of one body ``estimated_traction_error`` and ``estimated_local_traction_error`` (the same), ``parts``
+            (resultants of the tractions on each part) and ``contacts`` (what each contact part feels), of an assembly
+            ``contacts``, ``bodies`` and ``rigid``,
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
             ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`).
         """

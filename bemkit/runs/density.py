@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.errors import InputError
-from bemkit.geometry.meshing.partition import SPREAD, better_partition
+from bemkit.geometry.meshing.partition import LEAST_DENSITY, SPREAD, better_partition
 from bemkit.results.solution import Solution
 from bemkit.runs.mesh_sequence import Level, ZoneEnd, zone_cuts, zone_ends
 
@@ -23,6 +23,14 @@ MOST_FOR_TRANSITIONS = 2
 """Meshes whose estimated error is small enough, made only because of the elements in which the status changes."""
 SAFETY = 0.8
 """The next mesh is planned for this part of the error asked for."""
+LEAST_LOCAL = 1e-3
+"""Smallest error that is asked of single elements of a half-plane: constant tractions take thousands for less."""
+LOCAL_SAFETY = 0.6
+"""The same of errors that are to hold element by element: lengths turn out longer here and there."""
+HALF_PLANE_SPREAD = 0.15
+"""What `SPREAD` is on half-planes, whose errors are known element by element."""
+LENGTH_GROWTH = 0.2
+"""Of elements with the distance, at most: jumps of lengths are errors of tractions there."""
 MEAN_RATE = 2
 """Power of element lengths in the mean error of the tractions at the centres of elements on a half-plane."""
 
@@ -39,17 +47,24 @@ class DensityMeshes:
     ----------
     accuracy : float
         Largest error in the energy norm, relative to the solution; of half-planes also that of the tractions at the
-        centres of elements, in the mean.
+        centres of elements, in the mean and, down to `LEAST_LOCAL`, element by element.
     """
 
     accuracy: float
 
     def error(self, solution: Solution) -> float:
-        """Return the estimated error in the energy norm, of a half-plane that of its tractions if it is larger."""
-        energy, tractions = solution.estimated_error, solution.estimated_traction_error
-        if energy is None:
+        """Return the estimated error in the energy norm, of a half-plane those of its tractions if they are larger."""
+        if solution.estimated_error is None:
             return float("inf")
-        return energy if solution.mean_traction_errors is None or tractions is None else max(energy, tractions)
+        errors = [solution.estimated_error]
+        if solution.mean_traction_errors is not None:
+            errors.append(solution.estimated_traction_error or 0.0)
+            errors.append((solution.estimated_local_traction_error or 0.0) * self.accuracy / self._local_accuracy)
+        return max(errors)
+
+    @property
+    def _local_accuracy(self) -> float:
+        return max(self.accuracy, LEAST_LOCAL)
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Tell whether the estimated error is small enough, and the elements in which the status changes short."""
@@ -65,12 +80,22 @@ class DensityMeshes:
         if solution.mean_traction_errors is not None:
             allowed = SAFETY * goal * solution.mean_traction_size
             density = np.maximum(density, needed_elements(solution.mean_traction_errors, MEAN_RATE, allowed))
+            density = np.maximum(density, _needed_locally(solution, LOCAL_SAFETY * self._local_accuracy))
+            density = _gradual(density, solution)
         parts = [part.name for part in solution.scene.contact_parts]
-        spread = SPREAD if parts else 0.0
+        spread = (SPREAD if solution.mesh.surface is None else HALF_PLANE_SPREAD) if parts else 0.0
         is_accurate = self.error(solution) <= goal
         n_elements = int(next_size(solution.n_elements, float(density.sum()) / (1.0 - spread), is_accurate=is_accurate))
         cuts = zone_cuts(level.partition, zone_ends(solution))
-        partition = better_partition(level.partition, density, n_elements, cuts=cuts, spread_over=parts)
+        partition = better_partition(
+            level.partition,
+            density,
+            n_elements,
+            cuts=cuts,
+            spread_over=parts,
+            spread=spread,
+            idle=_idle_elements(solution),
+        )
         return replace(level, partition=partition)
 
 
@@ -103,6 +128,33 @@ def needed_elements(errors: FloatArray, rate: int, allowed: float) -> FloatArray
     """
     density = np.asarray(errors ** (1.0 / (rate + 1)))
     return density * (float(density.sum()) / allowed) ** (1.0 / rate) if allowed > 0.0 else density
+
+
+def _needed_locally(solution: Solution, allowed: float) -> FloatArray:
+    """Return how many elements should replace each one of a half-plane, so that its own error is allowed.
+
+    The worst elements may stay as they are where they are no more than an allowed share of all.
+    """
+    errors, lengths = solution.local_traction_errors, solution.mesh.lengths
+    assert errors is not None
+    order = np.argsort(-errors)
+    is_short = np.cumsum(lengths[order]) <= allowed * float(lengths[errors > 0.0].sum())
+    errors = errors.copy()
+    errors[order[is_short]] = 0.0
+    return np.asarray((errors / allowed) ** (1.0 / MEAN_RATE))
+
+
+def _gradual(density: FloatArray, solution: Solution) -> FloatArray:
+    """Raise densities on a half-plane until wanted lengths grow by no more than `LENGTH_GROWTH` of the distance."""
+    lengths, place = solution.mesh.lengths, solution.mesh.centres[:, 0]
+    distance = np.maximum(np.abs(place[:, None] - place) - 0.5 * lengths, 0.0)
+    wanted = np.min(lengths / np.maximum(density, LEAST_DENSITY) + LENGTH_GROWTH * distance, axis=1)
+    return np.asarray(lengths / wanted)
+
+
+def _idle_elements(solution: Solution) -> BoolArray | None:
+    """Return which elements of a half-plane carry no tractions; of other bodies all do what they must."""
+    return None if solution.mesh.surface is None else np.asarray(~solution.boundary.traction.any(axis=1))
 
 
 def next_size(n_elements: int, needed: float, *, is_accurate: bool) -> float:

@@ -113,7 +113,8 @@ def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
         vars(worst)["mean_traction_size"] = max(
             body.mean_traction_size for step in steps for body in step.solved_bodies
         )
-        vars(worst).pop("estimated_traction_error", None)
+        for name in ("estimated_traction_error", "local_traction_errors", "estimated_local_traction_error"):
+            vars(worst).pop(name, None)
     return worst
 
 

@@ -40,6 +40,9 @@ GAIN = 6.0
 """Factor by which a degree and the layers that come with it reduce the error."""
 LARGEST_RISE = 2
 """Degrees from mesh to mesh: the places where the status changes must keep up."""
+FLICKER = 1e-8
+"""Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
+statuses change from node to node."""
 MOST_LOOKS = 3
 """Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
 
@@ -100,7 +103,7 @@ class LayeredMeshes:
         ends = zone_ends(solution)
         if level.number == 0 and len(solutions) < MOST_LOOKS and len(ends) < len(solution.transitions):
             return DensityMeshes(self.accuracy).following(level, solutions)
-        cuts = zone_cuts(partition, ends)
+        cuts = {side: _settled(places) for side, places in zone_cuts(partition, ends).items()}
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
             return Level(level.asked, fresh, 1)
@@ -109,7 +112,9 @@ class LayeredMeshes:
         following = Level(level.asked, fresh, level.number + rise)
         old_degrees = element_degrees(level.scene.discretisation.displacement_space(solution.mesh))
         degree = following.scene.discretisation.displacement_space(solution.mesh).degree
-        refined = refined_partition(partition, self._excess(solution, degree - old_degrees), cuts, self.accuracy)
+        # layers shorter than what flickers would hold nothing but round-off
+        resolution = max(self.accuracy, FLICKER)
+        refined = refined_partition(partition, self._excess(solution, degree - old_degrees), cuts, resolution)
         degrees: tuple[int, ...] = ()
         if has_moved and level.asked.discretisation.needs_accuracy:
             degrees = self._degrees(solution, partition, refined, old_degrees, degree)
@@ -172,6 +177,13 @@ class LayeredMeshes:
             of_tractions = _excess_of(errors.traction[elements], (size * goal) ** 2)
             excess[elements] = np.maximum(excess[elements], of_tractions)
         return excess
+
+
+def _settled(places: Sequence[float]) -> list[float]:
+    """Return the middles of places of change that `FLICKER` does not tell apart."""
+    ascending = np.sort(places)
+    groups = np.split(ascending, 1 + np.flatnonzero(np.diff(ascending) > FLICKER))
+    return [float(0.5 * (group[0] + group[-1])) for group in groups]
 
 
 def _excess_of(squared: FloatArray, allowed: float) -> FloatArray:

@@ -39,7 +39,8 @@ class MeshOptions:
         How densely sides are divided compared with the others, by the name of the side; 1 where left out.
     accuracy : float, optional
         Wanted error relative to the solution, instead of a number of elements, at least 1e-10: in the energy norm, and
-        of degree 3 and more (or rising) of contact tractions in L2, too, on half-planes of all tractions in the mean.
+        of degree 3 and more (or rising) of contact tractions in L2, too, on half-planes of all tractions in the mean
+        and, down to 1e-3, element by element (`Solution.estimated_local_traction_error`).
         Meshes then follow the solution: see `bemkit.runs.adaptive.run_adaptive`.
     most_elements : int, optional
         No mesh on the way to the accuracy has more elements, the first one aside; 1500 if left out. Elements of high

@@ -16,6 +16,7 @@ from bemkit.model.prepared import prepare
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.operators.half_plane.periodic import PeriodicElasticity, wave_flexibility
 from bemkit.operators.material import Material, Plane
+from bemkit.scene.transform import with_gap_offset
 from bemkit.testing import check_body
 
 MATERIAL = bk.Material(2.0, 0.2)
@@ -124,6 +125,18 @@ def test_units_and_places_change_nothing() -> None:
     other = bk.run(shifted)
     np.testing.assert_array_equal(plain.contact.status, other.contact.status)
     np.testing.assert_allclose(1e-6 * plain.contact.sigma_n, other.contact.sigma_n, rtol=0.0, atol=1e-9 * 1e-6)
+
+
+@pytest.mark.parametrize("travel", [1e3, 1e5])
+def test_a_gap_far_larger_than_the_deformation_changes_nothing(travel: float) -> None:
+    rough = replace(bk.load_scene("rough-surface"), mesh=bk.MeshOptions(elements=128))
+    near = bk.run(rough)
+    offset = travel * float(np.abs(near.boundary.displacement).max())
+    far = bk.run(with_gap_offset(rough, offset))
+    assert far.is_converged, far.message
+    # a displacement holds 1e-16 of the travel, and iterations stop at 1e-11 of the tractions
+    np.testing.assert_allclose(far.contact.sigma_n, near.contact.sigma_n, atol=1e-9 * -near.contact.sigma_n.min())
+    np.testing.assert_array_equal(far.contact.status, near.contact.status)
 
 
 def test_what_nothing_holds_is_singular() -> None:

@@ -41,6 +41,24 @@ def pressure_error(solution: bk.Solution, exact: Callable[[np.ndarray], np.ndarr
     return float(table.weight[rows] @ np.abs(table.sigma_n[rows] + expected) / (table.weight[rows] @ np.abs(expected)))
 
 
+def local_error(solution: bk.Solution, exact: Callable[[np.ndarray], np.ndarray], half_width: float) -> float:
+    """Return the largest error of the pressure of an element, but on an equally small share of the contact.
+
+    Relative to the pressure there or to the mean, whichever is larger.
+    """
+    mesh = solution.mesh
+    rows = np.abs(mesh.centres[:, 0]) < half_width
+    places, weights = np.polynomial.legendre.leggauss(8)
+    inside = half_width * (1.0 - 1e-14)
+    x = np.clip(mesh.centres[rows, :1] + 0.5 * mesh.lengths[rows, None] * places, -inside, inside)
+    pressure = -solution.boundary.traction[rows, 1]
+    unit = np.maximum(pressure, float(mesh.lengths[rows] @ pressure) / (2.0 * half_width))
+    errors = np.abs(pressure - exact(x) @ weights / 2.0) / unit
+    order = np.argsort(-errors)
+    worse = np.cumsum(np.append(0.0, mesh.lengths[rows][order])) / (2.0 * half_width)
+    return float(np.maximum(np.append(errors[order], 0.0), worse).min())
+
+
 def zones(solution: bk.Solution) -> list[float]:
     """Return |x| of the places of change on the right, the outermost first."""
     return sorted((place.x for place in solution.transitions if place.x > 0.0), reverse=True)
@@ -56,7 +74,7 @@ INDENTERS: dict[str, tuple[str, bk.FarField, bk.FrictionLaw, reference.LineConta
 }
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 3e-4])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("name", INDENTERS)
 def test_what_is_asked_of_the_pressures_is_what_they_have(name: str, accuracy: float) -> None:
     gap, far, law, exact = INDENTERS[name]
@@ -65,6 +83,10 @@ def test_what_is_asked_of_the_pressures_is_what_they_have(name: str, accuracy: f
     width = 1.7 * half_width if is_smooth else half_width
     solution = pressed(gap, width, far, law=law, mesh=bk.MeshOptions(accuracy=accuracy))
     assert pressure_error(solution, exact.pressure, 0.95 * half_width) < accuracy
+    largest, estimate = local_error(solution, exact.pressure, half_width), solution.estimated_local_traction_error
+    assert estimate is not None
+    assert largest < max(accuracy, 1e-3)
+    assert 0.7 * largest < estimate < 4.0 * largest
     if is_smooth:
         assert zones(solution)[0] == pytest.approx(half_width, rel=accuracy)
     if name == "cylinder":
@@ -197,10 +219,10 @@ def test_two_equal_bodies_sheared_after_pressing_as_cattaneo_and_mindlin_say() -
     assert weight @ np.abs(np.abs(solution.contact.sigma_t) - exact) < WITHIN * shear
 
 
-def test_a_block_of_sixty_half_widths_agrees() -> None:
-    a = np.sqrt(4.0 / (np.pi * MODULUS))
-    size = 60.0 * a
-    block = bk.Scene(
+def block(n_half_widths: float) -> bk.Solution:
+    """Press the cylinder onto a block of so many half-widths between walls."""
+    size = n_half_widths * np.sqrt(4.0 / (np.pi * MODULUS))
+    scene = bk.Scene(
         title="block",
         shape=bk.Rectangle(size, size, (-0.5 * size, -size)),
         material=MATERIAL,
@@ -213,13 +235,25 @@ def test_a_block_of_sixty_half_widths_agrees() -> None:
         discretisation=bk.QuadraticGalerkin(),
         mesh=bk.MeshOptions(accuracy=3e-4),
     )
-    solution = bk.run(block)
+    solution = bk.run(scene)
     assert solution.is_certified, solution.message
+    return solution
+
+
+def test_blocks_agree_as_they_grow() -> None:
+    """Far away a half-plane moves towards the load by a constant, a block between its walls does not.
+
+    That strains the surface by as much as its size is small: at 30, 60 and 120 half-widths the peak is 3.3e-3, 2.0e-3
+    and 1.1e-3 too low, the stick zone 7.9, 3.9 and 1.9 per cent too long. What is left in proportion goes.
+    """
+    a = np.sqrt(4.0 / (np.pi * MODULUS))
     half_plane = pressed("x**2 / 2", 1.5 * a, ALONG, law=FRICTION)
-    (end, stick), (expected_end, expected_stick) = zones(solution), zones(half_plane)
-    assert end == pytest.approx(expected_end, rel=WITHIN)
-    peaks = [-each.contact.sigma_n.min() for each in (solution, half_plane)]
-    assert peaks[0] == pytest.approx(peaks[1], rel=5.0 * WITHIN)
-    # far away a half-plane moves towards the load by a constant, the block between its walls does not: that strains its
-    # surface by 1 / 30 of what slips under the static law
-    assert stick == pytest.approx(expected_stick, rel=0.05)
+    expected_peak, (expected_end, expected_stick) = -half_plane.contact.sigma_n.min(), zones(half_plane)
+    sizes = [block(30.0), block(60.0)]
+    peaks = [-each.contact.sigma_n.min() for each in sizes]
+    (end, stick), (larger_end, larger_stick) = map(zones, sizes)
+    assert larger_end == pytest.approx(expected_end, rel=WITHIN)
+    assert [stick / expected_stick, larger_stick / expected_stick] == pytest.approx([1.079, 1.039], abs=3e-3)
+    assert 2.0 * peaks[1] - peaks[0] == pytest.approx(expected_peak, rel=2.0 * WITHIN)
+    assert 2.0 * larger_stick - stick == pytest.approx(expected_stick, rel=3.0 * WITHIN)
+    assert end == pytest.approx(expected_end, rel=2.0 * WITHIN)

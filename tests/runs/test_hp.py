@@ -14,7 +14,7 @@ from bemkit.geometry.meshing.division import divide
 from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, origins, refined_partition
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
-from bemkit.runs.hp import LayeredMeshes
+from bemkit.runs.hp import LayeredMeshes, _settled
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, with_overrides
 from tests.scenes import true_error
 
@@ -262,6 +262,14 @@ def test_a_pressure_without_bound_is_named() -> None:
     assert "the largest error stands at (1, 0), where an element of the length" in last.message
     assert last.estimated_traction_error is not None
     assert last.estimated_traction_error <= 2e-5
+
+
+def test_statuses_that_flicker_where_clearances_are_round_off_do_not_keep_an_accuracy_out_of_reach() -> None:
+    last = risen("wavy-obstacle", 1e-9)[-1]
+    assert last.is_converged, last.message
+    assert len(last.transitions) > 1  # all within 3e-9 of each other
+    assert _settled([place.x for place in last.transitions]) == pytest.approx([0.25000030], abs=1e-7)
+    assert _settled([0.3, 0.1 + 1e-9, 0.3 + 4e-9, 0.1]) == pytest.approx([0.1 + 5e-10, 0.3 + 2e-9], abs=1e-15)
 
 
 def test_layers_end_where_coordinates_do() -> None:

@@ -22,6 +22,8 @@ EXPONENT = 2.5
 the logarithms at load jumps and the square roots at ends of contact zones."""
 SPREAD = 0.5
 """Part of all elements that is spread over the contact boundary whatever the error estimate says."""
+IDLE = 0.2
+"""Part of what other pieces get of these that is enough for those on which nothing happens."""
 STEEPEST = 4.0
 """Largest ratio of the lengths of two neighbours."""
 LEAST = 4
@@ -110,6 +112,8 @@ def better_partition(
     *,
     cuts: Mapping[int, Sequence[float]],
     spread_over: Collection[str],
+    spread: float = SPREAD,
+    idle: BoolArray | None = None,
 ) -> Partition:
     """Divide an outline anew, by a target density on the elements of an old partition.
 
@@ -123,12 +127,18 @@ def better_partition(
     cuts : mapping of int to sequence of float
         Where pieces shall end besides corners and ends of parts: parameters by the number of the side.
     spread_over : collection of str
-        Parts that share `SPREAD` of the elements among their pieces by the square roots of lengths, each graded
+        Parts that share some of the elements among their pieces by the square roots of lengths, each graded
         towards its ends; the rest follows the density.
+    spread : float
+        Which part of all elements that is.
+    idle : (n_elements_old,) bool array, optional
+        Old elements on which nothing happens: pieces of such share in the spread by `IDLE` only.
     """
     division = old.base.cut(cuts)
     shares = np.sqrt(division.piece_lengths) * [piece.part in spread_over for piece in division.pieces]
-    shares *= SPREAD / shares.sum() if shares.any() else 0.0
+    if idle is not None:
+        shares *= [1.0 - (1.0 - IDLE) * _covered(piece, old, idle) for piece in division.pieces]
+    shares *= spread / shares.sum() if shares.any() else 0.0
     density = np.maximum(density, LEAST_DENSITY * density.max()) if density.any() else np.ones_like(density)
     density = density * (1.0 - shares.sum()) / density.sum()
     parameters = []
@@ -138,6 +148,13 @@ def better_partition(
         count = max(LEAST, round(n_elements * float(wanted[-1])))
         parameters.append(piece.at(_stretched(np.interp(np.linspace(0.0, wanted[-1], count + 1), wanted, y))))
     return _balanced(old.base, division, parameters)
+
+
+def _covered(piece: Piece, old: Partition, chosen: BoolArray) -> float:
+    """Return the part of a piece that some elements cover."""
+    own = chosen & (old.sides == piece.side)
+    (start, end), (starts, ends) = piece.span, old.spans[own].T
+    return float(np.maximum(np.minimum(ends, end) - np.maximum(starts, start), 0.0).sum()) / (end - start)
 
 
 def _density_along(piece: Piece, old: Partition, density: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -31,8 +31,9 @@ EVERY = 4
 
 LOST = 1e-6
 """Share of the work in a load step that iterative linear solvers and far rigid motions may leave unexplained."""
-ROUND_OFF = 1e-13
-"""Share, on top, of the work by which the displacement would strain a body of its own size: the last digits of it."""
+ROUND_OFF = 1e-12
+"""Share, on top, of the work by which the displacement would strain a body of its own size: the last digits of sums of
+forces, each of that size, which a body that is carried along has."""
 
 
 class Outcome(Enum):
