@@ -2,13 +2,16 @@
 
 Each dof has a place: the nodes of the displacements, where the forces f act, and the dofs of the tractions. Its
 unknowns are numbered as those of collocation, 4 * place + 2 * kind + component: kind 1 is the displacement of a node,
-kind 0 its force by its weight, or a traction. Its two equations are those tested with its own function. But for the
-forces, which no other equation feels, the matrix is symmetric, and one skeleton of a cluster serves rows and columns.
+kind 0 its force by its weight, or a traction. Its two equations are those tested with its own function. Tractions are
+measured by E' / h, h the length of the element, and their equations multiplied by the same, so that all entries of
+neighbours are those of E' times a number: equations of one size are all solved to round-off. But for the forces, which
+no other equation feels, the matrix is symmetric, and one skeleton of a cluster serves rows and columns.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -124,10 +127,15 @@ class GalerkinColumns:
         """(1, n_places) places on which each dof acts: itself."""
         return np.arange(self.order.size)[None]
 
+    @cached_property
+    def units(self) -> FloatArray:
+        """(n_places,) array [Pa, or 1 at nodes]: of the tractions, by which their equations are multiplied, too."""
+        return np.where(self.is_node, 1.0, self.material.plane_modulus / self.lengths)
+
     @property
     def sizes(self) -> FloatArray:
-        """(n_places,) array by which the equations become displacements: weights of tractions, E' at nodes."""
-        return np.where(self.is_node, self.material.plane_modulus, self.weights)
+        """(n_places,) array by which the equations become displacements."""
+        return np.where(self.is_node, self.material.plane_modulus, self.weights * self.units)
 
     def rows_of(self, columns: IntArray) -> IntArray:
         """Return the equations 2 * place + component that belong to columns."""
@@ -165,11 +173,13 @@ class GalerkinColumns:
         ]
         mass = self.mass[rows][:, columns].tocoo()
         block[mass.row, mass.col] += mass.data
+        block *= self.units[rows // 2, None]
+        block *= self.units[columns // 2]
         if self.idle.any():
             block[self.idle[rows]] = 0.0
             block[:, self.idle[columns]] = 0.0
             row, column = np.nonzero((rows[:, None] == columns) & (self.idle[rows] & ~self.is_node[rows // 2])[:, None])
-            block[row, column] = -self.constants.single * self.weights[rows[row] // 2] ** 2
+            block[row, column] = -self.material.plane_modulus
         return block
 
     def fields(self, x: ComplexArray, columns: IntArray) -> FloatArray:
@@ -192,7 +202,8 @@ class GalerkinColumns:
             else:
                 on = of.single * ((1.5 - 2.0 * of.poisson_ratio) * np.log(squared / of.log_length**2) - 0.5)
                 on_conjugate = (-0.5 * of.single) * turn
-            on, on_conjugate = factors @ on, factors @ on_conjugate
+            units = self.units[places[chosen], None]
+            on, on_conjugate = units * (factors @ on), units * (factors @ on_conjugate)
             result[chosen, 0], result[chosen, 1] = on + on_conjugate, 1j * (on - on_conjugate)
         return result[number, columns % 2].view(float).T
 
@@ -203,7 +214,7 @@ class GalerkinColumns:
         ----------
         places : (n,) array
         traction, displacement : (n_places, 2) arrays
-            By place: tractions, or the forces of nodes by their weights, and displacements of nodes.
+            By place: tractions in their units, or the forces of nodes by their weights, and displacements of nodes.
         """
         values = np.where(self.is_node[:, None], displacement, traction).ravel()
         rows = (2 * places[:, None] + np.arange(2)).ravel()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import IntArray
 from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
 from bemkit.operators.hierarchy.interpolative import sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO
@@ -12,11 +12,7 @@ from bemkit.operators.hierarchy.skeletons import FLOOR, LevelView, Skeleton
 
 
 class SymmetricView(LevelView):
-    """The clusters of one level of Galerkin's equations.
-
-    Tractions are multiplied by E' / h and equations divided by the same before they are compared: the entries of
-    neighbours are then those of E' times a number, of whatever kind they are.
-    """
+    """The clusters of one level of Galerkin's equations."""
 
     @property
     def _of(self) -> GalerkinColumns:
@@ -29,14 +25,11 @@ class SymmetricView(LevelView):
         _, near = self.near(cluster)
         proxies = self.proxies(cluster)
         entries = of.between(of.rows_of(near), of.rows_of(candidates))
-        modulus, lengths = of.material.plane_modulus, of.lengths[candidates // 4]
-        spacing = 2.0 * np.pi * PROXY_RATIO * float(self.discs.radius[cluster]) / proxies.size
-        at_circle = modulus * np.sqrt(spacing / np.median(lengths))
-        weights = np.append(self._sizes(near), np.full(2 * proxies.size, at_circle))
+        weights = np.append(np.ones(near.size), np.full(2 * proxies.size, of.material.plane_modulus))
         fields = np.concatenate([entries, of.fields(proxies, candidates)])
         own = candidates // 4
         guess = self.guess(cluster, np.append(own, near // 4))
-        map_ = sketched(fields, weights, self._sizes(candidates), self.tolerance_at(cluster, own), guess)
+        map_ = sketched(fields, weights, np.ones(own.size), self.tolerance_at(cluster, own), guess)
         columns = candidates[map_.skeleton]
         return Skeleton(of.rows_of(columns), map_, columns, map_)
 
@@ -44,7 +37,3 @@ class SymmetricView(LevelView):
         """Return the tolerance of a cluster: smooth displacements add up the errors of all its small elements."""
         share = 4.0 * float(self.columns.lengths[elements].min()) / (PROXY_RATIO * float(self.discs.radius[cluster]))
         return max(self.tolerance * min(1.0, share), FLOOR)
-
-    def _sizes(self, columns: IntArray) -> FloatArray:
-        of, places = self._of, columns // 4
-        return np.where(of.is_node[places], 1.0, of.material.plane_modulus / of.lengths[places])

@@ -97,6 +97,13 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
         return ClusterTree.of(np.concatenate(points), LEAF_SIZE)
 
     @cached_property
+    def _units(self) -> FloatArray:
+        """(n_places,) units of the tractions by number, those of nodes first."""
+        units = np.empty(self.columns.n_elements)
+        units[self.columns.order] = self.columns.units
+        return units
+
+    @cached_property
     def weights(self) -> FloatArray:
         """(n_nodes,) array [m]: integrals of the functions of the nodes."""
         weights = np.empty(self.columns.n_elements)
@@ -124,7 +131,7 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
         system.state(
             system.laws(held), none, NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
         )
-        return system.beyond().ravel()
+        return (system.beyond() * self._units[n:, None]).ravel()
 
     @cached_property
     def _known(self) -> _Known:
@@ -136,6 +143,7 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
         values, equations = np.zeros((n_places, 2, 2, k)), np.empty((n_places, 2, k))
         values[:n, 1] = displacement.reshape(n, 2, k)
         equations[order] = compression.product(values[order].reshape(4 * n_places, k)).reshape(n_places, 2, k)
+        equations /= self._units[:, None, None]
         trace, hyper = equations[n:].reshape(2 * (n_places - n), k), equations[:n].reshape(2 * n, k)
         along = at_rest.T @ displacement[:, -1:]
         of_hyper = hyper[:, -1:] - hyper[:, :-1] @ along
@@ -168,13 +176,14 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
         own[n_idle : n_idle + n_change, n_idle : n_idle + n_change] = -yields
         own[n_border - 2 * n_rest : n_border - n_rest, n_border - 2 * n_rest : n_border - n_rest] = -np.eye(n_rest)
         order, n_places = self.columns.order, (n_u + n_t) // 2
-        errors = np.concatenate([on_nodes, on_tractions]).reshape(n_places, 2, n_border)[order]
+        units = self._units[:, None, None]
+        errors = (np.concatenate([on_nodes, on_tractions]).reshape(n_places, 2, n_border) * units)[order]
         balances = np.zeros((n_places, 2, 2, n_border))
         balances[: n_u // 2, 1] = of_nodes.reshape(n_u // 2, 2, n_border)
         balances[: n_u // 2, 0, :, n_border - n_rest :] = self.weights[:, None, None] * at_rest.reshape(
             n_u // 2, 2, n_rest
         )
-        balances[n_u // 2 :, 0] = of_tractions.reshape(n_t // 2, 2, n_border)
+        balances[n_u // 2 :, 0] = of_tractions.reshape(n_t // 2, 2, n_border) * units[n_u // 2 :]
         return Border(
             errors.reshape(2 * n_places, n_border),
             np.ascontiguousarray(balances[order].reshape(4 * n_places, n_border).T),

@@ -64,7 +64,7 @@ class _Costs:
 
 
 _COLLOCATION = _Costs(40e3, 6e3, 1.6e6, 8.5e3, 3.5e3)
-_GALERKIN = {1: _Costs(400e3, 80e3, 4e6, 20e3, 0.0), 2: _Costs(800e3, 160e3, 8e6, 40e3, 0.0)}
+_GALERKIN = {1: _Costs(250e3, 100e3, 4e6, 21e3, 0.0), 2: _Costs(500e3, 190e3, 8e6, 41e3, 0.0)}
 """By the degree of the displacements."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
 """Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""

@@ -43,15 +43,16 @@ def spaces_of(name: str, degree: int, n_elements: int = 120) -> tuple[BoundarySp
 
 
 def dense_of(name: str, degree: int) -> np.ndarray:
-    """The same equations from the operators, by place."""
+    """The same equations from the operators, by place, tractions in their units."""
     u, t = spaces_of(name, degree)
     v, w = boundary.single_layer(t, t, MATERIAL), boundary.hypersingular(u, u, MATERIAL)
     k = boundary.double_layer(u, t, MATERIAL)
     boundary.assemble(v, k, w)
     trace = k.matrix() + 0.5 * boundary.mass(u, t).matrix().toarray()
     whole = np.block([[w.matrix(), trace.T], [trace, -v.matrix()]])
-    order = (2 * columns_of(name, degree)[0].order[:, None] + np.arange(2)).ravel()
-    return np.asarray(whole[np.ix_(order, order)])
+    columns = columns_of(name, degree)[0]
+    order, units = (2 * columns.order[:, None] + np.arange(2)).ravel(), np.repeat(columns.units, 2)
+    return np.asarray(whole[np.ix_(order, order)] * np.outer(units, units))
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -61,11 +62,11 @@ def test_entries_are_those_of_the_operators(name: str, degree: int) -> None:
     dense, everything = dense_of(name, degree), np.arange(2 * columns.n_elements)
     active = np.flatnonzero(~columns.idle)
     block = columns.between(everything, everything)
-    # far pairs are integrated to 1e-13 by either
-    np.testing.assert_allclose(block[np.ix_(active, active)], dense[np.ix_(active, active)], atol=2e-13)
+    # the entries are of the size of E', and far pairs are integrated to 1e-13 by either
+    np.testing.assert_allclose(block[np.ix_(active, active)], dense[np.ix_(active, active)], atol=1e-12)
     rng = np.random.default_rng(0)
     rows, some = rng.permutation(everything)[:57], rng.permutation(everything)[:71]
-    np.testing.assert_allclose(columns.between(rows, some), block[np.ix_(rows, some)], atol=1e-15)
+    np.testing.assert_allclose(columns.between(rows, some), block[np.ix_(rows, some)], atol=1e-14)
     # unknowns that are zero by symmetry have an equation that says so, and no other one feels them
     idle = np.flatnonzero(columns.idle & np.repeat(~columns.is_node, 2))
     assert not block[np.ix_(idle, active)].any()
