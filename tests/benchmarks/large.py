@@ -1,8 +1,9 @@
-"""Example 1 on compressed equations, of collocation or of Galerkin's method of degree P, from a thousand elements on, beside dense ones where these fit.
+"""Example 1 on compressed equations, from a thousand elements on, beside dense ones where these fit.
 
     python tests/benchmarks/large.py [--dense N] [--without-numba] [--galerkin P] [N ...]
 
-For each number of elements N (default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
+Elements are those of constant collocation, or of Galerkin's method of degree P (1 or 2). For each number of elements N
+(default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
 prints what the finest mesh takes of it in processor seconds: compressing the equations, the first factorisation, the
 median of later contact steps that change at most `FEW` leaves, and the median of certificates; the memory of all arrays
 that stay; the largest memory of the process; the largest rank; and the certificate and transitions of the solution.

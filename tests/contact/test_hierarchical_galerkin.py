@@ -90,6 +90,20 @@ def test_the_condensed_map_is_that_of_dense_equations(degree: int) -> None:
     np.testing.assert_allclose(tractions, same, atol=close * np.abs(same).max())
 
 
+@pytest.mark.parametrize("degree", [1, 2])
+def test_contact_knows_nothing_of_given_forces_on_its_own_nodes(degree: int) -> None:
+    floor, press = loose_block().parts
+    pushed = bk.Part("push", bk.Pressure(0.3), sides=("left",))  # down to the corner that touches
+    scene = replace(loose_block(), parts=(floor, press, pushed))
+    compressed, dense = (bk.run(each) for each in in_both_ways(scene, 240, degree))
+    assert compressed.plan.is_compressed
+    np.testing.assert_array_equal(compressed.contact.status, dense.contact.status)
+    stress = np.abs(dense.boundary.traction).max()
+    for component in ("sigma_n", "sigma_t"):
+        one, two = (getattr(each.contact, component) for each in (compressed, dense))
+        np.testing.assert_allclose(one, two, atol=1e-8 * stress)
+
+
 def test_without_contact_all_of_the_body_is_solved_for() -> None:
     compressed, dense = (bk.run(each) for each in in_both_ways(bk.load_scene("bending"), 240, 1))
     assert compressed.plan.is_compressed
