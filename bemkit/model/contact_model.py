@@ -275,10 +275,10 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
         given = prepared.conditions, prepared.contact.nodes, prepared.force
         if prepared.linear_solver.hierarchical is not None and not prepared.is_condensed:
             from bemkit.contact.condensation.hierarchical_body import hierarchical_body
-            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
+            from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap
 
             weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
-            assert isinstance(weightless, HierarchicalCollocation)
+            assert isinstance(weightless, HierarchicalMap)
             return hierarchical_body(weightless, *given, prepared.inside)
         return condensed_body(elastic, *given)
     check_held(prepared)

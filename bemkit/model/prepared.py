@@ -21,20 +21,16 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
+from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution, stress_of
 from bemkit.operators.half_plane.far_drive import FarDrive
-from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import (
-    Automatic,
     ChosenLinearSolver,
-    DenseCholesky,
-    Krylov,
 )
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
@@ -44,7 +40,7 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     integrate_traction,
 )
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
-from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.symmetry import check_symmetry
 
 _LEAST_TURN = 1e-9
@@ -272,24 +268,20 @@ class Prepared:
 
     @cached_property
     def linear_solver(self) -> ChosenLinearSolver:
-        """The linear solver that a symmetric map follows, and why it is taken."""
-        scene, requested = self.scene, self.scene.linear_solver
-        if not scene.discretisation.is_symmetric:
-            body = self.mesh, self.material, self.conditions, (self.map_data,)
-            case, hindrance = BodyCase(*body, is_condensed=self.is_condensed), scene.discretisation.why_dense(self.mesh)
-            return choose_collocation_solver(requested, case, physical_memory(), hindrance)
-        if isinstance(requested, Automatic) and Krylov().error_at(scene.material) > LARGEST_KRYLOV_ERROR:
-            requested = DenseCholesky()  # iteration would be too inexact
-        n_retained = int(np.count_nonzero(self.conditions.is_retained))
-        return choose_linear_solver(requested, self.space.n_dofs, n_retained, physical_memory())
+        """The linear solver that the map follows, and why it is taken."""
+        case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed)
+        requested, discretisation = self.scene.linear_solver, self.scene.discretisation
+        return linear_solver_of(requested, discretisation, case, self.space, physical_memory())
 
     @cached_property
     def is_condensed(self) -> bool:
         """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
 
         Only a stiffness tells whether the energy of elements that are too long can be negative, and what displacements
-        without slopes make of a rotation that no support holds.
+        without slopes make of a rotation that no support holds; and nodes between two obstacles stand in two rows.
         """
+        if self.contact.nodes.is_shared.any():
+            return True
         discretisation, motions = self.scene.discretisation, free_modes(self.space, self.conditions)
         turns_freely = not discretisation.keeps_rotations and np.ptp(motions, axis=1).max(initial=0.0) > _LEAST_TURN
         return not discretisation.is_symmetric and bool(turns_freely or discretisation.may_be_negative(self.mesh))

@@ -121,8 +121,7 @@ def _without_history(result: Result) -> str:
 
 
 def _without_inside(result: Result) -> str:
-    bodies = result.bodies.values() if isinstance(result, AssemblySolution) else [result]
-    has_surface = any(body.mesh.surface is not None for body in bodies)
+    has_surface = any(body.mesh.surface is not None for body in result.solved_bodies)
     return "of a half-plane only the surface is known" if has_surface else ""
 
 

@@ -17,7 +17,6 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_initial, inside, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
 from bemkit.pictures.stress_points import StressPoints, stress_points
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def draw_stress(
     if measure not in STRESSES:
         raise InputError(f"measure is {measure!r}: give one of {', '.join(STRESSES)}")
     chosen, scene, units = STRESSES[measure], shown(solution), units or solution.units
-    bodies = list(solution.bodies.values()) if isinstance(solution, AssemblySolution) else [solution]
+    bodies = solution.solved_bodies
     spacing = float(np.ptp(scene.frame, axis=1).max()) / _ACROSS
     # obstacles are where they are in the end: a body that is seen to move must be there, too
     farthest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)

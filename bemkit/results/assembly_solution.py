@@ -103,6 +103,11 @@ class AssemblySolution(SolvedProblem):
     def _problem(self) -> Assembly:
         return self.assembly
 
+    @property
+    def solved_bodies(self) -> tuple[BodyResult, ...]:
+        """The elastic bodies, in the order of the assembly."""
+        return tuple(self.bodies.values())
+
     def part_length(self, contact: str) -> float:
         """Return the length of boundary that can touch in a contact [m]."""
         own = self.contact.rows(contact)

@@ -29,7 +29,6 @@ from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.conditions import Contact
-from bemkit.scene.rigid_body import RigidBody
 
 _LIGHTEST = 1e-3
 """A body that carries less than this share of what the others carry is measured by this share."""
@@ -106,7 +105,6 @@ def _at_obstacles(
     assembly: Assembly, bodies: Mapping[str, SolvedBody], rigid: Mapping[str, RigidResult]
 ) -> Iterator[_Measured]:
     """Yield the contacts with rigid obstacles, fixed and moving; each point belongs to the one that is nearest."""
-    stated: dict[str | None, RigidBody] = {body.name: body for body in assembly.rigid}
     moving: dict[str, list[ContactPair]] = {}
     for pair in assembly.contacts:
         if pair.rigid_body is not None:
@@ -121,9 +119,10 @@ def _at_obstacles(
                 facing.setdefault(part.name, []).append(_Measured(name, (owner,), scene.laws[part.name], values))
         for pair in moving.get(owner, ()):
             part_name = pair.elastic_sides[0].split(".", 1)[1]
-            values = points_at_obstacle(body, stated[pair.rigid_body].obstacle, body.mesh.part(part_name))
+            stated = assembly.rigid_body_of(pair)
+            values = points_at_obstacle(body, stated.obstacle, body.mesh.part(part_name))
             motion = rigid[str(pair.rigid_body)]
-            moved = stated[pair.rigid_body].motions_at(values.points) @ np.array([motion.x, motion.y, motion.turn])
+            moved = stated.motions_at(values.points) @ np.array([motion.x, motion.y, motion.turn])
             clearance = values.clearance + pair.gap + np.sum(moved * values.directions, axis=1)
             values = values._replace(clearance=clearance)
             facing.setdefault(part_name, []).append(_Measured(pair.name, (owner,), assembly.law_of(pair), values))

@@ -118,6 +118,11 @@ class Solution(SolvedProblem, SolvedBody):
         return self.scene
 
     @property
+    def solved_bodies(self) -> tuple[Solution]:
+        """The one body: the solution itself."""
+        return (self,)
+
+    @property
     def n_elements(self) -> int:
         """Number of elements."""
         return self.mesh.n_elements
@@ -155,8 +160,7 @@ class Solution(SolvedProblem, SolvedBody):
 
     def _parts(self) -> dict[str, Any]:
         return {
-            "estimated_traction_error": self.estimated_traction_error,
-            "estimated_local_traction_error": self.estimated_local_traction_error,
+            **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
             "parts": [force.as_dict() for force in self.part_forces],
             "contacts": [contact.as_dict() for contact in self.contacts],
         }

@@ -17,6 +17,7 @@ from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, at_step, step_rows
+from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
 
@@ -82,6 +83,11 @@ class SolvedProblem(ShownInNotebooks):
     @property
     def _problem(self) -> Scene | Assembly:
         """What was solved; of a load history that of its last step."""
+        raise NotImplementedError
+
+    @property
+    def solved_bodies(self) -> Sequence[SolvedBody]:
+        """The elastic bodies, one or several."""
         raise NotImplementedError
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:

@@ -20,11 +20,12 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.certificate import Certificate
 from bemkit.errors import InputError
 from bemkit.hdf5 import Reader, rows_of, write_table
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.solved_body import SolvedBody
 from bemkit.results.tables import CERTIFICATE_ENTRIES
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
@@ -50,7 +51,7 @@ def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
     places = {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
     step = np.array([row["step"] for row in rows], dtype=np.int64)
     write_table(group.create_group("transitions"), texts | places | {"step": step})
-    for number, body in enumerate(zip(*(_bodies(end) for end in ends), strict=True)):
+    for number, body in enumerate(zip(*(end.solved_bodies for end in ends), strict=True)):
         for name in _FIELDS:
             group[f"bodies/{number}/{name}"] = np.stack([getattr(own.boundary, name).ravel() for own in body])
         group[f"bodies/{number}/energy"] = np.array([own.energy for own in body])
@@ -85,7 +86,7 @@ def read_ends(
     n = len(tables)
     rows = rows_of(reader.table("steps/certificate", floats=CERTIFICATE_ENTRIES))
     transitions = _read_transitions(reader, n)
-    bodies = [_read_body(reader, f"steps/bodies/{number}", body, n) for number, body in enumerate(_bodies(last))]
+    bodies = [_read_body(reader, f"steps/bodies/{number}", body, n) for number, body in enumerate(last.solved_bodies)]
     if len(rows) != n:
         raise InputError(f"{len(rows)} certificates for {n} steps")
     if isinstance(asked, Assembly) != isinstance(last, AssemblySolution):
@@ -147,9 +148,7 @@ def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ..
     return [tuple(each for step, each in rows if step == k) for k in range(n_steps)]
 
 
-def _read_body(
-    reader: Reader, place: str, body: Solution | BodyResult, n_steps: int
-) -> list[tuple[BoundaryFields, float]]:
+def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> list[tuple[BoundaryFields, float]]:
     energies = reader.floats(f"{place}/energy")
     columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS}
     if any(len(column) != n_steps for column in (energies, *columns.values())):
@@ -173,10 +172,6 @@ def _loads(asked: Scene | Assembly) -> Sequence[Scene | Assembly]:
     if isinstance(asked, Assembly):
         return load_steps(asked)
     return load_steps(asked)
-
-
-def _bodies(solution: Solution | AssemblySolution) -> list[Solution | BodyResult]:
-    return [solution] if isinstance(solution, Solution) else list(solution.bodies.values())
 
 
 def _numbers(steps: Sequence[Sequence[object]], kind: type) -> FloatArray:

@@ -18,6 +18,7 @@ from bemkit.model.assembled.energies import with_energies_checked
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
+from bemkit.model.solved_contact import SLIP_TOLERANCE
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import assembly_time
 from bemkit.plan import Plan, announce_plan, check_memory
@@ -33,6 +34,7 @@ from bemkit.runs.steps import History, Kind, joined, solve_steps
 from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
+from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
 
@@ -141,13 +143,13 @@ def assembly_solution(
     """Turn what the driver found into the physical fields of all bodies; the slip is for laws that depend on it."""
     prepared = model.prepared
     law = prepared.law if motion is None else prepared.law.at_slip(motion)
-    table = _contact_table(model, result.state, result.node_status)
+    solved = model.boundary_fields(result.state)
+    furthest = max(float(np.abs(displacement).max()) for displacement, _, _ in solved)
+    table = _contact_table(model, result.state, _at_rest(model, result, furthest))
     slip = table.u_t - model.problem.slip_origin * prepared.units.displacement
     transitions = find_transitions(table, slip)
     bodies = {}
-    for body, (displacement, traction, energy) in zip(
-        prepared.bodies, model.boundary_fields(result.state), strict=True
-    ):
+    for body, (displacement, traction, energy) in zip(prepared.bodies, solved, strict=True):
         space = body.scene.discretisation.traction_space(body.mesh)
         fields = BoundaryFields(
             dof_points(body.space),
@@ -186,6 +188,18 @@ def assembly_solution(
         rigid=rigid,
     )
     return solution.with_warnings(find_assembly_warnings(solution))
+
+
+def _at_rest(model: AssembledModel, result: ContactSolution, furthest: float) -> IntArray:
+    """Return the status of the nodes, those that supports and symmetry lines hold sticking unless they move.
+
+    They have no friction of their own, and count as free to slip in the contact problem. What is seen to move exceeds a
+    share of the largest displacement [m] of the bodies.
+    """
+    held = np.concatenate([rows.is_held & (not rows.law.is_frictionless) for rows in model.prepared.rows])
+    slip = np.abs(result.state.u_t - model.problem.slip_origin) * model.prepared.units.displacement
+    rests = held & (result.node_status != NodeStatus.SEPARATED) & (slip <= SLIP_TOLERANCE * furthest)
+    return np.where(rests, NodeStatus.STICK, result.node_status)
 
 
 def _contact_table(model: AssembledModel, state: ContactState, node_status: IntArray) -> ContactTable:

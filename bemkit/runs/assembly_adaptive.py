@@ -117,7 +117,7 @@ class _Level:
                 parts = [*assembly.contact_parts(body), *(part.name for part in scene.contact_parts)]
                 touching[id(scene)] = tuple(parts)
                 outline = scene.shape.outline()
-                partitions[id(scene)] = scene.mesh.first_partition(outline, scene.selections, parts)
+                partitions[id(scene)] = scene.mesh.first_partition(outline, scene.selections, parts, scene.symmetry)
         return cls(assembly, keys, partitions, touching)
 
     @property

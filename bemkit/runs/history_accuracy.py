@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.refinement import AnyLevel, Refinement
 from bemkit.runs.steps import History, joined
@@ -92,7 +92,7 @@ def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
     on half-planes that with the largest tractions measures those of tractions.
     """
     unit = max(step.error_unit for step in steps)
-    errors = [[body.element_errors for body in _bodies(step)] for step in steps]
+    errors = [[body.element_errors for body in step.solved_bodies] for step in steps]
     known = [[own for own in of_step if own is not None] for of_step in errors]
     if not unit > 0.0 or any(len(own) < len(all_own) for own, all_own in zip(known, errors, strict=True)):
         return steps[-1]
@@ -103,14 +103,16 @@ def worst_of(steps: Sequence[AnySolution]) -> AnySolution:
     if isinstance(worst, AssemblySolution):
         bodies = {name: copy(body) for name, body in worst.bodies.items()}
         object.__setattr__(worst, "bodies", bodies)
-    for body, own in zip(_bodies(worst), largest, strict=True):
+    for body, own in zip(worst.solved_bodies, largest, strict=True):
         vars(body)["element_errors"] = own * share
     vars(worst)["estimated_error"] = float(np.sqrt(sum(float(own.sum()) for own in largest) / unit))
-    of_tractions = [body.mean_traction_errors for step in steps for body in _bodies(step)]
+    of_tractions = [body.mean_traction_errors for step in steps for body in step.solved_bodies]
     known_tractions = [own for own in of_tractions if own is not None]
     if isinstance(worst, Solution) and known_tractions:
         vars(worst)["mean_traction_errors"] = np.max(known_tractions, axis=0)
-        vars(worst)["mean_traction_size"] = max(body.mean_traction_size for step in steps for body in _bodies(step))
+        vars(worst)["mean_traction_size"] = max(
+            body.mean_traction_size for step in steps for body in step.solved_bodies
+        )
         for name in ("estimated_traction_error", "local_traction_errors", "estimated_local_traction_error"):
             vars(worst).pop(name, None)
     return worst
@@ -126,7 +128,3 @@ def _has_meshes(solution: Solution | AssemblySolution, meshes: Mapping[str, Boun
     own = {"": solution.mesh} if isinstance(solution, Solution) else {k: v.mesh for k, v in solution.bodies.items()}
     pairs = [(own[name].lengths, mesh.lengths) for name, mesh in meshes.items()]
     return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)
-
-
-def _bodies(solution: Solution | AssemblySolution) -> list[Solution | BodyResult]:
-    return [solution] if isinstance(solution, Solution) else list(solution.bodies.values())

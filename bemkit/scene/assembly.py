@@ -12,11 +12,13 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
 from bemkit.formulas import closest
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
+from bemkit.scene.halved_bodies import check_place, lines_across
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene
@@ -153,6 +155,10 @@ class Assembly(ShownInNotebooks):
     discretisation : Discretisation
         Of all bodies that have none of their own.
     linear_solver : LinearSolver or Automatic
+    symmetry : Symmetry, optional
+        Lines about which everything is symmetric. Bodies that they cross are halved, and must be drawn in their places;
+        of those beside them only the ones on the side of smaller x, or y, are listed: images stand for the others.
+        Whatever touches its own image at a line needs an obstacle there.
     mesh : MeshOptions
         Of each body that has none of its own; `elements` are those of one body. An accuracy is that of all bodies.
     solver : ContactSolver
@@ -180,6 +186,7 @@ class Assembly(ShownInNotebooks):
     steps: tuple[Step, ...] = ()
     discretisation: Discretisation = field(default_factory=LinearGalerkin)
     linear_solver: LinearSolverChoice = field(default_factory=Automatic)
+    symmetry: Symmetry | None = None
     mesh: MeshOptions = field(default_factory=MeshOptions)
     solver: ContactSolver = field(default_factory=SemismoothNewton)
     units: UnitNames | None = None
@@ -205,6 +212,12 @@ class Assembly(ShownInNotebooks):
             for side in pair.elastic_sides:
                 self._check_side(side)
         self._check_rigid()
+        if self.symmetry is not None:
+            if self.rigid or self.touching is not None:
+                words = "rigid bodies" if self.rigid else "touching"
+                raise InputError(f"symmetry goes with listed contacts of elastic bodies alone: leave it or {words} out")
+            for body in self.placed_bodies:
+                check_place(body, self.symmetry)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         for body in self.placed_bodies:
@@ -323,7 +336,12 @@ class Assembly(ShownInNotebooks):
         and so have bodies that are made of the same objects.
         """
         stated = (body.shape, body.mesh, body.discretisation, *body.parts, None, *body.body_forces)
-        key = (*(id(each) for each in stated), body.material, self.contact_parts(body))
+        key = (
+            *(id(each) for each in stated),
+            body.material,
+            self.contact_parts(body),
+            lines_across(body, self.symmetry),
+        )
         if key not in self._scenes:
             self._scenes[key] = self._new_scene(body)
         return self._scenes[key]
@@ -342,6 +360,7 @@ class Assembly(ShownInNotebooks):
                 body_forces=body.body_forces,
                 law=self.law if touches_obstacle else Frictionless(),
                 steps=self.steps,
+                symmetry=lines_across(body, self.symmetry),
                 discretisation=self.discretisation if body.discretisation is None else body.discretisation,
                 linear_solver=self.linear_solver,
                 mesh=self.mesh if body.mesh is None else body.mesh,
@@ -349,6 +368,10 @@ class Assembly(ShownInNotebooks):
             )
         except InputError as error:
             raise type(error)(f"body {body.name!r}: {error}") from error
+
+    def rigid_body_of(self, pair: ContactPair) -> RigidBody:
+        """Return the rigid body of a contact that has one."""
+        return next(body for body in self.rigid if body.name == pair.rigid_body)
 
     def law_of(self, pair: ContactPair | Touching) -> FrictionLaw:
         """Return the friction law of a contact."""

@@ -151,6 +151,10 @@ class SymmetricGalerkin(Discretisation, Protocol):
 
             return half_plane_needs(case)
         degree = self.displacement_space(case.mesh).degree
+        if case.linear_solver.hierarchical is not None:
+            from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_galerkin_needs
+
+            return hierarchical_galerkin_needs(case, degree)
         return galerkin_needs(case, self.traction_space(case.mesh).n_dofs, degree)
 
 
@@ -236,6 +240,18 @@ class Galerkin(SymmetricGalerkin):
         degrees = self._on(mesh)
         own = None if degrees is None else np.maximum(degrees - 1, 1)
         return LagrangeSpace(mesh, break_nodes(mesh), degree=self.largest_degree - 1, element_degrees=own)
+
+    def why_dense(self, mesh: BoundaryMesh) -> str:
+        """Say what stands in the way: a half-plane, or another degree than 1 or 2 on all elements."""
+        if mesh.surface is not None:
+            return "a half-plane has a map of its own"
+        return "" if set(self._degrees) <= {self.largest_degree} <= {1, 2} else "elements are not of degree 1 or 2"
+
+    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
+        """Return the compressed map."""
+        from bemkit.operators.steklov_poincare.hierarchical_galerkin import HierarchicalGalerkin
+
+        return HierarchicalGalerkin(mesh, material, options, self.displacement_space(mesh), self.traction_space(mesh))
 
     def _on(self, mesh: BoundaryMesh) -> IntArray | None:
         """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
 from bemkit.arrays import FloatArray
@@ -70,6 +70,29 @@ def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
         last, load_factor = step.time, _value(load_factor, step.time)
         changes = {place: _value(value, step.time) for place, value in changes.items()}
     return tuple(states)
+
+
+def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) -> AnyScene:
+    """Return a scene whose load steps are those of another one after a change of each.
+
+    Parameters
+    ----------
+    scene : Scene or Assembly
+    change : callable
+        Takes a scene or an assembly of one step, and returns what it becomes.
+
+    Returns
+    -------
+    Scene or Assembly
+        With the changes of its steps as objects of Python, so that no file can hold them, if it has several.
+    """
+    first, *others = (change(step) for step in load_steps(scene))
+    if not others:
+        return first
+    own = [entry.name for entry in fields(first) if entry.init and entry.name not in ("title", "steps", "load_factors")]
+    names = [name for name in own if any(getattr(step, name) != getattr(first, name) for step in others)]
+    steps = [Step(step.steps[0].time, {name: getattr(step, name) for name in names}) for step in (first, *others)]
+    return replace(first, steps=tuple(steps))
 
 
 def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> AnyScene:

@@ -105,6 +105,24 @@ def check_symmetry(scene: SymmetricScene, mesh: BoundaryMesh) -> None:
                 )
 
 
+def check_law_symmetry(name: str, law: FrictionLaw, points: FloatArray, symmetry: Symmetry, modulus: float) -> None:
+    """Raise unless the friction law of a contact is the same at points (n, 2) and at their images.
+
+    Raises
+    ------
+    AsymmetricSceneError
+    """
+    for signs in symmetry.images[1:]:
+        images = symmetry.reflected(points, signs)
+        own, of_images = (_bounds(law, places, modulus) for places in (points, images))
+        difference = _first_difference(own, of_images, (points, images), signs)
+        if difference is not None:
+            raise AsymmetricSceneError(
+                f"contact {name!r}: its law is not symmetric about {symmetry}: {difference}: correct it, or leave the "
+                "symmetry out"
+            )
+
+
 def find_symmetry(scene: SymmetricScene) -> Symmetry | None:
     """Find the lines through the middle of a body, along x and y, about which a scene is symmetric.
 
@@ -255,9 +273,7 @@ def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tupl
     points, normals = samples.points, samples.normals
     match None if part is None else part.condition:
         case Contact(obstacle=obstacle) if part is not None:
-            law = scene.laws[part.name].at(points)
-            pressures = [np.full(len(points), -p * scene.material.plane_modulus) for p in _PRESSURES]
-            bounds = {f"friction bound at the pressure {-p[0]:.3g}": law.bound(p)[:, None] for p in pressures}
+            bounds = _bounds(scene.laws[part.name], points, scene.material.plane_modulus)
             gap, direction = measure_contact(obstacle, points, normals)
             return "in contact", {"gap": gap[:, None], "direction of contact": direction, **bounds}
         case Traction() | Pressure() as load:
@@ -270,6 +286,13 @@ def _acting(scene: SymmetricScene, part: Part | None, samples: _Samples) -> tupl
         case Roller():
             return "on rollers", {}
     return "free or loaded", {"traction": np.zeros_like(points)}
+
+
+def _bounds(law: FrictionLaw, points: FloatArray, modulus: float) -> dict[str, FloatArray]:
+    """Return the bounds (n, 1) of a law at points and some pressures, by name."""
+    at_points = law.at(points)
+    pressures = [np.full(len(points), -p * modulus) for p in _PRESSURES]
+    return {f"friction bound at the pressure {-p[0]:.3g}": at_points.bound(p)[:, None] for p in pressures}
 
 
 def _largest(values: FloatArray) -> float:

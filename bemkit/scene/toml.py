@@ -32,7 +32,7 @@ _SCENE_KEYS = (
 )
 _ASSEMBLY_KEYS = (
     *("title", "description", "reference", "units", "discretisation", "linear_solver", "solver"),
-    *("load_factors", "steps", "law", "touching", "mesh", "bodies", "rigid", "contacts"),
+    *("load_factors", "steps", "symmetry", "law", "touching", "mesh", "bodies", "rigid", "contacts"),
 )
 _BODY_KEYS = ("shape", "material", "body_forces", "placement", "copies", "discretisation", "mesh", "parts")
 _RIGID_KEYS = ("obstacle", "centre", "x", "y", "turn", "force_x", "force_y", "moment")

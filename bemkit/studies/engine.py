@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from itertools import groupby
 from multiprocessing import get_context, parent_process
 from threading import Thread
-from typing import Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple
 
 from bemkit.errors import BemkitError, InputError, printable
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.record_file import R
-from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import AnySolution
 
 REFUSED = "refused"
 """Status of a scene that is refused by a named error before any step."""
@@ -34,9 +33,6 @@ CONNECT_SECONDS = 10.0
 
 class StudyError(InputError):
     """A study that cannot begin or cannot go on."""
-
-
-AnySolution = TypeVar("AnySolution", bound=Solution | AssemblySolution)
 
 
 class Attempt(NamedTuple, Generic[AnySolution]):

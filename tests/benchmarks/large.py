@@ -1,8 +1,9 @@
-"""Example 1 on compressed equations of collocation, from a thousand elements on, beside dense ones where these fit.
+"""Example 1 on compressed equations, from a thousand elements on, beside dense ones where these fit.
 
-    python tests/benchmarks/large.py [--dense N] [--without-numba] [N ...]
+    python tests/benchmarks/large.py [--dense N] [--without-numba] [--galerkin P] [N ...]
 
-For each number of elements N (default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
+Elements are those of constant collocation, or of Galerkin's method of degree P (1 or 2). For each number of elements N
+(default 1000 2000 5000 10000 20000) it runs `bk.run`, which begins on coarser meshes, and
 prints what the finest mesh takes of it in processor seconds: compressing the equations, the first factorisation, the
 median of later contact steps that change at most `FEW` leaves, and the median of certificates; the memory of all arrays
 that stay; the largest memory of the process; the largest rank; and the certificate and transitions of the solution.
@@ -99,16 +100,18 @@ class Parts:
         HierarchicalBody.imbalance = certified  # type: ignore[method-assign]
 
 
-def scene_of(n_elements: int, linear_solver: object) -> bk.Scene:
+def scene_of(n_elements: int, linear_solver: object, degree: int) -> bk.Scene:
     """Return Example 1."""
     scene = bk.load_scene("paper-1")
-    return replace(scene, mesh=replace(scene.mesh, elements=n_elements), linear_solver=linear_solver)
+    discretisation = bk.Galerkin(degree) if degree else bk.ConstantCollocation()
+    mesh = replace(scene.mesh, elements=n_elements)
+    return replace(scene, mesh=mesh, linear_solver=linear_solver, discretisation=discretisation)
 
 
-def row_of(n_elements: int, parts: Parts, *, with_dense: bool) -> Row:
+def row_of(n_elements: int, parts: Parts, degree: int, *, with_dense: bool) -> Row:
     """Measure one number of elements."""
     clock = time.process_time()
-    solution = bk.run(scene_of(n_elements, bk.Hierarchical()))
+    solution = bk.run(scene_of(n_elements, bk.Hierarchical(), degree))
     whole = time.process_time() - clock
     places = [each.x for each in solution.transitions]
     miss = max(abs(place - known) for place, known in zip(places, REFERENCE, strict=True))
@@ -121,7 +124,7 @@ def row_of(n_elements: int, parts: Parts, *, with_dense: bool) -> Row:
     if not with_dense:
         return row
     clock = time.process_time()
-    dense = run_on_mesh(scene_of(n_elements, bk.DenseCholesky()))
+    dense = run_on_mesh(scene_of(n_elements, bk.DenseCholesky(), degree))
     seconds = time.process_time() - clock
     assert np.array_equal(dense.contact.status, solution.contact.status), "the statuses differ"
     apart = np.abs(dense.contact.sigma_n - solution.contact.sigma_n).max() / np.abs(dense.contact.sigma_n).max()
@@ -175,6 +178,7 @@ def main() -> None:
     parser.add_argument("numbers", nargs="*", type=int, default=[1000, 2000, 5000, 10000, 20000])
     parser.add_argument("--dense", type=int, default=2000)
     parser.add_argument("--without-numba", action="store_true")
+    parser.add_argument("--galerkin", type=int, choices=(1, 2), default=0)
     options = parser.parse_args()
     if options.without_numba:
         compiled.functions = lambda: None  # type: ignore[assignment]
@@ -182,7 +186,7 @@ def main() -> None:
     console, rows, parts = Console(width=160), [], Parts()
     parts.listen()
     for number in options.numbers:
-        rows.append(row_of(number, parts, with_dense=number <= options.dense))
+        rows.append(row_of(number, parts, options.galerkin, with_dense=number <= options.dense))
         console.print(table_of(rows[-1:]))
     console.print(table_of(rows))
     growth = Table(title="growth exponents")

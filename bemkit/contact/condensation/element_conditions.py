@@ -21,8 +21,9 @@ class ElementConditions:
     Parameters
     ----------
     of_traction, of_displacement : (n_contact, 2, 2) arrays
-        ``sigma = of_traction @ t`` and ``u = of_displacement @ u_local``. Where a support holds a node in one
-        direction, what acts there is its reaction: the pressure is what the other one tells, and there is no friction.
+        ``sigma = of_traction @ t``, where t is the force of an element or node by its weight, and
+        ``u = of_displacement @ u_local``. Where a support holds a node in one direction, what acts there is its
+        reaction: the pressure is what the other one tells, and there is no friction.
     is_held : (n_contact,) bool array
         These nodes.
     support : (n_contact, 2) array
@@ -38,8 +39,8 @@ class ElementConditions:
     given: FloatArray
 
     @classmethod
-    def of(cls, conditions: NodalConditions, contact: ContactNodes) -> ElementConditions:
-        """Return what the conditions on all elements and the frames of contact make of it."""
+    def of(cls, conditions: NodalConditions, contact: ContactNodes, weights: FloatArray) -> ElementConditions:
+        """Return what conditions and weights of all elements (n_elements,) and the frames of contact make of it."""
         nodes, is_held = contact.nodes, held_nodes(conditions, contact)
         turn = np.einsum("nkc,njc->nkj", contact.frame, conditions.frame[nodes])
         unit = np.broadcast_to(np.eye(2), turn.shape)
@@ -48,7 +49,8 @@ class ElementConditions:
         pressure[:, 0] = moving / np.where(is_held, np.sum(moving * turn[:, 0], axis=1), 1.0)[:, None]
         support = np.where(is_held[:, None], 1.0 - moving, 0.0)
         return cls(
-            of_traction=np.where(is_held[:, None, None], pressure, unit),
+            of_traction=(weights[nodes] / contact.weights)[:, None, None]
+            * np.where(is_held[:, None, None], pressure, unit),
             of_displacement=np.where(is_held[:, None, None], turn, unit),
             is_held=is_held,
             support=support,

@@ -14,12 +14,13 @@ from bemkit.contact.condensation.element_conditions import ElementConditions, ex
 from bemkit.contact.condensation.nodes import ContactNodes, free_motions, held_nodes
 from bemkit.contact.condensation.reduction import NoContactNodesError
 from bemkit.contact.conditions import LinearConditions, stick
+from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, LoadedSystem
+from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap, LoadedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 _ERROR = 10.0
@@ -44,7 +45,7 @@ class HierarchicalBody(LinearBody):
     loaded : LoadedSystem
         The equations under the given supports and forces.
     nodes : ContactNodes
-        Elements that may touch, along whose frames those of the equations stand.
+        Elements, or nodes of Galerkin's method, that may touch, along whose frames those of the equations stand.
     conditions : NodalConditions
         Of the elements.
     force : (n_elements, 2) array [N/m]
@@ -164,16 +165,18 @@ class HierarchicalBody(LinearBody):
         loaded, mesh, inside = fields.loaded, self.loaded.map.mesh, self.inside
         if not (np.isfinite(fields.displacement).all() and np.isfinite(fields.force).all()):
             return Imbalance(np.nan, np.nan)
-        size = float(np.abs(without_motion(mesh, mesh.centres, fields.displacement - loaded.motion)).max())
-        at_nodes = np.einsum("nkc,nc->nk", self.conditions.frame, fields.force)[self.nodes.nodes]
+        points = dof_points(loaded.map.displacement_space)
+        size = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
+        of_contact = (fields.force - self.force) / loaded.map.weights[:, None]
+        at_nodes = np.einsum("nkc,nc->nk", self.conditions.frame, of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
-        missing = float(np.abs(self.weights[:, None] * state.traction - at_nodes).max())
+        missing = float(np.abs(self.weights[:, None] * (state.traction - at_nodes)).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
         terms = loaded.map.material.plane_modulus * float(np.abs(fields.displacement).max())
         if inside is None and not self.force.any() and largest <= self.accuracy * terms:
             return Imbalance(missing / terms, 0.0) if terms else Imbalance(0.0, 0.0)  # it has only been moved
         of_inside = () if inside is None else (inside.volume_force, inside.inner_force)
-        result = resultant_imbalance(mesh.centres, fields.force, admissible_modes(mesh), 0.0, *of_inside)
+        result = resultant_imbalance(points, fields.force, admissible_modes(mesh), 0.0, *of_inside)
         noise = NOISE_FACTOR * float(np.finfo(float).eps * np.abs(fields.displacement - loaded.motion).max())
         if size > noise:
             left = loaded.system.residual(self._sampled, fields.traction, fields.strained)
@@ -189,7 +192,7 @@ class HierarchicalBody(LinearBody):
         self._solved(stick(state.u_n, state.u_t) if conditions is None else conditions)
         loaded = self._moving
         strained, traction = loaded.everywhere()
-        displacement, force = strained + loaded.motion, traction * loaded.map.mesh.lengths[:, None]
+        displacement, force = strained + loaded.motion, traction * loaded.map.weights[:, None]
         if self.inside is not None:
             displacement, force = displacement + self.inside.displacement, force + self.inside.force
         fields = _Fields(state, loaded, strained, traction, displacement, force)
@@ -199,7 +202,7 @@ class HierarchicalBody(LinearBody):
     @cached_property
     def _sampled(self) -> IntArray:
         """Elements where residuals are evaluated: half of them in contact, without any pattern."""
-        n = self.loaded.map.mesh.n_elements
+        n = len(self.force)
         n_points = min(n, int(np.clip(_SAMPLED_PAIRS // n, _FEWEST_SAMPLED, _MOST_SAMPLED)))
         spread = np.modf(np.arange(1, n_points + 1) * 0.6180339887498949)[0]
         in_contact = self.nodes.nodes[(spread[::2] * self.n_contact).astype(int)]
@@ -216,17 +219,20 @@ class HierarchicalBody(LinearBody):
 
     @cached_property
     def _elements(self) -> ElementConditions:
-        return ElementConditions.of(self.conditions, self.nodes)
+        return ElementConditions.of(self.conditions, self.nodes, self.loaded.map.weights)
 
     @cached_property
-    def _of_inside(self) -> tuple[FloatArray, FloatArray]:
-        """Tractions and displacements of the particular solution (n_contact, 2) in the frames of the elements."""
-        nodes, inside = self.nodes.nodes, self.inside
-        if inside is None:
-            return np.zeros((self.n_contact, 2)), np.zeros((self.n_contact, 2))
-        traction = inside.force[nodes] / self.loaded.map.mesh.lengths[nodes, None]
-        frame = self.conditions.frame[nodes]
-        return np.einsum("nkc,nc->nk", frame, traction), np.einsum("nkc,nc->nk", frame, inside.displacement[nodes])
+    def _known(self) -> tuple[FloatArray, FloatArray]:
+        """Tractions and displacements (n_contact, 2) in the frames of the elements that the equations do not solve for.
+
+        Those of the particular solution for what acts inside; and given forces, of which contact knows nothing.
+        """
+        nodes = self.nodes.nodes
+        force, displacement = -self.force[nodes], np.zeros((self.n_contact, 2))
+        if self.inside is not None:
+            force, displacement = force + self.inside.force[nodes], self.inside.displacement[nodes]
+        frame, traction = self.conditions.frame[nodes], force / self.loaded.map.weights[nodes, None]
+        return np.einsum("nkc,nc->nk", frame, traction), np.einsum("nkc,nc->nk", frame, displacement)
 
     def _solved(self, conditions: LinearConditions) -> ContactState:
         """Return the response; where the contact nodes move rigidly by far more than they strain, solve without that.
@@ -234,7 +240,7 @@ class HierarchicalBody(LinearBody):
         A rigid motion causes no tractions, in the compressed equations none but for their tolerance.
         """
         nodes, asked = self.nodes.nodes, self._elements.at_elements(conditions)
-        frame, (traction, displacement) = self.conditions.frame[nodes], self._of_inside
+        frame, (traction, displacement) = self.conditions.frame[nodes], self._known
         for _ in range(_MOST_SHIFTS):
             loaded = self._moving
             moved = displacement + np.einsum("nkc,nc->nk", frame, loaded.motion[nodes])
@@ -274,7 +280,7 @@ def _left_of(
 
 
 def hierarchical_body(
-    elastic: HierarchicalCollocation,
+    elastic: HierarchicalMap,
     conditions: NodalConditions,
     contact: ContactNodes,
     force: FloatArray,
@@ -284,7 +290,7 @@ def hierarchical_body(
 
     Parameters
     ----------
-    elastic : HierarchicalCollocation
+    elastic : HierarchicalMap
     conditions : NodalConditions
     contact : ContactNodes
         Both as `contact_conditions` has found them.

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.order import along_boundary
@@ -125,6 +125,7 @@ class ContactSide:
     def flat_normal(self) -> FloatArray | None:
         """(2,) array: outward unit normal if all elements lie on one line, else None.
 
+        None, too, of a side that goes on behind a symmetry line in another direction.
         It is free of the round-off in the directions of short elements.
         """
         along = (self.end - self.start).sum(axis=0)
@@ -132,9 +133,16 @@ class ContactSide:
         if not self.is_straight or size < self.lengths.max():
             return None
         normal = turned_right(along / size)
+        if (np.abs(normal) > _RESOLUTION)[self._ends_on_lines.any(axis=(0, 1))].any():
+            return None
         off_line = (np.concatenate([self.start, self.end]) - self.start[0]) @ normal
         is_flat = np.abs(off_line).max() <= self.resolution and np.all((self.end - self.start) @ along > 0.0)
         return normal if is_flat else None
+
+    @cached_property
+    def _ends_on_lines(self) -> BoolArray:
+        """(m, 2, 2) array: whether start and end of each element lie on the symmetry lines along y and along x."""
+        return self.mesh.on_symmetry_lines[self.mesh.elements[self.elements]]
 
     @cached_property
     def normals(self) -> FloatArray:
@@ -144,6 +152,10 @@ class ContactSide:
         at_knots = self.mesh.normals_at(self.elements, self.knots)
         total = np.zeros((int(self.knot_numbers.max()) + 1, 2))
         np.add.at(total, self.knot_numbers, at_knots)
+        # the image of an element that ends on a symmetry line takes part in the mean
+        is_across = np.zeros(total.shape, bool)
+        np.logical_or.at(is_across, self.knot_numbers[:, [0, -1]], self._ends_on_lines)
+        total[is_across] = 0.0
         size = norms(total)
         # elements that fold back onto each other leave no mean
         return (

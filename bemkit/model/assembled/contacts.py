@@ -20,6 +20,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.assembly import Assembly, ContactPair
+from bemkit.scene.symmetry import check_law_symmetry
 
 OVERLAP_TOLERANCE = 1e-6
 """Share of the size of the smaller body by which shapes may overlap without anybody meaning it: round-off of curves."""
@@ -152,6 +153,9 @@ def body_rows(
             )
         except ValueError as error:
             raise type(error)(f"contact {pairs[k].name!r}: {error}") from error
+        if assembly.symmetry is not None:
+            law, modulus = assembly.law_of(pairs[k]), bodies[first].material.plane_modulus
+            check_law_symmetry(pairs[k].name, law, coupling.points, assembly.symmetry, modulus)
         size = min(bodies[number].mesh.diameter for number in (first, second))
         check_overlap(pairs[k], coupling.overlap, coupling.deepest, size)
         for number, name, one in ordered[k]:

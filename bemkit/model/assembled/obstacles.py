@@ -72,7 +72,7 @@ def obstacle_rows(
 
 
 def _facing(pair: ContactPair, assembly: Assembly) -> FacingPart:
-    obstacle = next(body.obstacle for body in assembly.rigid if body.name == pair.rigid_body)
+    obstacle = assembly.rigid_body_of(pair).obstacle
     return FacingPart(pair.name, _part(pair), obstacle, assembly.law_of(pair).is_frictionless)
 
 

@@ -18,6 +18,7 @@ from bemkit.operators.material import Material
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.scene import Scene
+from bemkit.scene.symmetry import check_symmetry
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +131,8 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
             drawn = meshes[body.name]
         else:
             drawn = divided.setdefault(id(scene), divided.get(id(scene)) or _divided(scene, assembly, body))
+        if scene.symmetry is not None:
+            check_symmetry(scene, drawn)
         mesh = body.placement.mesh(drawn)
         check_position(drawn, f"body {body.name!r}, where it is drawn,")
         check_position(mesh, f"body {body.name!r}")
@@ -140,7 +143,7 @@ def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) 
 def _divided(scene: Scene, assembly: Assembly, body: Body) -> BoundaryMesh:
     even = [*(part.name for part in scene.contact_parts), *assembly.contact_parts(body)]
     try:
-        return scene.mesh.divide(scene.shape.outline(), scene.selections, even)
+        return scene.mesh.divide(scene.shape.outline(), scene.selections, even, scene.symmetry)
     except GeometryError as error:
         raise type(error)(f"body {body.name!r}: {error}") from error
 

@@ -20,13 +20,12 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
 from bemkit.model.assembled.obstacles import obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
+from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
-from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
@@ -322,9 +321,6 @@ def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver
     """Return the linear solver that the map of a body takes, and why."""
     body, conditions = prepared.bodies[number], prepared.conditions[number]
     requested, discretisation = prepared.assembly.linear_solver, body.scene.discretisation
-    if not discretisation.is_symmetric:
-        material = body.material.scaled(prepared.units.modulus)
-        case = BodyCase(body.own_mesh, material, conditions, (prepared.map_data(number),), is_condensed=True)
-        return choose_collocation_solver(requested, case, physical_memory(), discretisation.why_dense(body.own_mesh))
-    n_retained = int(np.count_nonzero(conditions.is_retained))
-    return choose_linear_solver(requested, body.space.n_dofs, n_retained, physical_memory())
+    material = body.material.scaled(prepared.units.modulus)
+    case = BodyCase(body.own_mesh, material, conditions, (prepared.map_data(number),), is_condensed=True)
+    return linear_solver_of(requested, discretisation, case, body.space, physical_memory())

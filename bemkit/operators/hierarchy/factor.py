@@ -19,7 +19,8 @@ from functools import partial
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.operators.hierarchy.compression import Compression, Skeleton
+from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.skeletons import Skeleton
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -54,11 +55,13 @@ class Border:
     errors : (2 n_elements, n_border) array
         Columns of the additional unknowns in the equations.
     balances : (n_border, 4 n_elements) array
-        Additional equations: balances @ (t_x, t_y, u_x, u_y of all elements) = 0.
+        Additional equations: balances @ (t_x, t_y, u_x, u_y of all elements) + own @ errors = 0.
+    own : (n_border, n_border) array
     """
 
     errors: FloatArray
     balances: FloatArray
+    own: FloatArray
 
 
 class SingularClusterError(SingularMatrixError):
@@ -211,7 +214,7 @@ class HierarchicalFactor:
         def cluster_at(level: int, cluster: int) -> _Cluster:
             return path[level] if cluster == leaf >> level else self._cluster(level, cluster).unloaded(k)
 
-        parts = self._descend(_of_border(path[-1]), leaves, cluster_at)
+        parts = self._descend(self._of_border(path[-1]), leaves, cluster_at)
         return np.concatenate([np.zeros((0, k)), *parts]).reshape(-1, 2, k)
 
     def _descend(
@@ -235,7 +238,7 @@ class HierarchicalFactor:
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
         root = self._cluster(-1, 0)
-        return _of_border(root)[:, 0]
+        return self._of_border(root)[:, 0]
 
     @property
     def n_bytes(self) -> int:
@@ -249,8 +252,8 @@ class HierarchicalFactor:
         rows = np.arange(2 * places.start, 2 * places.stop)
         n, n_border = places.stop - places.start, self.border.errors.shape[1]
         entries = np.zeros((4 * n, rows.size))
-        own = columns - 4 * places.start
-        entries[own] = compression.columns.entries(rows, columns).T
+        entries[columns - 4 * places.start] = compression.columns.entries(rows, columns).T
+        own = compression.columns.felt(columns) - 4 * places.start
         skeleton = compression.skeletons[0][number]
         outgoing = np.zeros((4 * n, skeleton.columns.size + n_border))
         outgoing[own, : skeleton.columns.size] = skeleton.column_map.matrix()
@@ -323,8 +326,7 @@ class HierarchicalFactor:
         """Return the skeleton of a cluster, none of the root."""
         return None if level == self.compression.tree.n_levels else self.compression.skeletons[level][cluster]
 
-
-def _of_border(root: _Cluster) -> FloatArray:
-    """Return the unknowns (n_border, k) of the boundary as a whole."""
-    error = SingularMatrixError("the balance of the body is singular: check that supports and contacts hold the body")
-    return _LU(root.scattering, error).solve(root.alone)
+    def _of_border(self, root: _Cluster) -> FloatArray:
+        """Return the unknowns (n_border, k) of the boundary as a whole."""
+        error = SingularMatrixError("the balance of the body is singular: check that supports and contacts hold it")
+        return _LU(root.scattering - self.border.own, error).solve(root.alone)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 
 PROXY_RATIO = 2.0
@@ -35,7 +35,7 @@ class Discs:
     radius: FloatArray
 
     @classmethod
-    def of(cls, columns: BoundaryColumns, tree: ClusterTree, level: int) -> Discs:
+    def of(cls, columns: Columns, tree: ClusterTree, level: int) -> Discs:
         """Return the discs of a level of a tree."""
         begins = tree.bounds[: -1 : 2**level]
         counts = np.diff(np.append(begins, columns.n_elements))
@@ -68,7 +68,7 @@ def n_proxies(tolerance: float) -> int:
     return int(2.2 * np.log(1.0 / tolerance) / np.log(PROXY_RATIO)) + 8
 
 
-def extents(columns: BoundaryColumns) -> FloatArray:
+def extents(columns: Columns) -> FloatArray:
     """Return how far from the middle of each element its unknowns act [m]."""
     ends = np.stack([columns.start, columns.centre, columns.end])
     far: FloatArray = np.abs(ends[:, columns.reach] - columns.centre[: columns.n_elements]).max(axis=(0, 1))

@@ -1,4 +1,4 @@
-"""The boundary equations of collocation under supports, loads and conditions of contact, compressed and factored."""
+"""Boundary equations under supports, loads and conditions of contact, compressed and factored."""
 
 from __future__ import annotations
 
@@ -7,19 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.reciprocity import HoleSource, Reciprocity
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_laws import solve_conditions
 from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
-from bemkit.operators.hierarchy.folded_columns import boundary_columns
-from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import traction_free_modes
-
-LEAF_SIZE = 88
-"""Elements of a leaf: larger ones cost more to factor, smaller ones have skeletons nearly as large as themselves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,54 +50,29 @@ class UndeterminedError(SingularMatrixError):
 
 
 class HierarchicalSystem:
-    """(1/2 + T) u = U t over a tree, with two conditions on each element.
+    """Boundary equations over a tree, with two conditions on each element or node.
 
     Parameters
     ----------
-    mesh : BoundaryMesh
-    material : Material
+    compression : Compression
+    border : Border
     frame : (n_elements, 2, 2) array
-        Rows are the directions of the conditions of each element.
-    may_be_traction, may_be_displacement : (n_elements,) bool arrays
-        Elements whose traction, and whose displacement, may ever differ from zero.
-    slopes : bool
-        Whether the double layer takes slopes.
-    tolerance : float
-        Of the compression; tractions and displacements err by a few times that.
+        Rows are the directions of the conditions of each element; those of Galerkin's method stand at nodes.
+    displacement_unit : float [m/Pa]
+        Displacement by traction of a single element.
 
     Notes
     -----
-    The equations, the balances of the tractions and the reciprocities are those of
-    `bemkit.operators.steklov_poincare.mixed_system.MixedSystem`.
+    Places of the tree beyond the elements, holes or tractions that no condition binds, have a traction alone.
     """
 
-    def __init__(
-        self,
-        mesh: BoundaryMesh,
-        material: Material,
-        frame: FloatArray,
-        *,
-        may_be_traction: BoolArray,
-        may_be_displacement: BoolArray,
-        slopes: bool,
-        tolerance: float,
-    ) -> None:
-        n, holes = mesh.n_elements, _holes(mesh)
-        at_holes = [
-            [source.centre.real, source.centre.imag] for source in (HoleSource.of(mesh, each) for each in holes)
-        ]
-        self._tree = ClusterTree.of(np.concatenate([mesh.centres, np.reshape(at_holes, (-1, 2))]), LEAF_SIZE)
-        self._order, self._n_elements = self._tree.order, n
+    def __init__(self, compression: Compression, border: Border, frame: FloatArray, displacement_unit: float) -> None:
+        self.compression, self._tree, self._columns = compression, compression.tree, compression.columns
+        self._order, self._n_elements, self._unit = self._tree.order, len(frame), displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
-        self._columns = boundary_columns(mesh, material, self._order, takes_slopes=slopes, holes=holes)
-        may_differ = np.repeat(np.stack([may_be_traction, may_be_displacement], axis=1), 2, axis=1)
-        may_differ = np.concatenate([may_differ, np.tile([True, True, False, False], (len(holes), 1))])
-        self.compression = Compression.of(self._columns, self._tree, may_differ[self._order], tolerance)
-        border = _border(mesh, material, self._order, slopes, has_holes=not holes)
-        self.factor = HierarchicalFactor(self.compression, border)
-        self._frame = np.concatenate([frame, np.tile(np.eye(2), (len(holes), 1, 1))])
-        self._unit = mesh.diameter / n / material.plane_modulus  # displacement by traction of a single element
+        self.factor = HierarchicalFactor(compression, border)
+        self._frame = np.concatenate([frame, np.tile(np.eye(2), (self._order.size - len(frame), 1, 1))])
 
     @property
     def n_elements(self) -> int:
@@ -183,8 +149,16 @@ class HierarchicalSystem:
         state[self._order] = self._states()
         return state[: self.n_elements, :2], state[: self.n_elements, 2:]
 
+    def beyond(self) -> FloatArray:
+        """Return the tractions (n, 2), in x and y, at the places beyond the elements, under the same conditions."""
+        state = np.empty((self._order.size, 4))
+        state[self._order] = self._states()
+        return state[self.n_elements :, :2]
+
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return what is left (n, 2) of the equations of some elements, all integrals in closed form.
+        """Return what is left (n, 2) of the equations of some elements, nothing compressed, as displacements.
+
+        Those of Galerkin's method are the equations of nodes, and of the tractions around them.
 
         Parameters
         ----------
@@ -192,13 +166,13 @@ class HierarchicalSystem:
         traction, displacement : (n_elements, 2) arrays
             As `everywhere` has returned them.
         """
-        places, border = self._place[elements], self.factor.border
+        places, border = self._columns.beside(self._place[elements]), self.factor.border
         of_all = self._states()
         is_element = self._order < self.n_elements
         of_all[is_element] = np.concatenate([traction, displacement], axis=1)[self._order[is_element]]
         left = self._columns.applied(places, of_all[:, :2], of_all[:, 2:])
         errors = border.errors.reshape(self._order.size, 2, -1)[places] @ self.factor.errors()
-        return left + errors
+        return (left + errors) / self._columns.sizes[places, None]
 
     def laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions on all elements make of their tractions and displacements, by place, in x and y."""
@@ -232,30 +206,3 @@ class HierarchicalSystem:
 
     def _places_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])
-
-
-def _holes(mesh: BoundaryMesh) -> list[IntArray]:
-    """Return the elements of each hole; none of a symmetric body, whose sources are several."""
-    if mesh.symmetry is not None:
-        return []
-    return [loop for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True) if area <= 0.0]
-
-
-def _border(mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool, *, has_holes: bool) -> Border:
-    """Return the errors and balances that the equations of collocation have besides, by place.
-
-    Those of holes are among them unless these have places of their own.
-    """
-    n = mesh.n_elements
-    motions = traction_free_modes(mesh, mesh.centres)
-    reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes, has_holes=has_holes)
-    compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
-    on_traction = np.concatenate([motions.T * (compliance * np.repeat(mesh.lengths, 2)), reciprocity.on_traction])
-    on_displacement = np.concatenate([np.zeros(motions.T.shape), reciprocity.on_displacement])
-    errors = np.column_stack([motions, reciprocity.fields])
-    n_border = errors.shape[1]
-    balances = np.concatenate([on_traction.reshape(n_border, n, 2), -on_displacement.reshape(n_border, n, 2)], axis=2)
-    n_holes = order.size - n
-    by_place = np.concatenate([errors.reshape(n, 2, n_border), np.zeros((n_holes, 2, n_border))])[order]
-    balances = np.concatenate([balances, np.zeros((n_border, n_holes, 4))], axis=1)[:, order]
-    return Border(by_place.reshape(2 * order.size, n_border), balances.reshape(n_border, 4 * order.size))

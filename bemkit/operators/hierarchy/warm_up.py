@@ -11,6 +11,7 @@ from bemkit.errors import InputError
 from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.element_pairs import ElementPairs
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
@@ -41,17 +42,21 @@ def warm_up() -> Iterator[Compiled]:
     """
     if not compiled.is_installed():
         raise InputError(f"nothing to compile: numba is {compiled.why()}")
-    from bemkit.operators.hierarchy import compiled_curved, compiled_fields
+    from bemkit.operators.hierarchy import compiled_curved, compiled_fields, compiled_pairs
 
     square, disk = (discretise(of.outline(), n_elements=_ELEMENTS).unit for of in (Rectangle(1.0, 1.0), Disk(1.0)))
     for what, mesh, module in (
         ("straight elements", square, compiled_fields),
         ("curved elements", disk, compiled_curved),
+        ("Galerkin's method", square, compiled_pairs),
     ):
         was_kept = compiled.is_cached(module)
         if compiled.functions() is None:
             raise InputError(f"nothing to compile: {compiled.why()}")
-        _use(mesh)
+        if module is compiled_pairs:
+            ElementPairs.of(mesh, 1).integrals(*2 * (np.arange(mesh.n_elements),))
+        else:
+            _use(mesh)
         yield Compiled(what, was_kept)
 
 

@@ -230,8 +230,8 @@ class Automatic:
 class Hierarchical:
     """Boundary equations compressed over a tree and factored there: time and memory grow like the number of elements.
 
-    For constant collocation; elsewhere what `Automatic` takes is taken, and the
-    plan says why.
+    For constant collocation, and for Galerkin's method of degree 1 and 2; elsewhere what `Automatic` takes is taken,
+    and the plan says why.
 
     Parameters
     ----------

@@ -1,14 +1,17 @@
-"""Direct collocation whose equations are compressed over a tree instead of stored; see `bemkit.operators.hierarchy`."""
+"""Elastic maps whose equations are compressed over a tree instead of stored; see `bemkit.operators.hierarchy`."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
+from bemkit.operators.hierarchy.collocation_system import collocation_system
 from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
@@ -23,21 +26,30 @@ class InexactEquationsError(SingularMatrixError):
     """Compressed equations that are not as accurate as their tolerance says."""
 
 
-class HierarchicalCollocation(CollocationElasticity):
-    """The map of `CollocationElasticity` that solves over a tree.
+class HierarchicalMap(ABC):
+    """An elastic map that solves over a tree; see `SteklovPoincare`."""
 
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-    material : Material
-    options : Hierarchical
-    slopes : bool
-        As of `CollocationElasticity`.
-    """
+    mesh: BoundaryMesh
+    material: Material
+    options: Hierarchical
+    displacement_space: BoundarySpace
+    keeps_rotations: bool
 
-    def __init__(self, mesh: BoundaryMesh, material: Material, options: Hierarchical, *, slopes: bool = True) -> None:
-        super().__init__(mesh, material, slopes=slopes)
-        self.options = options
+    @property
+    @abstractmethod
+    def weights(self) -> FloatArray:
+        """(n_nodes,) array [m]: by which tractions become the forces of nodes."""
+
+    @abstractmethod
+    def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
+        """Return the compressed equations in the frames of nodes.
+
+        Parameters
+        ----------
+        conditions : NodalConditions
+        may_be_loaded, may_move : (n_nodes,) bool arrays
+            Nodes whose traction, and whose displacement, may ever differ from zero.
+        """
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Solve for a unit displacement of each retained direction; see `SteklovPoincare.condense`.
@@ -65,7 +77,7 @@ class HierarchicalCollocation(CollocationElasticity):
     def _condensed(self, loaded: LoadedSystem, stiffness: FloatArray) -> CondensedMap:
         def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
             displacement, traction = loaded.recovered(retained_displacement)
-            return displacement, traction * self.mesh.lengths[:, None]
+            return displacement, traction * self.weights[:, None]
 
         def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
             displacement, _ = recover(np.zeros(loaded.retained.size))
@@ -80,6 +92,40 @@ class HierarchicalCollocation(CollocationElasticity):
         if loaded.retained.size:
             load = -np.einsum("nkc,nc->nk", loaded.conditions.frame, forces - loaded.force).ravel()[loaded.retained]
         return CondensedMap(stiffness, load, recover, under, follow)
+
+
+class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
+    """The map of `CollocationElasticity` that solves over a tree.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    options : Hierarchical
+    slopes : bool
+        As of `CollocationElasticity`.
+    """
+
+    def __init__(self, mesh: BoundaryMesh, material: Material, options: Hierarchical, *, slopes: bool = True) -> None:
+        super().__init__(mesh, material, slopes=slopes)
+        self.options, self.keeps_rotations = options, slopes
+
+    @property
+    def weights(self) -> FloatArray:
+        """(n_elements,) array [m]: their lengths."""
+        return self.mesh.lengths
+
+    def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
+        """Return the compressed equations of elements."""
+        return collocation_system(
+            self.mesh,
+            self.material,
+            conditions.frame,
+            may_be_traction=may_be_loaded,
+            may_be_displacement=may_move,
+            slopes=self.slopes,
+            tolerance=self.options.tolerance,
+        )
 
 
 _LEAST_TURN = 1e-9
@@ -97,7 +143,7 @@ class LoadedSystem:
 
     Parameters
     ----------
-    map : HierarchicalCollocation
+    map : HierarchicalMap
     conditions : NodalConditions
         Of the elements.
     system : HierarchicalSystem
@@ -116,7 +162,7 @@ class LoadedSystem:
         only, which counts where a body moves by far more than it strains.
     """
 
-    map: HierarchicalCollocation
+    map: HierarchicalMap
     conditions: NodalConditions
     system: HierarchicalSystem
     known: ElementLaws
@@ -127,22 +173,14 @@ class LoadedSystem:
     travel: FloatArray
 
     @classmethod
-    def of(cls, map: HierarchicalCollocation, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
+    def of(cls, map: HierarchicalMap, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
         """Compress the equations of a body."""
         is_loaded, is_moved = _loaded(conditions, force)
         may_be_loaded = is_loaded | ~conditions.is_free.all(axis=1)
         may_move = is_moved | ~conditions.is_fixed.all(axis=1)
-        system = HierarchicalSystem(
-            map.mesh,
-            map.material,
-            conditions.frame,
-            may_be_traction=may_be_loaded,
-            may_be_displacement=may_move,
-            slopes=map.slopes,
-            tolerance=map.options.tolerance,
-        )
+        system = map.system(conditions, may_be_loaded, may_move)
         motions = free_modes(map.displacement_space, conditions)
-        if not map.slopes:  # constant elements resist a rotation
+        if not map.keeps_rotations:  # constant elements resist a rotation
             motions = motions[np.ptp(motions, axis=1).max(axis=1, initial=0.0) < _LEAST_TURN]
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
@@ -172,9 +210,9 @@ class LoadedSystem:
     def moved(self, travel: FloatArray) -> LoadedSystem:
         """Return the equations of what is left of the displacements beside a further rigid motion (n_motions,)."""
         other = replace(self, travel=self.travel + travel)
-        conditions, mesh = self.conditions, self.map.mesh
+        conditions = self.conditions
         motion = np.einsum("nkc,nc->nk", conditions.frame, other.motion)
-        traction = np.einsum("nkc,nc->nk", conditions.frame, self.force) / mesh.lengths[:, None]
+        traction = np.einsum("nkc,nc->nk", conditions.frame, self.force) / self.map.weights[:, None]
         given = np.where(conditions.is_fixed, conditions.displacement - motion, 0.0)
         known = self.system.laws(NodeConditions.given(~conditions.is_free, traction, given))
         return replace(other, known=known)
@@ -206,8 +244,7 @@ class LoadedSystem:
         retained = self.retained
         if not retained.size:
             return np.zeros((0, 0))
-        lengths = self.map.mesh.lengths[retained // 2]
-        stiffness = lengths[:, None] * self.responses(retained)[0]
+        stiffness = self.map.weights[retained // 2, None] * self.responses(retained)[0]
         # what no support resists costs no force, in the compressed equations but for their tolerance
         motions = np.einsum("nkc,ncm->nkm", self.conditions.frame, self.motions).reshape(self.force.size, -1)
         basis = np.linalg.qr(motions[retained])[0]
@@ -222,7 +259,7 @@ class LoadedSystem:
         travel = None if elements.size == 0 else self.travel_of(elements, held)
         loaded = self if travel is None else self.moved(travel)
         motion = np.einsum("nkc,nc->nk", self.conditions.frame, loaded.motion)
-        traction = np.einsum("nkc,nc->nk", self.conditions.frame, self.force) / self.map.mesh.lengths[:, None]
+        traction = np.einsum("nkc,nc->nk", self.conditions.frame, self.force) / self.map.weights[:, None]
         given = NodeConditions.given(
             ~self.conditions.is_free[elements], traction[elements], (displacement - motion)[elements]
         )
@@ -233,7 +270,7 @@ class LoadedSystem:
     def residual(self, retained_displacement: FloatArray) -> float:
         """Return the residual of the boundary equations at some elements by the largest displacement."""
         displacement, traction = self.recovered(retained_displacement)
-        n = self.map.mesh.n_elements
+        n = self.force.shape[0]
         sampled = np.unique(np.linspace(0, n - 1, _SAMPLED).astype(int))
         size = float(np.abs(displacement).max())
         return float(np.abs(self.system.residual(sampled, traction, displacement)).max()) / size if size else 0.0

@@ -1,4 +1,4 @@
-"""Whether the equations of collocation are compressed over a tree, and what that takes, foreseen from sizes alone.
+"""Whether boundary equations are compressed over a tree, and what that takes, foreseen from sizes alone.
 
 Times and memory are those of a square with 1e4 to 1e5 elements (`tests/benchmarks/large.py` measures what is estimated
 here); they hardly depend on the shape.
@@ -7,7 +7,7 @@ here); they hardly depend on the shape.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,13 @@ from bemkit.operators.linear.solvers import (
     LinearSolver,
     LinearSolverChoice,
 )
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem, collocation_needs
+from bemkit.operators.steklov_poincare.needs import (
+    BodyCase,
+    BodyNeeds,
+    PlanItem,
+    collocation_needs,
+    galerkin_needs,
+)
 
 _DIRECT: LinearSolver = DenseCholesky()
 _FEWEST_ELEMENTS = 200
@@ -35,10 +41,31 @@ _EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
 """Seconds of a closed-form integral, of a flop on small blocks, and of one in the factorisation of a large matrix."""
 _CONTACT_STEPS, _SHARE_OF_STEP = 8.0, 0.1
 """Contact steps of a load step, and what each takes of the compressed equations, by their factorisation."""
-_EVALUATIONS, _EVALUATIONS_COMPILED, _FLOPS = 40e3, 6e3, 1.6e6
-"""For each element at the tolerance 1e-10."""
-_BYTES, _BYTES_OF_CONTACT = 8.5e3, 3.5e3
-"""Of an element at the tolerance 1e-10, and of one in contact besides, where both tractions and displacements are."""
+
+
+@dataclass(frozen=True)
+class _Costs:
+    """Of an element at the tolerance 1e-10.
+
+    Parameters
+    ----------
+    evaluations, compiled : float
+        In numpy, and compiled.
+    flops : float
+    n_bytes, of_contact : float
+        Memory, and that of an element in contact besides, where both tractions and displacements are.
+    """
+
+    evaluations: float
+    compiled: float
+    flops: float
+    n_bytes: float
+    of_contact: float
+
+
+_COLLOCATION = _Costs(40e3, 6e3, 1.6e6, 8.5e3, 3.5e3)
+_GALERKIN = {1: _Costs(250e3, 100e3, 4e6, 21e3, 0.0), 2: _Costs(500e3, 190e3, 8e6, 41e3, 0.0)}
+"""By the degree of the displacements."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
 """Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
@@ -82,15 +109,59 @@ def choose_collocation_solver(
     ChosenLinearSolver
         The compressed equations if they are asked for, or promise to be at least twice as fast, or nothing else fits.
     """
-    hindrance = hindrance or why_dense(case)
-    options = requested if isinstance(requested, Hierarchical) else Hierarchical()
     if not isinstance(requested, Automatic | Hierarchical):
         return ChosenLinearSolver(requested, "asked for")
-    if hindrance:
+    if hindrance := hindrance or why_dense(case):
         return ChosenLinearSolver(_DIRECT, f"the equations are not compressed, because {hindrance}")
+    dense = collocation_needs(case, takes_slopes=True)
+    gain = _gain(requested, case, dense, _COLLOCATION, memory)
+    return gain if isinstance(gain, ChosenLinearSolver) else ChosenLinearSolver(_DIRECT, gain)
+
+
+def choose_galerkin_solver(
+    requested: Automatic | Hierarchical,
+    case: BodyCase,
+    otherwise: ChosenLinearSolver,
+    n_tractions: int,
+    degree: int,
+    memory: float,
+    hindrance: str,
+) -> ChosenLinearSolver:
+    """Choose between the compressed equations of Galerkin's method and what is chosen otherwise.
+
+    Parameters
+    ----------
+    requested : Hierarchical or Automatic
+    case : BodyCase
+        Its linear solver counts for nothing.
+    otherwise : ChosenLinearSolver
+    n_tractions : int
+        Components of all traction dofs.
+    degree : int
+        Of the displacements.
+    memory : float [bytes]
+        Of the computer.
+    hindrance : str
+        Why the equations cannot be compressed; empty if they can.
+    """
+    if case.mesh.n_elements < _FEWEST_ELEMENTS:
+        hindrance = hindrance or f"{case.mesh.n_elements} elements are few"
+    if hindrance:
+        reason = f"{otherwise.reason}; the equations are not compressed, because {hindrance}"
+        return replace(otherwise, reason=reason) if isinstance(requested, Hierarchical) else otherwise
+    dense = galerkin_needs(replace(case, linear_solver=otherwise), n_tractions, degree)
+    gain = _gain(requested, case, dense, _GALERKIN[degree], memory)
+    return gain if isinstance(gain, ChosenLinearSolver) else replace(otherwise, reason=f"{otherwise.reason}; {gain}")
+
+
+def _gain(
+    requested: Automatic | Hierarchical, case: BodyCase, dense: BodyNeeds, costs: _Costs, memory: float
+) -> ChosenLinearSolver | str:
+    """Return the compressed equations if they are worth it, or say why they are not."""
     if isinstance(requested, Hierarchical):
-        return ChosenLinearSolver(_DIRECT, "asked for", options)
-    dense, compressed = collocation_needs(case, takes_slopes=True), _needs(case, options)
+        return ChosenLinearSolver(_DIRECT, "asked for", requested)
+    options = Hierarchical()
+    compressed = _needs(case, options, costs)
     of_dense = _FLOP_OF_LARGE * (dense.flops + _CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
     share = _seconds(compressed) / (_EVALUATION * dense.evaluations + of_dense)
     if share < _SHARE:
@@ -98,7 +169,20 @@ def choose_collocation_solver(
     if compressed.memory < memory < dense.memory:
         reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, this computer has {memory / 1e9:.3g} GB"
         return ChosenLinearSolver(_DIRECT, reason, options)
-    return ChosenLinearSolver(_DIRECT, f"compressed over a tree they would take {share:.2g} times as long")
+    return f"compressed over a tree they would take {share:.2g} times as long"
+
+
+def hierarchical_galerkin_needs(case: BodyCase, degree: int) -> BodyNeeds:
+    """Return what the compressed equations of Galerkin's method take, as `hierarchical_needs`."""
+    options, costs = case.linear_solver.hierarchical or Hierarchical(), _GALERKIN[degree]
+    reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
+    items = (
+        PlanItem("boundary equations", True, f"single and double layer and hypersingular operator, {reason}"),
+        PlanItem("adjoint double layer K'", False, "it is the transpose of K"),
+        PlanItem("Steklov-Poincare map", False, "tractions and displacements are both unknowns; V is not inverted"),
+        *_tree_items(case, options, costs),
+    )
+    return replace(_needs(case, options, costs), items=items)
 
 
 def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
@@ -110,33 +194,35 @@ def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
         PlanItem("boundary equations", True, f"single and double layer, {reason}"),
         PlanItem("slopes between constant elements", takes_slopes, slopes),
         PlanItem("hypersingular operator W", False, "collocation takes the displacement equation alone"),
+        *_tree_items(case, options, _COLLOCATION),
+    )
+    return replace(_needs(case, options, _COLLOCATION), items=items)
+
+
+def _tree_items(case: BodyCase, options: Hierarchical, costs: _Costs) -> tuple[PlanItem, PlanItem, PlanItem]:
+    """Say how the tree is solved, which kernels are used, and what the others would cost."""
+    is_compiled = compiled.functions() is not None
+    here, there = (_seconds(_needs(case, options, costs, is_compiled=each)) for each in (is_compiled, not is_compiled))
+    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
+    return (
         PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
-        _kernels(case, options),
+        PlanItem("compiled kernels (numba)", is_compiled, f"{compiled.why()}; {others}"),
         PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
     )
-    return replace(_needs(case, options), items=items)
-
-
-def _kernels(case: BodyCase, options: Hierarchical) -> PlanItem:
-    """Say which kernels are used, and what the others would cost."""
-    is_compiled = compiled.functions() is not None
-    here, there = (_seconds(_needs(case, options, is_compiled=each)) for each in (is_compiled, not is_compiled))
-    others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
-    return PlanItem("compiled kernels (numba)", is_compiled, f"{compiled.why()}; {others}")
 
 
 def _seconds(needs: BodyNeeds) -> float:
     return _EVALUATION * needs.evaluations + _FLOP * needs.flops
 
 
-def _needs(case: BodyCase, options: Hierarchical, *, is_compiled: bool | None = None) -> BodyNeeds:
+def _needs(case: BodyCase, options: Hierarchical, costs: _Costs, *, is_compiled: bool | None = None) -> BodyNeeds:
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
-    memory = int(digits * (_BYTES * n + _BYTES_OF_CONTACT * n_both))
+    memory = int(digits * (costs.n_bytes * n + costs.of_contact * n_both))
     if is_compiled is None:
         is_compiled = compiled.is_installed()  # whether it works takes a while to find out
-    evaluations = digits * n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
-    flops = digits * _FLOPS * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
+    evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
+    flops = digits * costs.flops * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
     if case.is_condensed:
         memory += int(_BYTES_OF_STATE * case.n_retained**2)
         flops += _FLOPS_OF_STATE * case.n_retained**2

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from bemkit.contact.laws import Coulomb
+from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
-from bemkit.scene.conditions import Contact, Part
+from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.axes import Axis
-from bemkit.studies.stability.case import PRECISION, Case
+from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, without_own_laws
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 _SIMILAR = "results equal to 1e-9 after scaling"
@@ -26,58 +27,70 @@ def _similar(baseline: AssemblySolution, value: float, *, factor: str) -> Case:
 
 
 def _moved(baseline: AssemblySolution, value: float) -> Case:
-    bodies = baseline.bodies.values()
-    distance = value * max(body.mesh.diameter for body in bodies)
-    # as for one body: gaps are differences of coordinates, known to eps distance
-    longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
-    pressure = float(np.abs(baseline.contact.sigma_n).max())
-    stiffest = max(body.scene.material.plane_modulus / float(body.mesh.lengths.min()) for body in bodies)
-    loss = max(1.0 / longest, stiffest / pressure) if pressure and longest else 0.0
-    precision = PRECISION + 4.0 * np.finfo(float).eps * distance * loss
+    distance = value * max(body.mesh.diameter for body in baseline.solved_bodies)
+    precision = precision_elsewhere(baseline, distance)
     return _similar_case(baseline, value, AssemblySimilarity(shift=(0.8 * distance, -0.6 * distance)), precision)
 
 
 def _similar_case(baseline: AssemblySolution, value: float, similarity: AssemblySimilarity, precision: float) -> Case:
-    scene = similarity.apply(baseline.assembly)
+    scene = _changed(baseline, similarity.apply)
     return Case(value, scene, similarity, precision=precision, drift_limit=precision)
 
 
+def _changed(baseline: AssemblySolution, change: Callable[[Assembly], Assembly]) -> Assembly:
+    """Return what was asked, all its steps with the contacts that were found, after a change of each step."""
+    contacts = baseline.assembly.contacts
+    return with_changed_steps(
+        baseline.stated, lambda step: change(step.with_contacts(contacts) if step.touching else step)
+    )
+
+
+def _against(assembly: Assembly, *, similarity: AssemblySimilarity) -> str:
+    """Return why an assembly has no similar one; empty if it has."""
+    try:
+        similarity.apply(assembly)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 def _stiffened(baseline: AssemblySolution, value: float) -> Case:
-    first, *others = baseline.assembly.bodies
-    material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
-    bodies = (replace(first, material=material), *others)
+    def stiffened(assembly: Assembly) -> Assembly:
+        first, *others = assembly.bodies
+        material = replace(first.material, youngs_modulus=value * first.material.youngs_modulus)
+        return replace(assembly, bodies=(replace(first, material=material), *others))
+
     # displacements of the soft bodies hold eps of themselves, forces of stiff pairs as much times the ratio
     precision = PRECISION * max(1.0, value, 1.0 / value) ** 0.5
-    return Case(value, replace(baseline.assembly, bodies=bodies), precision=precision)
+    return Case(value, _changed(baseline, stiffened), precision=precision)
 
 
 def _friction(baseline: AssemblySolution, value: float) -> Case:
-    assembly = baseline.assembly
+    def rubbed(assembly: Assembly) -> Assembly:
+        return replace(
+            assembly,
+            bodies=tuple(replace(body, parts=without_own_laws(body.parts)) for body in assembly.bodies),
+            contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
+            law=Coulomb(value),
+        )
 
-    def without_law(part: Part) -> Part:
-        is_contact = isinstance(part.condition, Contact)
-        return replace(part, condition=Contact(part.condition.obstacle)) if is_contact else part  # type: ignore[union-attr]
-
-    scene = replace(
-        assembly,
-        bodies=tuple(replace(body, parts=tuple(map(without_law, body.parts))) for body in assembly.bodies),
-        contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
-        touching=None if assembly.touching is None else replace(assembly.touching, law=None),
-        law=Coulomb(value),
-    )
-    return Case(value, scene)
+    return Case(value, _changed(baseline, rubbed))
 
 
 def _elements(baseline: AssemblySolution, value: float) -> Case:
-    assembly = baseline.assembly
+    common = baseline.assembly.mesh
 
     def divided(body: Body) -> Body:
-        options = assembly.mesh if body.mesh is None else body.mesh
+        options = common if body.mesh is None else body.mesh
         n_elements = baseline.bodies[next(iter(body.copied())).name].mesh.whole.n_elements
         return replace(body, mesh=MeshOptions(max(3, round(value * n_elements)), options.grading))
 
-    mesh = replace(assembly.mesh, accuracy=None)
-    return Case(value, replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies)))
+    mesh = replace(common, accuracy=None)
+
+    def of_step(assembly: Assembly) -> Assembly:
+        return replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies))
+
+    return Case(value, _changed(baseline, of_step))
 
 
 _DECADES = tuple(10.0**k for k in (-9, -6, -3, 3, 6, 9))
@@ -91,6 +104,7 @@ ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
         _SIMILAR,
         (30.0, 45.0, 90.0, 137.0, 180.0),
         partial(_similar, factor="turn"),
+        against_assembly=partial(_against, similarity=AssemblySimilarity(turn=30.0)),
     ),
     Axis(
         "position",
@@ -98,6 +112,7 @@ ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
         "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
         (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
         _moved,
+        against_assembly=partial(_against, similarity=AssemblySimilarity(shift=(1.0, 0.0))),
     ),
     Axis("stiffness", "factor of Young's modulus of the first body", _FREE, (*_DECADES[1:-1], 1e-8, 1e8), _stiffened),
     Axis("friction", "friction coefficient", _FREE, (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 3.0, 10.0, 100.0), _friction),

@@ -31,7 +31,7 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.case import PRECISION, Case, Similarity
+from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, without_own_laws
 
 Baseline = TypeVar("Baseline", Solution, AssemblySolution)
 
@@ -53,6 +53,8 @@ class Axis(Generic[Baseline]):
         Value whose row the others are compared with; the given scene if left out.
     beside_half_planes, beside_periodic : str
         Why the axis says nothing of half-planes, or of periodic ones; empty if it does.
+    against_assembly : callable (Assembly) -> str
+        The same of an assembly.
     """
 
     name: str
@@ -63,11 +65,12 @@ class Axis(Generic[Baseline]):
     reference: float | None = None
     beside_half_planes: str = ""
     beside_periodic: str = ""
+    against_assembly: Callable[[Assembly], str] = lambda _: ""
 
     def reason_against(self, scene: Scene | Assembly) -> str:
         """Return why the axis says nothing of a scene; empty if it does."""
         if isinstance(scene, Assembly):
-            return ""
+            return self.against_assembly(scene)
         surface = scene.shape.outline().surface
         if surface is None:
             return ""
@@ -111,12 +114,7 @@ def _similar(baseline: Solution, value: float, *, factor: str) -> Case:
 
 def _moved(baseline: Solution, value: float) -> Case:
     distance = value * baseline.mesh.diameter
-    # gaps are differences of coordinates, known to eps * distance; displacements are a small part of the size, and
-    # rough gaps make tractions as rough as E' times the roughness over the length of an element
-    longest = float(np.abs(baseline.boundary.displacement).max())
-    pressure = float(np.abs(baseline.contact.sigma_n).max())
-    rough = baseline.scene.material.plane_modulus / (float(baseline.mesh.lengths.min()) * pressure) if pressure else 0.0
-    precision = PRECISION + 4.0 * np.finfo(float).eps * distance * max(1.0 / longest, rough)
+    precision = precision_elsewhere(baseline, distance)
     return _similar_case(baseline, value, Similarity(shift=(0.8 * distance, -0.6 * distance)), precision)
 
 
@@ -145,11 +143,7 @@ def _friction(baseline: Solution, value: float) -> Case:
 
 
 def _with_friction(scene: Scene, coefficient: float) -> Scene:
-    parts = [
-        replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
-        for part in scene.parts
-    ]
-    return replace(scene, parts=tuple(parts), law=Coulomb(coefficient))
+    return replace(scene, parts=without_own_laws(scene.parts), law=Coulomb(coefficient))
 
 
 def _gap(baseline: Solution, value: float) -> Case:

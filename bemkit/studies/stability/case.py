@@ -2,19 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.conditions import Contact, Part
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 PRECISION = 1e-9
 """Agreement, relative to the largest entry, that similar problems owe each other after scaling."""
+
+
+def precision_elsewhere(solution: SolvedProblem, distance: float) -> float:
+    """Return the agreement that a scene owes when it is moved by a distance [m].
+
+    Gaps are differences of coordinates, known to eps of the distance; displacements are a small part of the size, and
+    rough gaps make tractions as rough as E' times the roughness over the length of an element.
+    """
+    bodies = solution.solved_bodies
+    longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
+    pressure = float(np.abs(solution.contact.sigma_n).max(initial=0.0))
+    stiffest = max(body.scene.material.plane_modulus / float(body.mesh.lengths.min()) for body in bodies)
+    loss = max(1.0 / longest, stiffest / pressure if pressure else 0.0) if longest else 0.0
+    return PRECISION + 4.0 * np.finfo(float).eps * distance * loss
+
+
+def without_own_laws(parts: Sequence[Part]) -> tuple[Part, ...]:
+    """Return parts whose contacts have no friction law of their own."""
+    return tuple(
+        replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
+        for part in parts
+    )
 
 
 @dataclass(frozen=True)

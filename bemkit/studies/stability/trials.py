@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
@@ -18,7 +18,6 @@ from bemkit.errors import BemkitError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.outputs import write_text
 from bemkit.results.solution import Solution
-from bemkit.results.solved_body import SolvedBody
 from bemkit.runs.assembly import run_assembly_history
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
@@ -156,18 +155,14 @@ def energy_fault(step: Solution | AssemblySolution) -> str:
 
 def _balances(step: Solution | AssemblySolution) -> bool:
     """Tell whether work and energy agree to round-off: stiffnesses of collocation are not symmetric."""
-    return all(body.scene.discretisation.is_symmetric for body in _bodies(step))
-
-
-def _bodies(step: Solution | AssemblySolution) -> Sequence[SolvedBody]:
-    return list(step.bodies.values()) if isinstance(step, AssemblySolution) else [step]
+    return all(body.scene.discretisation.is_symmetric for body in step.solved_bodies)
 
 
 def _work_of_motion(step: Solution | AssemblySolution) -> float:
     """Return ``E' |u|^2`` [J/m] of the largest displacement, of bodies that only move, too."""
     return max(
         body.scene.material.plane_modulus * float(np.abs(body.boundary.displacement).max()) ** 2
-        for body in _bodies(step)
+        for body in step.solved_bodies
     )
 
 

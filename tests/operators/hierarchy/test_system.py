@@ -7,6 +7,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
+from bemkit.operators.hierarchy.collocation_system import collocation_system
 from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
@@ -54,7 +55,7 @@ def conditions_of(mesh: BoundaryMesh, seed: int) -> tuple[NodalConditions, Float
 
 def system_of(mesh: BoundaryMesh, frame: FloatArray, slopes: bool, tolerance: float) -> HierarchicalSystem:
     everywhere = np.ones(mesh.n_elements, bool)
-    return HierarchicalSystem(
+    return collocation_system(
         mesh,
         MATERIAL,
         frame,

@@ -150,6 +150,23 @@ def test_points_in_each_other_between_nodes_are_doubted() -> None:
     assert check_assembly(belittled).faults == ("between_nodes",)
 
 
+def test_rigid_bodies_move_and_are_loaded_as_they_are_told() -> None:
+    solution = bk.run(bk.load_scene("tilted-punch"))
+    check = check_assembly(solution)
+    assert check.is_good, check
+    assert check.rigid < 1e-12  # sums of forces on a hundred nodes
+    (punch,) = solution.rigid.values()
+    for name in ("x", "force_x", "force_y", "moment"):
+        changed = replace(punch, **{name: getattr(punch, name) + 1e-4})  # type: ignore[arg-type]
+        wrong = check_assembly(replace(solution, rigid={"punch": changed}))
+        assert "rigid" in wrong.faults, name
+    gap = np.where(solution.contact.gap < 0.1, solution.contact.gap + 1e-3, solution.contact.gap)
+    moved = replace(solution.contact, gap=gap, clearance=gap - solution.contact.u_n)
+    assert "gaps" in check_assembly(replace(solution, contact=moved)).faults
+    sunk = replace(punch, y=2.0 * punch.y)
+    assert "energy" in check_assembly(replace(solution, rigid={"punch": sunk})).faults
+
+
 def test_a_disc_that_turns_in_its_hole_is_not_in_the_rock() -> None:
     circle, sides = bk.Disk(2.0), ("arc-1", "arc-2", "arc-3", "arc-4")
     rock = bk.Body(

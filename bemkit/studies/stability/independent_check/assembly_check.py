@@ -11,7 +11,12 @@ from bemkit.studies.stability.independent_check.boundary import largest
 from bemkit.studies.stability.independent_check.check import slip_opposition, status_mismatch
 from bemkit.studies.stability.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
 from bemkit.studies.stability.independent_check.joints import Joints
-from bemkit.studies.stability.independent_check.resultants import energy_mismatch, largest_imbalance, reaction_mismatch
+from bemkit.studies.stability.independent_check.resultants import (
+    energy_mismatch,
+    largest_imbalance,
+    reaction_mismatch,
+    rigid_mismatch,
+)
 from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Entries
 
 
@@ -39,6 +44,8 @@ class AssemblyCheck(Entries):
         Elastic energy of a body below zero; of all against half the work of loads and of contacts.
     elasticity : float
         Of half-planes, see `IndependentCheck`.
+    rigid : float
+        Motions and loads of rigid bodies against what is given, and the balance of each.
     between_nodes : float
         How much deeper points of one side are in the other one than the solution says of them.
     reciprocity, coarseness, hidden_overlap
@@ -61,6 +68,7 @@ class AssemblyCheck(Entries):
     negative_energy: float
     energy: float
     elasticity: float
+    rigid: float
     between_nodes: float
 
     @property
@@ -101,6 +109,7 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
         negative_energy=max(body.negative_energy() for body in bodies),
         energy=energy_mismatch(joints),
         elasticity=max(body.elasticity() for body in bodies),
+        rigid=rigid_mismatch(joints),
         between_nodes=unsaid,
         reciprocity=max(max(body.reciprocity(), body.moment()) for body in bodies),
         coarseness=max(body.coarseness for body in bodies),

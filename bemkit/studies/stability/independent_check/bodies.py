@@ -29,7 +29,7 @@ from bemkit.studies.stability.independent_check.balance import (
 from bemkit.studies.stability.independent_check.boundary import Boundary, Scales, boundary_of, scales_of
 from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.inside import inner_work
-from bemkit.studies.stability.independent_check.nodes import Fields, contact_nodes_of
+from bemkit.studies.stability.independent_check.nodes import Fields, contact_nodes_of, supported_nodes
 
 _NO_TABLE = ContactTable((), *(np.zeros(0),) * 9, status=np.zeros(0, np.intp), weight=np.zeros(0))
 
@@ -130,9 +130,8 @@ class MeasuredBody:
         return 0.0 if self.result.mesh.surface is None else Surface.of(self.fields).elasticity_mismatch()
 
     def supported_nodes(self) -> IntArray:
-        """Return the nodes that supports hold in some direction."""
-        held = (self.boundary.nodes[elements].ravel() for elements, _, _ in self.boundary.held)
-        return np.unique(np.concatenate([np.zeros(0, np.intp), *held]))
+        """Return the nodes that supports and symmetry lines hold in some direction."""
+        return supported_nodes(self.fields.solution, self.boundary)
 
     def force_on(self, elements: IntArray) -> tuple[FloatArray, float]:
         """Return resultant (2,) and size [N/m] of the tractions on some elements."""

@@ -40,18 +40,23 @@ def gap_mismatch(joints: Joints) -> float:
 
 
 def _from_obstacle(joints: Joints, name: str) -> FloatArray:
-    """Return differences [m] of gaps from the distances of a rigid obstacle."""
+    """Return differences [m] of gaps from the distances of a rigid obstacle, where it stands before it moves."""
     table, rows = joints.solution.contact, joints.solution.contact.rows(name)
     points = np.column_stack([table.x, table.y])[rows]
-    body, part = name.split(".", 1)
+    body, part = joints.owner[name].split(".", 1)
     measured = joints.bodies[body]
     nodes = np.linalg.norm(points[:, None] - measured.result.boundary.points, axis=2).argmin(axis=1)
     normals = mean_normals(measured.fields.solution, measured.boundary, part)[nodes]
-    (condition,) = (each.condition for each in measured.result.scene.parts if each.name == part)
-    assert isinstance(condition, Contact)
-    distance, _ = distance_to(condition.obstacle, points, normals)
+    added, pair = 0.0, joints.moving.get(name)
+    if pair is None:
+        (condition,) = (each.condition for each in measured.result.scene.parts if each.name == part)
+        assert isinstance(condition, Contact)
+        obstacle = condition.obstacle
+    else:
+        added, obstacle = pair.gap, joints.solution.assembly.rigid_body_of(pair).obstacle
+    distance, _ = distance_to(obstacle, points, normals)
     known = np.isfinite(table.gap[rows])
-    return np.abs(table.gap[rows] - distance)[known]
+    return np.abs(table.gap[rows] - distance - added)[known]
 
 
 def mean_mismatch(joints: Joints) -> float:

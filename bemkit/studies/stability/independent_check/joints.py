@@ -32,7 +32,9 @@ class Joints:
     solution : AssemblySolution
     bodies : mapping of str to MeasuredBody
     pairs : mapping of str to ContactPair
-        By name, those between bodies.
+        By name, those between elastic bodies.
+    moving : mapping of str to ContactPair
+        By name, those with rigid bodies that move.
     owner : mapping of str to str
         The side ``"body.part"`` whose nodes each contact of the table has.
     """
@@ -40,22 +42,28 @@ class Joints:
     solution: AssemblySolution
     bodies: Mapping[str, MeasuredBody]
     pairs: Mapping[str, ContactPair]
+    moving: Mapping[str, ContactPair]
     owner: Mapping[str, str]
 
     @classmethod
     def of(cls, solution: AssemblySolution) -> Joints:
         """Measure the bodies of a solution, and find whose nodes the rows of its table are."""
-        pairs = {pair.name: pair for pair in solution.assembly.contacts}
+        pairs, moving = (
+            {pair.name: pair for pair in solution.assembly.contacts if (pair.rigid_body is None) is is_elastic}
+            for is_elastic in (True, False)
+        )
         touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
-        for pair in pairs.values():
-            for body, part in (side.split(".", 1) for side in pair.sides):
+        for pair in (*pairs.values(), *moving.values()):
+            for body, part in (side.split(".", 1) for side in pair.elastic_sides):
                 touched[body].append(part)
         alone = {name: MeasuredBody.of(body, tuple(touched[name])) for name, body in solution.bodies.items()}
         most = max(body.largest_stress for body in alone.values())
         bodies = {name: body.measured_by(LIGHTEST * most) for name, body in alone.items()}
-        joints = cls(solution, bodies, pairs, {})
-        owner = {name: joints._owner(pairs[name]) if name in pairs else name for name in solution.contact.parts}
-        return cls(solution, bodies, pairs, owner)
+        joints = cls(solution, bodies, pairs, moving, {})
+        owner = {name: name for name in solution.contact.parts}
+        owner |= {name: joints._owner(pairs[name]) for name in owner if name in pairs}
+        owner |= {name: moving[name].elastic_sides[0] for name in owner if name in moving}
+        return cls(solution, bodies, pairs, moving, owner)
 
     def _owner(self, pair: ContactPair) -> str:
         """Return the side on which all nodes of a contact lie, out of whose body the directions point."""
@@ -77,15 +85,15 @@ class Joints:
         return Side(self.bodies[body], self.bodies[body].result.mesh.part(part))
 
     def partner(self, name: str) -> str | None:
-        """Return the side without the nodes, None of an obstacle."""
+        """Return the elastic side without the nodes, None of an obstacle."""
         if name not in self.pairs:
             return None
         one, two = self.pairs[name].sides
         return two if one == self.owner[name] else one
 
     def _law(self, name: str) -> FrictionLaw:
-        if name in self.pairs:
-            return self.solution.assembly.law_of(self.pairs[name])
+        if pair := self.pairs.get(name) or self.moving.get(name):
+            return self.solution.assembly.law_of(pair)
         body, part = name.split(".", 1)
         return self.solution.bodies[body].scene.laws[part]
 
@@ -114,7 +122,8 @@ class Joints:
             rows = table.rows(name)
             columns: dict[str, Any] = {key: column[rows] for key, column in table.columns().items()}
             own = ContactTable((name,) * int(rows.sum()), **columns)
-            law = self._law(name).at(points[rows])
+            law, loading = self._law(name).at(points[rows]), self.solution.loading
+            law = law if loading is None else law.at_slip(loading.motion.of(np.flatnonzero(rows)))
             supported = self._is_supported(name)
             parts.append(measure(own, law, own.u_n, slip[rows], supported, (units[0][rows], units[1][rows])))
         order = np.argsort(np.concatenate([np.flatnonzero(table.rows(name)) for name in table.parts]))

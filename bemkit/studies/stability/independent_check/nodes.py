@@ -77,7 +77,7 @@ def contact_nodes_of(solution: Solution, boundary: Boundary) -> Nodes:
             distance[own], direction[own] = distance_to(part.condition.obstacle, points[own], normals[own])
     facing = np.sum(direction * normals, axis=1)
     frame = np.stack([direction, np.column_stack([-direction[:, 1], direction[:, 0]])], axis=1)
-    is_supported = np.isin(nodes, _supported_nodes(solution, boundary))
+    is_supported = np.isin(nodes, supported_nodes(solution, boundary))
     components = np.column_stack([table.sigma_n, table.sigma_t])
     acting = np.column_stack([table.sigma_n, np.where(is_supported, 0.0, table.sigma_t)])
     return Nodes(
@@ -140,7 +140,7 @@ def mean_normals(solution: Solution, boundary: Boundary, part: str) -> FloatArra
     return np.asarray(total / np.where(size > 0.0, size, 1.0)[:, None])
 
 
-def _supported_nodes(solution: Solution, boundary: Boundary) -> IntArray:
+def supported_nodes(solution: Solution, boundary: Boundary) -> IntArray:
     """Return the nodes on supports and on symmetry lines, which hold a body like rollers."""
     mesh = solution.mesh
     found = [np.zeros(0, np.intp)]

@@ -11,9 +11,7 @@ from bemkit.studies.stability.independent_check.joints import Joints
 def forces(joints: Joints) -> dict[str, tuple[FloatArray, float]]:
     """Return the resultant (2,) and size [N/m] of the forces on each side of the table."""
     table, found = joints.solution.contact, dict[str, tuple[FloatArray, float]]()
-    normal = joints.solution.contact_directions
-    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
-    acting = table.weight[:, None] * (table.sigma_n[:, None] * normal + table.sigma_t[:, None] * tangent)
+    acting = _nodal(joints)
     for name in table.parts:
         own = acting[table.rows(name)]
         for side, sign in ((joints.owner[name], 1.0), (joints.partner(name), -1.0)):
@@ -21,6 +19,40 @@ def forces(joints: Joints) -> dict[str, tuple[FloatArray, float]]:
                 force, size = found.get(side, (np.zeros(2), 0.0))
                 found[side] = force + sign * own.sum(axis=0), size + float(np.abs(own).sum())
     return found
+
+
+def _nodal(joints: Joints) -> FloatArray:
+    """Return the forces (n_contact, 2) [N/m] on the bodies with the nodes."""
+    table, normal = joints.solution.contact, joints.solution.contact_directions
+    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
+    return np.asarray(table.weight[:, None] * (table.sigma_n[:, None] * normal + table.sigma_t[:, None] * tangent))
+
+
+def rigid_mismatch(joints: Joints) -> float:
+    """Return how far rigid bodies are from moving, and being loaded, as they are told [-].
+
+    What acts on each besides its contacts balances these, at the points that the nodes may touch.
+    """
+    solution, table, worst = joints.solution, joints.solution.contact, [0.0]
+    points, acting = np.column_stack([table.x, table.y]), _nodal(joints)
+    for body in solution.assembly.rigid:
+        total, size, found = np.zeros(3), 0.0, solution.rigid[body.name]
+        for name, pair in joints.moving.items():
+            if pair.rigid_body != body.name or name not in table.parts:
+                continue
+            rows = table.rows(name) & np.isfinite(table.gap)
+            distance = (table.gap[rows] - pair.gap)[:, None] * solution.contact_directions[rows]
+            arm, force = points[rows] + distance - body.centre, acting[rows]
+            total += [*force.sum(axis=0), float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))]
+            scales = joints.side(joints.owner[name]).body.scales
+            size += float(np.abs(force).sum()) + scales.stress * float(table.weight[rows].min())
+        reach = np.array([1.0, 1.0, max(each.result.mesh.diameter for each in joints.bodies.values())])
+        reaction = np.array([found.force_x, found.force_y, found.moment])
+        unexplained = (reaction - total, np.where(body.is_driven, reaction - body.load, 0.0))
+        worst += [float(np.abs(each / reach).max()) / (size or 1.0) for each in unexplained]
+        motion = np.array([found.x, found.y, found.turn])
+        worst.append(float(np.abs(np.where(body.is_driven, 0.0, motion - body.motion)).max()))
+    return float(np.max(worst))
 
 
 def reaction_mismatch(joints: Joints) -> float:
@@ -65,4 +97,7 @@ def energy_mismatch(joints: Joints) -> float:
     table = joints.solution.contact
     each = table.weight[:, None] * np.column_stack([table.sigma_n * table.u_n, table.sigma_t * table.u_t])
     work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
+    for found in joints.solution.rigid.values():  # relative displacements leave out how obstacles move
+        of_motion = found.force_x * found.x, found.force_y * found.y, found.moment * found.turn
+        work, size = work + 0.5 * sum(of_motion), size + 0.5 * float(np.abs(of_motion).sum())
     return abs(joints.solution.energy - work) / size if size > 0.0 else 0.0

@@ -7,16 +7,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.laws import CohesiveCoulomb, FrictionLaw, Tresca
+from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
+from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
+from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.spline import SplineObstacle
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
+from bemkit.scene.load_history import with_changed_steps
+from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.transform import AffineMap, TransformedRegion
 
 
@@ -24,9 +30,9 @@ from bemkit.scene.transform import AffineMap, TransformedRegion
 class AssemblySimilarity:
     """The map x -> length * (turned x) + shift, with stresses and moduli times the same factor.
 
-    Assemblies are changed number by number, so that the result can be written to a file (but for parts chosen by a
-    region, if the length changes): fields have to be numbers, and copies in a grid stay as they are turned only by way
-    of a list of places.
+    Assemblies are changed number by number, so that the result can be written to a file (but for several load steps,
+    and parts chosen by a region, if the length changes): fields have to be numbers, and copies in a grid stay as they
+    are turned only by way of a list of places.
 
     Parameters
     ----------
@@ -61,33 +67,78 @@ class AssemblySimilarity:
         return self._motion.turned(vectors)
 
     def apply(self, assembly: Assembly) -> Assembly:
-        """Return the similar assembly."""
-        for words, given in (("rigid bodies", assembly.rigid), ("load steps", assembly.steps)):
-            if given:
-                raise InputError(f"the assembly has {words}: leave them out, numbers of these have no similar ones yet")
+        """Return the similar assembly.
+
+        Raises
+        ------
+        InputError
+            If something of it has no similar one; the message names it.
+        """
+        if assembly.symmetry is not None and not (self.turn == 0.0 and self.shift == (0.0, 0.0)):
+            raise InputError("the assembly has a symmetry, whose bodies stay where they are drawn: leave it out")
+        return with_changed_steps(assembly, self._applied)
+
+    def _applied(self, assembly: Assembly) -> Assembly:
         touching = assembly.touching
         if touching is not None:
             law = None if touching.law is None else self._law(touching.law)
-            touching = replace(touching, within=self.length * touching.within, law=law)
+            reach = self._length(touching.reach)
+            touching = replace(touching, within=self.length * touching.within, law=law, reach=reach)
         return replace(
             assembly,
             bodies=tuple(self._body(body) for body in assembly.bodies),
+            rigid=tuple(self._rigid(body) for body in assembly.rigid),
             contacts=tuple(self._pair(pair) for pair in assembly.contacts),
             touching=touching,
             law=self._law(assembly.law),
+            symmetry=None if assembly.symmetry is None else self._lines(assembly.symmetry),
         )
+
+    def _lines(self, symmetry: Symmetry) -> Symmetry:
+        return AffineMap((self.length, self.length)).transformed(symmetry)
 
     def _pair(self, pair: ContactPair) -> ContactPair:
         law = None if pair.law is None else self._law(pair.law)
-        return replace(pair, gap=self.length * pair.gap, interference=self.length * pair.interference, law=law)
+        gap, interference = self.length * pair.gap, self.length * pair.interference
+        return replace(pair, gap=gap, interference=interference, law=law, reach=self._length(pair.reach))
+
+    def _length(self, length: float | None) -> float | None:
+        return None if length is None else self.length * length
+
+    def _rigid(self, body: RigidBody) -> RigidBody:
+        """Return the rigid body that moves alike; one that a force drives along one axis alone cannot be turned."""
+        is_pushed = body.is_driven[:2]
+        if is_pushed.any() and not is_pushed.all() and self.turn != 0.0:
+            raise InputError(
+                f"rigid body {body.name!r} is driven by a force along one axis alone, which cannot be turned: give "
+                "both forces, or both motions"
+            )
+        of_turn = np.array([1.0, 1.0, self.length])
+        moved = body.multiplied(self.length / of_turn, self.stress * self.length * of_turn)
+        if self.turn != 0.0 and is_pushed.all():
+            force_x, force_y = self._vector(moved.force_x or 0.0, moved.force_y or 0.0, 1.0)
+            moved = replace(moved, force_x=force_x, force_y=force_y)
+        elif self.turn != 0.0:
+            x, y = self._vector(moved.x or 0.0, moved.y or 0.0, 1.0)
+            moved = replace(moved, x=x, y=y)
+        return replace(moved, obstacle=self._obstacle(body.obstacle), centre=self._point(body.centre))
 
     def _law(self, law: FrictionLaw) -> FrictionLaw:
         match law:
+            case Frictionless():
+                return law
             case Tresca(bound_value=bound):
                 return Tresca(self.stress * _number(bound))
+            case Coulomb(coefficient):
+                return Coulomb(_number(coefficient))
             case CohesiveCoulomb(coefficient, cohesion, cap):
-                return CohesiveCoulomb(coefficient, self.stress * _number(cohesion), self.stress * _number(cap))
-        return law
+                stresses = (self.stress * _number(each) for each in (cohesion, cap))
+                return CohesiveCoulomb(_number(coefficient), *stresses)
+            case SlipWeakening(static, kinetic, distance):
+                return SlipWeakening(_number(static), _number(kinetic), self.length * _number(distance))
+            case RateStrengthening(coefficient, by_rate, rate):  # times stay what they are
+                return RateStrengthening(_number(coefficient), _number(by_rate), self.length * _number(rate))
+        raise InputError(f"law is {type(law).__name__}: give one of the laws of bemkit")
 
     def _body(self, body: Body) -> Body:
         material = replace(body.material, youngs_modulus=self.stress * body.material.youngs_modulus)
@@ -175,9 +226,15 @@ class AssemblySimilarity:
                 return Circle(self._point(centre), self.length * radius)
             case Cavity(centre, radius):
                 return Cavity(self._point(centre), self.length * radius)
+            case PolygonalObstacle(vertices):
+                return PolygonalObstacle(tuple(self._point(vertex) for vertex in vertices))
+            case SplineObstacle(points, is_closed):
+                return SplineObstacle(tuple(self._point(point) for point in points), is_closed)
             case Gap(value, None):
                 return Gap(self.length * _number(value))
-        raise InputError(f"obstacle is {type(obstacle).__name__}: give a plane, a circle, a cavity or a plain gap")
+        raise InputError(
+            f"obstacle is {type(obstacle).__name__}: give plane, circle, cavity, polygon, spline or plain gap"
+        )
 
     def _force(self, force: BodyForce) -> BodyForce:
         match force:

@@ -1,0 +1,142 @@
+"""Skeletons of the clusters of a tree: a few unknowns and equations that stand for all of them.
+
+Seen from afar the unknowns of a cluster are those of its column skeleton, and the equations of a cluster feel the rest
+of the boundary through its row skeleton. Whatever the conditions on the elements are, the skeletons stay what they are,
+because tractions and displacements are both among the unknowns.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
+from bemkit.operators.hierarchy.columns import Columns
+from bemkit.operators.hierarchy.interpolative import Interpolation, sketched
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, n_proxies, point_forces
+
+FLOOR = 2e-13
+"""No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
+_UNEVEN = 10.0
+"""Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """What stands for a cluster.
+
+    Parameters
+    ----------
+    rows : (n_rows,) array
+        Equations 2 * place + component.
+    row_map : Interpolation
+        What all equations of the cluster (of its children: their skeletons) feel, from what these feel.
+    columns : (n_columns,) array
+        Unknowns 4 * place + 2 * kind + component.
+    column_map : Interpolation
+        What all unknowns of the cluster (of its children: their skeletons) cause, as if these had caused it.
+    """
+
+    rows: IntArray
+    row_map: Interpolation
+    columns: IntArray
+    column_map: Interpolation
+
+
+@dataclass(frozen=True, eq=False)
+class LevelView(ABC):
+    """The clusters of one level with the rows and columns that are candidates for their skeletons."""
+
+    columns: Columns
+    discs: Discs
+    rows: list[IntArray]
+    candidates: list[IntArray]
+    extent: FloatArray
+    tolerance: float
+    guesses: list[int]
+
+    @abstractmethod
+    def skeleton(self, cluster: int) -> Skeleton:
+        """Choose the skeleton of one cluster."""
+
+    def near(self, cluster: int) -> tuple[IntArray, IntArray]:
+        """Return the rows and columns of other clusters that lie in the proxy circle of one, or reach into it."""
+        near = self.discs.near(cluster)
+        if not near.size:
+            return np.zeros(0, np.intp), np.zeros(0, np.intp)
+        rows = np.concatenate([self.rows[other] for other in near])
+        columns = np.concatenate([self.candidates[other] for other in near])
+        middle, circle = self.discs.centre[cluster], PROXY_RATIO * self.discs.radius[cluster]
+        of_rows, of_columns = (np.abs(self.columns.centre[each] - middle) for each in (rows // 2, columns // 4))
+        return rows[of_rows < circle], columns[of_columns < circle + self.extent[columns // 4]]
+
+    def tolerance_at(self, cluster: int, elements: IntArray) -> float:
+        """Return the tolerance of a cluster: errors of large clusters with small elements count more."""
+        share = (
+            4.0
+            * float(self.columns.lengths[elements].min(initial=np.inf))
+            / (PROXY_RATIO * float(self.discs.radius[cluster]))
+        )
+        return max(self.tolerance * float(np.sqrt(min(1.0, share))), FLOOR)
+
+    def guess(self, cluster: int, elements: IntArray) -> int | None:
+        """Return a guess of the rank; none where random combinations would lose the smallest elements."""
+        lengths = self.columns.lengths[elements]
+        is_even = lengths.max(initial=0.0) <= _UNEVEN * lengths.min(initial=np.inf)
+        return self.guesses[cluster] if is_even else None
+
+    def proxies(self, cluster: int) -> ComplexArray:
+        """Return the points that stand for all that is far from a cluster."""
+        return self.discs.points(cluster, n_proxies(self.tolerance))
+
+
+class CollocationView(LevelView):
+    """Interpolates what columns of collocation cause, and what its equations feel, one for each."""
+
+    @property
+    def _of(self) -> BoundaryColumns:
+        assert isinstance(self.columns, BoundaryColumns)
+        return self.columns
+
+    def skeleton(self, cluster: int) -> Skeleton:
+        """Choose the skeleton of one cluster."""
+        near_rows, near_columns = self.near(cluster)
+        rows, columns = self.rows[cluster], self.candidates[cluster]
+        row_map, column_map = self._row_map(cluster, near_columns), self._column_map(cluster, near_rows)
+        return Skeleton(rows[row_map.skeleton], row_map, columns[column_map.skeleton], column_map)
+
+    def _column_map(self, cluster: int, near_rows: IntArray) -> Interpolation:
+        """Interpolate the columns of a cluster, seen from near rows and from the proxy circle."""
+        candidates, of = self.candidates[cluster], self._of
+        points, proxies = np.unique(near_rows // 2), self.proxies(cluster)
+        places = np.append(np.full(proxies.size, NOWHERE), points)
+        fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
+        spacing = 2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / proxies.size
+        weights = np.repeat(np.sqrt(np.append(np.full(proxies.size, spacing), of.lengths[points])), 2)
+        sizes = 1.0 / np.sqrt(of.lengths[candidates // 4])
+        norms = sizes * np.sqrt(np.square(weights) @ np.square(fields))
+        for kind in (0, 1):
+            own = (candidates // 2) % 2 == kind
+            sizes[own] /= norms[own].max(initial=0.0) or 1.0
+        guess = self.guess(cluster, np.append(points, candidates // 4))
+        return sketched(fields, weights, sizes, self.tolerance_at(cluster, candidates // 4), guess)
+
+    def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
+        """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
+        rows, of = self.rows[cluster], self._of
+        points, number = np.unique(rows // 2, return_inverse=True)
+        x, proxies = of.centre[points], self.proxies(cluster)
+        circle = PROXY_RATIO * float(self.discs.radius[cluster])
+        forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
+        fields = np.concatenate([of.fields(x, points, near_columns).T, forces])[:, 2 * number + rows % 2]
+        weights = np.append(1.0 / np.sqrt(of.lengths[near_columns // 4]), np.ones(len(forces)))
+        sizes = np.sqrt(of.lengths[rows // 2])
+        kind = np.append((near_columns // 2) % 2, np.full(len(forces), 2))
+        groups = (kind == np.arange(3)[:, None]) * np.square(weights)
+        largest = np.sqrt(np.max((groups @ np.square(fields)) * np.square(sizes), axis=1, initial=0.0))
+        weights /= np.where(largest > 0.0, largest, 1.0)[kind]
+        guess = self.guess(cluster, np.append(points, near_columns // 4))
+        return sketched(fields, weights, sizes, self.tolerance_at(cluster, rows // 2), guess)

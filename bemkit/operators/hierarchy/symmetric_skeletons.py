@@ -1,0 +1,39 @@
+"""Skeletons of symmetric equations: one interpolation of a cluster serves its rows and its columns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
+from bemkit.operators.hierarchy.interpolative import sketched
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO
+from bemkit.operators.hierarchy.skeletons import FLOOR, LevelView, Skeleton
+
+
+class SymmetricView(LevelView):
+    """The clusters of one level of Galerkin's equations."""
+
+    @property
+    def _of(self) -> GalerkinColumns:
+        assert isinstance(self.columns, GalerkinColumns)
+        return self.columns
+
+    def skeleton(self, cluster: int) -> Skeleton:
+        """Choose the skeleton of one cluster."""
+        of, candidates = self._of, self.candidates[cluster]
+        _, near = self.near(cluster)
+        proxies = self.proxies(cluster)
+        entries = of.between(of.rows_of(near), of.rows_of(candidates))
+        weights = np.append(np.ones(near.size), np.full(2 * proxies.size, of.material.plane_modulus))
+        fields = np.concatenate([entries, of.fields(proxies, candidates)])
+        own = candidates // 4
+        guess = self.guess(cluster, np.append(own, near // 4))
+        map_ = sketched(fields, weights, np.ones(own.size), self.tolerance_at(cluster, own), guess)
+        columns = candidates[map_.skeleton]
+        return Skeleton(of.rows_of(columns), map_, columns, map_)
+
+    def tolerance_at(self, cluster: int, elements: IntArray) -> float:
+        """Return the tolerance of a cluster: smooth displacements add up the errors of all its small elements."""
+        share = 4.0 * float(self.columns.lengths[elements].min()) / (PROXY_RATIO * float(self.discs.radius[cluster]))
+        return max(self.tolerance * min(1.0, share), FLOOR)
