@@ -18,7 +18,7 @@ from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.interpolative import Interpolation, sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, n_proxies, point_forces
 
-FLOOR = 2e-13
+_FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
 _UNEVEN = 10.0
 """Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
@@ -80,7 +80,7 @@ class LevelView(ABC):
             * float(self.columns.lengths[elements].min(initial=np.inf))
             / (PROXY_RATIO * float(self.discs.radius[cluster]))
         )
-        return max(self.tolerance * float(np.sqrt(min(1.0, share))), FLOOR)
+        return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
 
     def guess(self, cluster: int, elements: IntArray) -> int | None:
         """Return a guess of the rank; none where random combinations would lose the smallest elements."""

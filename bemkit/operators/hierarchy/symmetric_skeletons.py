@@ -8,7 +8,12 @@ from bemkit.arrays import IntArray
 from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
 from bemkit.operators.hierarchy.interpolative import sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO
-from bemkit.operators.hierarchy.skeletons import FLOOR, LevelView, Skeleton
+from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
+
+_SHARE = 0.1
+"""Tolerance of a cluster of a few elements by that asked for: forces of nodes are small differences of large terms."""
+_FLOOR = 2e-14
+"""No tolerance is smaller: of entries of one size, compared with the largest, less is known to round-off."""
 
 
 class SymmetricView(LevelView):
@@ -36,4 +41,4 @@ class SymmetricView(LevelView):
     def tolerance_at(self, cluster: int, elements: IntArray) -> float:
         """Return the tolerance of a cluster: smooth displacements add up the errors of all its small elements."""
         share = 4.0 * float(self.columns.lengths[elements].min()) / (PROXY_RATIO * float(self.discs.radius[cluster]))
-        return max(self.tolerance * min(1.0, share), FLOOR)
+        return max(_SHARE * self.tolerance * min(1.0, share), _FLOOR)
