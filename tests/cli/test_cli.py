@@ -213,7 +213,7 @@ def one_line_error(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["run", "paper-1", "--accuracy", "1e-3"], "collocation has no error estimate"),
         (["run", "paper-1", "--accuracy", "1e-3", "--elements", "40"], "give one of them"),
         (["run", "paper-1", "--elements", "many"], "'many' is not a valid integer.*bemkit run --help"),
-        (["run", "paper-1", "--elements", "100000", "--discretisation", "linear"], "use at most"),
+        (["run", "paper-1", "--elements", "100000", "--degree", "3"], "use at most"),
         (["run", "paper-1", "--solver", "newtn"], "unknown solver 'newtn'"),
         (["run", "paper-1", "--discretisation", "cubic"], "unknown discretisation 'cubic'"),
         (["run", "paper-1", "--rho", "-1"], "rho"),

@@ -215,7 +215,7 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
 
     monkeypatch.setattr(bk.Scene, "build_mesh", watched)
     with pytest.raises(SystemExit, match="2"):
-        main([command, "paper-1", "--elements", "1000000", "--discretisation", "linear"])
+        main([command, "paper-1", "--elements", "1000000", "--degree", "3"])
     message = r"1000000 elements need about \S+ GB, this computer has \S+ GB: use at most \d+ elements"
     assert re.search(message, capsys.readouterr().err)
     assert max(filter(None, built)) <= 5000  # small ones, by which the large one is judged
@@ -224,7 +224,7 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
 def test_the_memory_of_large_meshes_is_told_from_a_small_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bk.load_scene("paper-1")
     # collocation compares the distances of all elements, which takes seconds
-    large = with_overrides(scene, elements=12_000, discretisation="linear")
+    large = with_overrides(scene, elements=12_000, degree=3)
     needed = make_plan(large, large.build_mesh()).memory
     # the parts that grow more slowly than the square are a few thousandths
     monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 1.01 * needed)
