@@ -12,7 +12,6 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.results.between_bodies import violations_between_bodies
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.part_forces import ContactForce
 from bemkit.results.rigid_result import RigidResult
@@ -147,6 +146,8 @@ class AssemblySolution(SolvedProblem):
         return sum(body.error_unit for body in self.bodies.values())
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
+        from bemkit.results.between_bodies import violations_between_bodies  # mortars, which single bodies lack
+
         return violations_between_bodies(self.assembly, self.bodies, self.rigid, self.contact, motion)
 
     def contact_elements(self, body: str) -> IntArray:
