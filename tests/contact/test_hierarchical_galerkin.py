@@ -104,6 +104,17 @@ def test_contact_knows_nothing_of_given_forces_on_its_own_nodes(degree: int) -> 
         np.testing.assert_allclose(one, two, atol=1e-8 * stress)
 
 
+def test_estimated_errors_and_the_meshes_that_follow_them_are_those_of_dense_equations() -> None:
+    scene = replace(paper(1), discretisation=bk.Galerkin(1), mesh=bk.MeshOptions(accuracy=5e-3))
+    compressed = bk.run(replace(scene, linear_solver=Hierarchical(TOLERANCE)))
+    dense = bk.run(replace(scene, linear_solver=DenseCholesky()))
+    assert compressed.plan.is_compressed
+    assert compressed.status is dense.status is bk.Status.CONVERGED
+    assert compressed.n_elements == dense.n_elements
+    # the error itself is a small difference of tractions that agree to 1e-9
+    assert compressed.estimated_error == pytest.approx(dense.estimated_error, rel=1e-6)
+
+
 def test_without_contact_all_of_the_body_is_solved_for() -> None:
     compressed, dense = (bk.run(each) for each in in_both_ways(bk.load_scene("bending"), 240, 1))
     assert compressed.plan.is_compressed
