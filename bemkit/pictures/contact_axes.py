@@ -119,7 +119,7 @@ def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: Un
     cut = [(least, "down to", low - margin), (largest, "up to", high + margin)]
     words = [f"{way} {amount(peak, 'stress', units)}" for peak, way, end in cut if abs(peak) > abs(end)]
     note = f"peaks {' and '.join(words)} are cut"
-    axes.text(0.99, 0.02, note, transform=axes.transAxes, ha="right", va="bottom", fontsize=9)
+    axes.text(0.5, 0.02, note, transform=axes.transAxes, ha="center", va="bottom", fontsize=9)
 
 
 def near(distance: FloatArray, solution: Result, chosen: BoolArray) -> FloatArray:
