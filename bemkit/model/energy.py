@@ -115,6 +115,10 @@ def negative_share(
     round_off = _ROUND_OFF * size + round_off_of(displacement, sensitivity) * farthest
     # strains are differences of displacements, and known no better than these are
     round_off += _OF_DIFFERENCES * float(np.finfo(float).eps * np.sum(np.abs(displacement * force)))
+    # forces that strain nothing, such as a pressure all around an incompressible body, move it by round-off alone
+    stiffest = 0.0 if sensitivity is None else float(np.abs(sensitivity).max(initial=0.0))
+    if stiffest > 0.0:
+        round_off += NOISE_FACTOR * float(np.finfo(float).eps * np.sum(np.abs(force)) ** 2) / stiffest
     work = float(parts.sum())
     return -work / size if work < -round_off else 0.0
 
