@@ -74,7 +74,7 @@ INDENTERS: dict[str, tuple[str, bk.FarField, bk.FrictionLaw, reference.LineConta
 }
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", INDENTERS)
 def test_what_is_asked_of_the_pressures_is_what_they_have(name: str, accuracy: float) -> None:
     gap, far, law, exact = INDENTERS[name]
