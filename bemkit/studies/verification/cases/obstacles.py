@@ -90,7 +90,7 @@ def paper_1() -> Case:
         RISING,
         sigma_n=(1.5e-3, 1e-4, 1e-6),
         sigma_t=(1e-2, 1e-3, 2e-6),
-        energy=(2e-5, 1e-9, 1e-12),
+        energy=(2e-5, 1e-8, 1e-12),
         transitions=(2e-3, 1e-4, 1e-6),
     )
 
