@@ -25,9 +25,7 @@ from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution, stress_of
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.linear.memory import physical_memory
-from bemkit.operators.linear.solvers import (
-    ChosenLinearSolver,
-)
+from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside

@@ -115,9 +115,10 @@ def cut_peaks(axes: Axes, s: FloatArray, curves: Sequence[FloatArray], units: Un
     if largest - least <= _PEAKED * (high - low) or high == low:
         return
     margin = 0.25 * (high - low)
-    axes.set_ylim(max(least, low) - margin, min(largest, high) + margin)
-    cut = [(least, "down to", low - margin), (largest, "up to", high + margin)]
-    words = [f"{way} {amount(peak, 'stress', units)}" for peak, way, end in cut if abs(peak) > abs(end)]
+    bottom, top = low - margin, high + margin
+    axes.set_ylim(bottom, top)
+    cut = ((least < bottom, "down to", least), (largest > top, "up to", largest))
+    words = [f"{way} {amount(peak, 'stress', units)}" for is_cut, way, peak in cut if is_cut]
     note = f"peaks {' and '.join(words)} are cut"
     axes.text(0.5, 0.02, note, transform=axes.transAxes, ha="center", va="bottom", fontsize=9)
 

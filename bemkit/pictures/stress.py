@@ -95,10 +95,11 @@ def draw_stress(
         raise InputError(f"measure is {measure!r}: give one of {', '.join(STRESSES)}")
     chosen, scene, units = STRESSES[measure], shown(solution), units or solution.units
     bodies = solution.solved_bodies
-    spacing = float(np.ptp(scene.frame, axis=1).max()) / _ACROSS
+    size = float(np.ptp(scene.frame, axis=1).max())
+    spacing = size / _ACROSS
     # obstacles are where they are in the end: a body that is seen to move must be there, too
     farthest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies)
-    is_seen = farthest > _SEEN * float(np.ptp(scene.frame, axis=1).max())
+    is_seen = farthest > _SEEN * size
     factor = 1.0 if is_seen else 0.0
     found = [stress_points(body, spacing, scene.frame, moved=is_seen) for body in bodies]
     values = [chosen.of(each.stresses, body.scene.material) for each, body in zip(found, bodies, strict=True)]

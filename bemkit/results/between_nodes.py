@@ -15,6 +15,7 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Contact
@@ -155,14 +156,17 @@ def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray)
 def displacement_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
     """Return displacements (m, q, 2) [m] at xi (m, q) of elements (m,)."""
     space = body.scene.discretisation.displacement_space(body.mesh)
-    values = values_on_elements(space, body.boundary.displacement, elements)
-    return np.asarray(np.einsum("leq,elc->eqc", space.basis(xi.ravel()).reshape(-1, *xi.shape), values))
+    return _combined(space, values_on_elements(space, body.boundary.displacement, elements), xi)
 
 
 def traction_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
     """Return tractions (m, q, 2) [Pa] at xi (m, q) of elements (m,)."""
     space = body.scene.discretisation.traction_space(body.mesh)
-    values = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements]
+    return _combined(space, body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements], xi)
+
+
+def _combined(space: BoundarySpace, values: FloatArray, xi: FloatArray) -> FloatArray:
+    """Return (m, q, 2) values at xi (m, q) from those of the local basis (m, n, 2)."""
     return np.asarray(np.einsum("leq,elc->eqc", space.basis(xi.ravel()).reshape(-1, *xi.shape), values))
 
 

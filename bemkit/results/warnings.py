@@ -55,8 +55,9 @@ def find_warnings(solution: Solution) -> tuple[str, ...]:
         return solution.plan.warnings
     laws = solution.scene.laws
     smooth = {part for part, law in laws.items() if law.is_frictionless}
-    narrow = _narrow_zones(solution.contact, smooth, _remedy((solution,)))
-    overlaps = _hidden_overlaps(solution.contacts_between_nodes, solution.units, _remedy((solution,)))
+    remedy = _remedy((solution,))
+    narrow = _narrow_zones(solution.contact, smooth, remedy)
+    overlaps = _hidden_overlaps(solution.contacts_between_nodes, solution.units, remedy)
     doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
     return (*solution.plan.warnings, *chain(*doubts, overlaps))
 

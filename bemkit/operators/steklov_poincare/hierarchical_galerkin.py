@@ -99,16 +99,18 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
     @cached_property
     def _units(self) -> FloatArray:
         """(n_places,) units of the tractions by number, those of nodes first."""
-        units = np.empty(self.columns.n_elements)
-        units[self.columns.order] = self.columns.units
-        return units
+        return self._by_number(self.columns.units)
 
     @cached_property
     def weights(self) -> FloatArray:
         """(n_nodes,) array [m]: integrals of the functions of the nodes."""
-        weights = np.empty(self.columns.n_elements)
-        weights[self.columns.order] = self.columns.weights
-        return weights[: self.displacement_space.n_dofs // 2]
+        return self._by_number(self.columns.weights)[: self.displacement_space.n_dofs // 2]
+
+    def _by_number(self, values: FloatArray) -> FloatArray:
+        """Return values (n_places,) of places by number, those of nodes first."""
+        result = np.empty_like(values)
+        result[self.columns.order] = values
+        return result
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
         """Return the compressed equations of nodes and tractions."""

@@ -48,12 +48,11 @@ class Joints:
     @classmethod
     def of(cls, solution: AssemblySolution) -> Joints:
         """Measure the bodies of a solution, and find whose nodes the rows of its table are."""
-        pairs, moving = (
-            {pair.name: pair for pair in solution.assembly.contacts if (pair.rigid_body is None) is is_elastic}
-            for is_elastic in (True, False)
-        )
+        contacts = solution.assembly.contacts
+        pairs = {pair.name: pair for pair in solution.assembly.elastic_contacts}
+        moving = {pair.name: pair for pair in contacts if pair.name not in pairs}
         touched: dict[str, list[str]] = {name: [] for name in solution.bodies}
-        for pair in (*pairs.values(), *moving.values()):
+        for pair in contacts:
             for body, part in (side.split(".", 1) for side in pair.elastic_sides):
                 touched[body].append(part)
         alone = {name: MeasuredBody.of(body, tuple(touched[name])) for name, body in solution.bodies.items()}
