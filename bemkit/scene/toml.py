@@ -107,11 +107,6 @@ def load_single_body(source: str | Path) -> Scene:
     return single_body(load_scene(source), str(source))
 
 
-def single_body_from_toml(text: str, *, name: str = "scene") -> Scene:
-    """Turn TOML text into a scene of one body; see `scene_from_toml` and `load_single_body`."""
-    return single_body(scene_from_toml(text, name=name), name)
-
-
 def single_body(scene: Scene | Assembly, name: str) -> Scene:
     """Return a scene, and refuse an assembly; the name is for the message."""
     if isinstance(scene, Assembly):

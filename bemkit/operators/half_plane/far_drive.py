@@ -40,7 +40,3 @@ class FarDrive:
     def motions_at(self, points: FloatArray) -> FloatArray:
         """Return the displacements (n, 2, 3) of points (n, 2) [m] by the three unit motions."""
         return rigid_motions(points, np.array(self.centre), 1.0)
-
-    def given_at(self, points: FloatArray) -> FloatArray:
-        """Return the displacements (n, 2) [m] of points (n, 2) [m] by the motion that is given."""
-        return np.asarray(self.motions_at(points) @ np.array(self.motion))
