@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 from bemkit.cli.main import _run_to_end, commands
 from bemkit.geometry.files.gmsh_files import why_no_gmsh
 from tests.geometry.files.parts import DATA, MESHES, PART_DXF, PART_SVG, dxf, why_no
+from tests.slow import slow_except
 
 FILES = (*MESHES, "part.dxf", "part.svg")
 
@@ -29,7 +30,7 @@ def call(*arguments: str) -> Result:
     return CliRunner().invoke(commands, arguments, catch_exceptions=False)
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", slow_except(FILES, "version-4.msh", "part.dxf", "part.svg"))
 def test_from_a_file_to_a_picture(name: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     put(tmp_path, name)

@@ -77,7 +77,9 @@ def test_each_mesh_is_announced_with_its_size(heard: list[str]) -> None:
     ("arguments", "words"),
     [
         (("run", "paper-1", "--elements", "24"), ("begin", "24 elements: solve, step 1", "step  solves")),
-        (("plot", "paper-1", "--what", "traction"), ("begin", "320 elements: draw traction")),
+        pytest.param(
+            ("plot", "paper-1", "--what", "traction"), ("begin", "320 elements: draw traction"), marks=pytest.mark.slow
+        ),
     ],
 )
 def test_a_terminal_shows_stage_and_step(
@@ -117,10 +119,13 @@ print([name for name in ("numpy", "scipy", "h5py", "cattrs", "matplotlib", "rich
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("verify", "--quick", "cattaneo-mindlin"),
         ("sweep", "paper-1", "--vary", "law.friction_coefficient=0.3,0.4", "--elements", "24"),
-        ("stability", "--random", "1", "--jobs", "1"),
-        ("study", "paper-1", "--elements", "40", "--meshes", "uniform", "--discretisation", "constant"),
+        pytest.param(("verify", "--quick", "cattaneo-mindlin"), marks=pytest.mark.slow),
+        pytest.param(("stability", "--random", "1", "--jobs", "1"), marks=pytest.mark.slow),
+        pytest.param(
+            ("study", "paper-1", "--elements", "40", "--meshes", "uniform", "--discretisation", "constant"),
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_a_study_shows_that_it_begins_and_then_its_tasks(arguments: tuple[str, ...]) -> None:

@@ -22,6 +22,7 @@ from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocati
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
 from bemkit.testing import check_body
 from tests.scenes import Perforated, paper, squeezed, wavy
+from tests.slow import slow_only
 
 TOLERANCE = 1e-11
 
@@ -108,7 +109,13 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+SLOW = (
+    "travelling block", "plate with a round hole", "twelve holes", "twelve holes, incompressible",
+    "half of a plate with a hole", "load history",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", slow_only(SCENES, *SLOW))
 def test_statuses_and_tractions_are_those_of_dense_equations(name: str) -> None:
     symmetry = SCENES[name].symmetry
     n_elements = (480 if "holes" in name else 240) * (1 if symmetry is None else symmetry.n_images)

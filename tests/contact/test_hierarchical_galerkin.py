@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,14 +19,12 @@ from bemkit.operators.steklov_poincare.hierarchical_galerkin import Hierarchical
 from bemkit.testing import check_body
 from tests.contact.test_hierarchical_body import SCENES, loose_block, on_floor
 from tests.scenes import paper
+from tests.slow import slow_except
 
 TOLERANCE = 1e-11
 # held at all its corners, where its supports would contradict each other at a common node
 BODIES = {name: scene for name, scene in SCENES.items() if name != "tilted block"}
-QUICK = {
-    ("paper-1", 1), ("paper-1", 2), ("disc", 1), ("disc", 2), ("incompressible with a hole", 1),
-    ("half of a plate with a hole", 2), ("travelling block", 1), ("weight and heat", 2), ("load history", 1),
-}  # fmt: skip
+QUICK = (("paper-1", 1), ("disc", 2), ("incompressible with a hole", 1))
 
 
 def in_both_ways(scene: bk.Scene, n_elements: int, degree: int) -> tuple[bk.Scene, bk.Scene]:
@@ -35,14 +34,7 @@ def in_both_ways(scene: bk.Scene, n_elements: int, degree: int) -> tuple[bk.Scen
     return replace(scene, linear_solver=Hierarchical(TOLERANCE)), replace(scene, linear_solver=DenseCholesky())
 
 
-CASES = [
-    pytest.param(name, degree, marks=() if (name, degree) in QUICK else pytest.mark.slow, id=f"{name}-{degree}")
-    for name in BODIES
-    for degree in (1, 2)
-]
-
-
-@pytest.mark.parametrize(("name", "degree"), CASES)
+@pytest.mark.parametrize(("name", "degree"), slow_except(product(BODIES, (1, 2)), *QUICK))
 def test_statuses_and_tractions_are_those_of_dense_equations(name: str, degree: int) -> None:
     symmetry = BODIES[name].symmetry
     n_elements = (480 if "holes" in name else 240) * (1 if symmetry is None else symmetry.n_images)
@@ -63,15 +55,15 @@ def test_statuses_and_tractions_are_those_of_dense_equations(name: str, degree: 
     assert compressed.certificate.worst < 1e-9
 
 
-def test_the_body_keeps_the_promises_of_a_body() -> None:
-    for scene in (paper(1), loose_block()):
-        compressed = (in_both_ways(replace(scene, load_factors=(factor,)), 240, 1)[0] for factor in (1.0, 0.4))
-        body, reloaded = (build_model(prepare(each, each.build_mesh())).body for each in compressed)
-        assert isinstance(body, HierarchicalBody)
-        check_body(body, reloaded=reloaded)
+@pytest.mark.parametrize("name", slow_except(("paper-1", "loose block"), "loose block"))
+def test_the_body_keeps_the_promises_of_a_body(name: str) -> None:
+    compressed = (in_both_ways(replace(BODIES[name], load_factors=(factor,)), 240, 1)[0] for factor in (1.0, 0.4))
+    body, reloaded = (build_model(prepare(each, each.build_mesh())).body for each in compressed)
+    assert isinstance(body, HierarchicalBody)
+    check_body(body, reloaded=reloaded)
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", slow_except((1, 2), 1))
 def test_the_condensed_map_is_that_of_dense_equations(degree: int) -> None:
     scene = in_both_ways(replace(loose_block(), shape=bk.PlateWithHole(2.0, 1.5, 0.4)), 300, degree)[1]
     given = prepare(scene, scene.build_mesh())
@@ -90,7 +82,7 @@ def test_the_condensed_map_is_that_of_dense_equations(degree: int) -> None:
     np.testing.assert_allclose(tractions, same, atol=close * np.abs(same).max())
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", slow_except((1, 2), 1))
 def test_contact_knows_nothing_of_given_forces_on_its_own_nodes(degree: int) -> None:
     floor, press = loose_block().parts
     pushed = bk.Part("push", bk.Pressure(0.3), sides=("left",))  # down to the corner that touches
@@ -122,6 +114,7 @@ def test_without_contact_all_of_the_body_is_solved_for() -> None:
     np.testing.assert_allclose(compressed.boundary.displacement, dense.boundary.displacement, atol=1e-9 * size)
 
 
+@pytest.mark.slow
 def test_several_bodies_are_those_of_dense_equations() -> None:
     assembly = bk.load_scene("two-cylinders")
     assert isinstance(assembly, bk.Assembly)

@@ -172,6 +172,7 @@ def test_a_rounded_punch() -> None:
     assert zones(solution)[0] == pytest.approx(half_width, rel=WITHIN)
 
 
+@pytest.mark.slow
 def test_stick_under_a_punch_and_under_a_cylinder_is_as_spence_says() -> None:
     """Of a flat punch pressed with friction the static and the incremental law agree: it slips inward everywhere.
 
@@ -240,6 +241,7 @@ def block(n_half_widths: float) -> bk.Solution:
     return solution
 
 
+@pytest.mark.slow
 def test_blocks_agree_as_they_grow() -> None:
     """Far away a half-plane moves towards the load by a constant, a block between its walls does not.
 

@@ -125,6 +125,7 @@ def test_cylinders_approach_each_other_as_the_closed_form_says() -> None:
         assert contact.peak_pressure == pytest.approx(2.0 * load / (np.pi * half_width), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_cylinders_pressed_then_sheared_are_those_of_cattaneo_and_mindlin() -> None:
     """Two steps on meshes that fit the sheared state: stick zone, shear and slip at the edge to half a per cent."""
     scene, friction = bk.load_scene("two-cylinders"), 0.5

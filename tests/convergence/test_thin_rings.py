@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.outline import Outline
+from tests.slow import slow_except
 
 DISCRETISATIONS = [bk.ConstantCollocation(), bk.LinearGalerkin(), bk.QuadraticGalerkin()]
 POISSON_RATIOS = [0.49, 0.4995, 0.499995, 0.4999999999, 0.5]
@@ -60,7 +61,9 @@ def shaft_error(radius: float, nu: float, n: int, discretisation: object, **opti
 
 
 @pytest.mark.parametrize("discretisation", DISCRETISATIONS, ids=lambda d: type(d).__name__)
-@pytest.mark.parametrize(("radius", "nu"), [(0.3, 0.499995), (0.8, 0.4995), (0.8, 0.5), (0.99, 0.49)])
+@pytest.mark.parametrize(
+    ("radius", "nu"), slow_except([(0.3, 0.499995), (0.8, 0.4995), (0.8, 0.5), (0.99, 0.49)], (0.3, 0.499995))
+)
 def test_rings_under_pressure_and_on_shafts(radius: float, nu: float, discretisation: object) -> None:
     # 0.7 per cent is the largest error of 160 elements, on the smallest hole: the pressure at single nodes
     assert pressure_error(radius, nu, 160, discretisation) < 1e-2

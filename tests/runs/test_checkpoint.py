@@ -14,6 +14,7 @@ from bemkit.results.load_history import LoadHistory
 from bemkit.runs import checkpoint, load_path
 from bemkit.solvers.base import Status
 from tests.runs.test_rigid_bodies import driven
+from tests.slow import slow_except
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 LOOP = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=8)))
@@ -47,7 +48,7 @@ def loading_of(solution: bk.Solution | bk.AssemblySolution) -> LoadHistory:
     return solution.loading
 
 
-@pytest.mark.parametrize("scene", [LOOP, PUNCH], ids=["one body", "punch"])
+@pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), LOOP), ids=["one body", "punch"])
 def test_a_killed_run_is_continued_to_the_same_bits(
     scene: bk.Scene | bk.Assembly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +86,7 @@ CYLINDERS = replace(
 )
 
 
-@pytest.mark.parametrize("scene", [SHORT, CYLINDERS], ids=["one body", "two bodies"])
+@pytest.mark.parametrize("scene", slow_except((SHORT, CYLINDERS), SHORT), ids=["one body", "two bodies"])
 def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(
     scene: bk.Scene | bk.Assembly, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

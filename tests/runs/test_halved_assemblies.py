@@ -125,6 +125,7 @@ def test_normals_at_a_line_are_those_of_the_whole_side() -> None:
     np.testing.assert_allclose(at_apex, [[0.0, 1.0], [0.0, 1.0]], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_halved_cylinders_on_meshes_that_follow_the_solution() -> None:
     whole = bk.load_scene("two-cylinders")
     assert isinstance(whole, bk.Assembly)

@@ -41,6 +41,7 @@ def test_a_wall_is_pushed_up_to_its_collapse() -> None:
     check_up_to_collapse(wall(3, 4, push=True), FRICTION * 8.0, "block 2-0", 24.0)
 
 
+@pytest.mark.slow
 def test_a_wall_leans_up_to_its_collapse() -> None:
     check_up_to_collapse(wall(5, 4, push=False), FRICTION, "block 0-0", 40.0)
 

@@ -16,6 +16,7 @@ from bemkit.runs.nested import run_cascade
 from bemkit.runs.warm_start import state_on
 from bemkit.solvers.active_sets import contact_sets
 from tests.scene.test_load_history import block
+from tests.slow import slow_except
 
 DISCRETISATIONS = {"constant": bk.ConstantCollocation(), "linear": bk.LinearGalerkin()}
 
@@ -26,7 +27,7 @@ def example(number: int, discretisation: str, elements: int) -> bk.Scene:
     return dataclasses.replace(scene, discretisation=DISCRETISATIONS[discretisation], mesh=mesh)
 
 
-@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("number", slow_except((1, 2), 1))
 @pytest.mark.parametrize("discretisation", list(DISCRETISATIONS))
 def test_the_finest_mesh_costs_two_solves(number: int, discretisation: str) -> None:
     scene = example(number, discretisation, 640)

@@ -31,6 +31,7 @@ def test_packings_of_two_hundred_discs_rest(seed: int) -> None:
     check_packing(packing(200, 20.0, seed=seed))
 
 
+@pytest.mark.slow
 def test_points_that_face_two_discs_are_why_contacts_have_a_reach() -> None:
     """With the reach of half a disc the contacts tie many points twice, and six digits are lost."""
     near = packing(12, 5.0)

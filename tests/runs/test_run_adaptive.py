@@ -31,7 +31,7 @@ def adapted(example: int, word: str, accuracy: float) -> tuple[bk.Solution, ...]
         # the next to last mesh ends an element 4e-4 beside the transition, whose own elements are longer for it
         ("quadratic", 1e-3, 1e-3, 4e-3, 2e-5, 1e-5, 6e-5),
         ("quadratic", 1e-4, 1e-4, 2e-4, 1e-5, 1e-5, 1.5e-5),
-        ("quadratic", 3e-5, 3e-5, 1.2e-4, 2e-6, 1e-5, 1.5e-5),
+        pytest.param("quadratic", 3e-5, 3e-5, 1.2e-4, 2e-6, 1e-5, 1.5e-5, marks=pytest.mark.slow),
         ("linear", 4e-3, 1e-3, 4e-3, 5e-4, 1e-3, 3e-4),
     ],
 )

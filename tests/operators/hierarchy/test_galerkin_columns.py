@@ -18,6 +18,7 @@ from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
 from bemkit.operators.hierarchy.symmetric_skeletons import SymmetricView
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
+from tests.slow import slow_except
 
 MATERIAL = Material(2.0, 0.3)
 SHAPES = {
@@ -113,7 +114,7 @@ def test_rigid_motions_cause_nothing_outside() -> None:
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", slow_except(SHAPES, "quarter of a disc"))
 def test_products_with_skeletons_are_those_of_the_equations(name: str, degree: int) -> None:
     columns, tree = columns_of(name, degree, 300)
     differ = np.repeat(np.stack([np.ones_like(columns.is_node), columns.is_node], axis=1), 2, axis=1)

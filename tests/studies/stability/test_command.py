@@ -108,6 +108,7 @@ def test_random_scenes_are_counted() -> None:
         assert outcome in result.output
 
 
+@pytest.mark.slow
 def test_random_scenes_are_the_same_in_processes() -> None:
     tasks = trial_tasks(7, range(40, 44))
     together = list(compute_with_progress(tasks, "random scenes", is_live=False, processes=2))

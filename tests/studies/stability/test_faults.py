@@ -201,6 +201,7 @@ def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(
     assert after[: len(finished)] == finished or any("nan" in repr(row) for row in finished)
 
 
+@pytest.mark.slow
 def test_a_load_history_that_is_killed_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     runs = [
         sys.executable,

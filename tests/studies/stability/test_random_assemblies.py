@@ -36,10 +36,10 @@ def trials_of(seed: int, count: int, processes: int = 1) -> list[Trial]:
 
 
 def test_random_assemblies_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = trials_of(2, 12)
+    trials = trials_of(2, 6)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] > 4  # assemblies without answers test nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] > 2  # assemblies without answers test nothing
 
 
 @pytest.mark.slow
@@ -59,7 +59,8 @@ def test_many_random_assemblies(seed: int) -> None:
     assert_honest(trials_of(seed, 300, processes=2))
 
 
-@pytest.mark.parametrize("index", [295, pytest.param(391, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [295, 391])
 def test_histories_of_several_bodies_are_judged_by_what_they_promise(index: int) -> None:
     """The work of collocation does not balance, and slip counts from the last increment of a step, not from none."""
     (assembly,) = random_assembly(81, index).scenes
@@ -77,7 +78,7 @@ def test_every_fourth_trial_has_several_bodies() -> None:
 
 
 def test_assemblies_are_the_same_after_a_scene_file(tmp_path: Path) -> None:
-    for index in range(8):
+    for index in range(4):
         case = random_assembly(7, index)
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
     save_trial(Trial(7, FIRST, Outcome.WRONG, "means", "means 1"), tmp_path)
@@ -134,7 +135,7 @@ def test_assemblies_that_were_judged_wrong(seed: int, index: int, outcome: Outco
 
 def test_results_survive_a_file_and_plans_count_what_is_done(tmp_path: Path) -> None:
     n_solved = 0
-    for index in range(8):
+    for index in (6, 7, 8, 9, 10):
         try:
             steps = solved_steps(random_assembly(11, index))
         except bk.BemkitError:

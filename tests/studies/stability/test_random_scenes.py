@@ -37,10 +37,10 @@ def random_trials(seed: int, count: int, processes: int = 1) -> list[Trial]:
 
 
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = random_trials(1, 60)
+    trials = random_trials(1, 25)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 24  # a generator of scenes without answers tests nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 10  # a generator of scenes without answers tests nothing
 
 
 def half_planes_among(seed: int, count: int) -> list[RandomCase]:

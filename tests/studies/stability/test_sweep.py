@@ -19,6 +19,7 @@ from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
 from tests.scenes import CONSTANT, LINEAR, small_paper_scene
+from tests.slow import slow_only
 
 EXTREMES = {
     "youngs-modulus": (1e-12, 1e15),
@@ -50,7 +51,7 @@ def test_every_axis_is_tested_here() -> None:
         find_axes(["rho"])
 
 
-@pytest.mark.parametrize("name", EXTREMES)
+@pytest.mark.parametrize("name", slow_only(EXTREMES, "grading"))
 @pytest.mark.parametrize(("number", "discretisation"), [(1, CONSTANT), (2, LINEAR)], ids=["paper-1", "paper-2"])
 def test_the_ends_of_every_axis_are_right_or_named(
     name: str, number: int, discretisation: bk.LinearGalerkin | bk.ConstantCollocation
