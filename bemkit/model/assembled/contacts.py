@@ -146,8 +146,8 @@ def body_rows(
         try:
             reach = reach_of(pairs[k], bodies[first].mesh, bodies[second].mesh)
             coupling = couplings.couple(
-                PlacedSide(side, bodies[first].own_mesh, bodies[first].turn),
-                PlacedSide(other_side, bodies[second].own_mesh, bodies[second].turn),
+                PlacedSide(side, bodies[first].body.placement),
+                PlacedSide(other_side, bodies[second].body.placement),
                 without,
                 reach,
             )
