@@ -90,6 +90,13 @@ class ContactRows:
         """Number of nodes."""
         return self.nodes.size
 
+    def is_coupled_like(self, other: ContactRows) -> bool:
+        """Whether its nodes take part in both sides as they do in another step of the same load history."""
+        if isinstance(self.on_other, sparse.csr_array):
+            return self.on_body is other.on_body and self.on_other is other.on_other
+        columns = ((self.nodes, other.nodes), (self.weights, other.weights))
+        return self.name == other.name and all(np.array_equal(one, two) for one, two in columns)
+
 
 def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
     """Return all contacts between bodies: those that are listed, and those of bodies found touching."""
