@@ -18,6 +18,8 @@ from bemkit.model.boundary_tractions import projector
 _REACHED = 1e-12
 """Share of the largest coupling from which on a node takes part; less is round-off of places where meshes meet."""
 
+_Entries = tuple[FloatArray, IntArray, IntArray]
+
 
 @dataclass(frozen=True, eq=False)
 class ContactSpread:
@@ -53,10 +55,8 @@ class ContactSpread:
                     sides[key] = _Side(number, elements, bodies[number])
                 sides[key].add(coupling, rows, n_contact, sign)
             n_contact += rows.n_contact
-        if not sides:
-            return cls(sparse.csr_array((0, n_contact)), ())
-        collected = sparse.vstack([side.collected(n_contact) for side in sides.values()], format="csr")
-        spread = sparse.block_diag([side.spread() for side in sides.values()], format="csr")
+        collected = _stacked([(side.collected(), side.n_nodes, 0) for side in sides.values()], n_contact)
+        spread = _stacked([(side.spread(), side.n_values, side.n_nodes) for side in sides.values()], collected.shape[0])
         layout = tuple((side.body, side.elements, len(side.projection)) for side in sides.values())
         return cls(sparse.csr_array(spread @ collected), layout)
 
@@ -85,7 +85,7 @@ class _Side:
         self.local, self.reached = local.reshape(elements.size, -1), np.zeros(nodes.size)
         self.position = np.zeros(placed.space.n_dofs // 2, np.intp)
         self.position[nodes] = np.arange(nodes.size)
-        self.entries: list[tuple[FloatArray, IntArray, IntArray]] = []
+        self.entries: list[_Entries] = []
 
     def add(self, coupling: sparse.csr_array, rows: ContactRows, first: int, sign: float) -> None:
         """Take the coupling (n, n_nodes) of a contact whose nodes count on from the given one."""
@@ -95,13 +95,23 @@ class _Side:
         if not isinstance(rows.on_other, sparse.csr_array):  # an obstacle ends nowhere
             self.reached[:] = 1.0 + self.reached.max()
 
-    def collected(self, n_contact: int) -> sparse.csr_array:
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return self.reached.size
+
+    @property
+    def n_values(self) -> int:
+        """Number of tractions."""
+        return self.elements.size * len(self.projection)
+
+    def collected(self) -> _Entries:
         """Return how the nodes (n_nodes, n_contact) collect forces."""
         values, nodes, contact_nodes = (np.concatenate(each) for each in zip(*self.entries, strict=True))
-        return sparse.csr_array((values, (nodes, contact_nodes)), (self.reached.size, n_contact))
+        return values, nodes, contact_nodes
 
-    def spread(self) -> sparse.csr_array:
-        """Return the tractions (m * n_local, n_nodes) at the local nodes of elements that stand for forces of nodes."""
+    def spread(self) -> _Entries:
+        """Return the tractions (n_values, n_nodes) at the local nodes of elements that stand for forces of nodes."""
         is_reached = self.reached > _REACHED * self.reached.max(initial=0.0)
         is_covered = is_reached[self.local].all(axis=1)
         # nodes that are alone: on a sliver, or beside nodes that a support holds
@@ -113,9 +123,23 @@ class _Side:
         totals = np.bincount(self.local[is_covered].ravel(), integrals[is_covered].ravel(), self.reached.size)
         shares = is_covered[:, None] / np.where(totals > 0.0, totals, np.inf)[self.local]
         values = self.projection * shares[:, None]  # (m, n_values, n_local)
-        rows = np.arange(values[..., 0].size).reshape(values.shape[:2])
-        place = np.broadcast_arrays(rows[..., None], self.local[:, None])
-        return sparse.csr_array((values.ravel(), tuple(each.ravel() for each in place)), (rows.size, self.reached.size))
+        rows = np.arange(self.n_values).reshape(values.shape[:2])
+        row, column = np.broadcast_arrays(rows[..., None], self.local[:, None])
+        return values.ravel(), row.ravel(), column.ravel()
+
+
+def _stacked(blocks: Sequence[tuple[_Entries, int, int]], n_columns: int) -> sparse.csr_array:
+    """Return the sparse array of blocks (values, rows, columns), so many rows and columns after each other."""
+    first = np.cumsum([(0, 0), *((n_rows, n_beside) for _, n_rows, n_beside in blocks)], axis=0)
+    values, rows, columns = (
+        np.concatenate([np.zeros(0, kind), *parts])
+        for kind, parts in (
+            (float, [entries[0] for entries, _, _ in blocks]),
+            (int, [entries[1] + begin for (entries, _, _), begin in zip(blocks, first[:, 0], strict=False)]),
+            (int, [entries[2] + begin for (entries, _, _), begin in zip(blocks, first[:, 1], strict=False)]),
+        )
+    )
+    return sparse.csr_array((values, (rows, columns)), (int(first[-1, 0]), n_columns))
 
 
 def _sides(rows: ContactRows) -> list[tuple[int, sparse.csr_array, IntArray, float]]:
