@@ -11,6 +11,9 @@ from bemkit.contact.problem import ContactProblem, ContactState
 _ROUND_OFF = 1e-13
 """Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
 ones mean something, however small they are."""
+DEFORMED = 1e-3
+"""Share of its displacement by which a body counts as deformed that contact does not touch: more than round-off of the
+displacement leaves to a tolerance of 1e-9, less than the load may deform a body that has given way to an overlap."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     causes at its node, ``force / E'``, however few nodes or small elements carry it: a far obstacle or a long rigid
     motion does not loosen the test until it exceeds 1e6 times that displacement, where round-off would speak instead. A
     state without tractions, such as that of a loose body which has given way to an overlap, has no length but its
-    displacement.
+    displacement: a thousandth of it is what counts as deformation.
     """
     scales = _scales(problem, state)
     stress = np.minimum(scales.stress, scales.force / problem.body.weights) * scales.share
@@ -142,7 +145,7 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
     # by what would hold it or, if even that is nothing, by the gaps.
     gaps = np.abs(problem.gap[np.isfinite(problem.gap)])
     force = float((weights * sticking).max())
-    length = furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
+    length = DEFORMED * furthest or force / modulus or float(gaps.max(initial=0.0)) or 1.0
     return _Scales(float(sticking.max()) or 1.0, force or float(weights.max()), length, length, np.ones(len(weights)))
 
 

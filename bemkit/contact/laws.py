@@ -154,6 +154,11 @@ class LawOfCoefficients(FrictionLaw):
         """The coefficients by name."""
         return {entry.name: getattr(self, entry.name) for entry in fields(self)}  # type: ignore[arg-type]
 
+    @property
+    def is_uniform(self) -> bool:
+        """Whether its coefficients are numbers, the same at all nodes."""
+        return all(isinstance(value, float) for value in self.coefficients.values())
+
     def _compared(self) -> tuple[object, ...]:
         """Return class and coefficients in a form that compares and hashes."""
         values = self.coefficients.values()

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
+from bemkit.contact.mortar.congruent import stand_alike
 from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.contact.slip_history import SlipHistory
+from bemkit.geometry.placement import Placement
 from bemkit.model.assembled.contacts import carries_multipliers, reach_of
 from bemkit.results.between_nodes import (
     BetweenNodes,
+    Interpolation,
     PointsBetween,
-    displacement_at,
     law_between,
     points_at_obstacle,
     points_between,
-    traction_at,
     violations_at,
 )
 from bemkit.results.contact_table import ContactTable
@@ -134,39 +137,93 @@ def _at_obstacles(
 
 def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator[_Measured]:
     """Yield the contacts between elastic bodies, the tractions of both sides one after the other."""
+    placements = {body.name: body.placement for body in assembly.placed_bodies}
+    known: dict[Hashable, _Facing] = {}
     for pair in assembly.elastic_contacts:
-        names = [side.split(".", 1) for side in pair.sides]
-        bodies = [solved[name] for name, _ in names]
-        spaces = [body.scene.discretisation.displacement_space(body.mesh) for body in bodies]
+        names, parts = zip(*(side.split(".", 1) for side in pair.sides), strict=True)
+        one, two = (solved[name] for name in names)
+        reach = reach_of(pair, one.mesh, two.mesh)
+        alike = stand_alike((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)
+        key = (alike, parts, pair.multipliers_on and pair.multipliers_on == pair.sides[0])
+        if key not in known:
+            known[key] = _Facing.of(pair, (one, two), parts, placements[names[0]], reach)
+        values = known[key].values((one, two), placements[names[0]], pair.gap)
+        yield _Measured(pair.name, names, assembly.law_of(pair), values)
+
+
+@dataclass(frozen=True, eq=False)
+class _Facing:
+    """Points of two sides that face each other, for all pairs of bodies that stand alike.
+
+    Parameters
+    ----------
+    placement : Placement
+        Of the body named first, where the places and vectors are those of.
+    is_swapped : bool
+        Whether the body named second has the multipliers.
+    sides : two Interpolation
+        Of the body with the multipliers, and of the other one.
+    s : (n,) array [m]
+    points, directions, gap : (n, 2) arrays
+        The gap is the way from the one side to the other.
+    """
+
+    placement: Placement
+    is_swapped: bool
+    sides: tuple[Interpolation, Interpolation]
+    s: FloatArray
+    points: FloatArray
+    directions: FloatArray
+    gap: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        pair: ContactPair,
+        bodies: tuple[SolvedBody, SolvedBody],
+        parts: Sequence[str],
+        placement: Placement,
+        reach: float,
+    ) -> _Facing:
         one, two = (
-            ContactSide(space, body.mesh.part(part))
-            for space, body, (_, part) in zip(spaces, bodies, names, strict=True)
+            ContactSide(body.scene.discretisation.displacement_space(body.mesh), body.mesh.part(part))
+            for body, part in zip(bodies, parts, strict=True)
         )
-        if not carries_multipliers(pair, one, two):
+        is_swapped = not carries_multipliers(pair, one, two)
+        if is_swapped:
             one, two, bodies = two, one, bodies[::-1]
-        reach = reach_of(pair, bodies[0].mesh, bodies[1].mesh)
-        law, partners = assembly.law_of(pair), tuple(name for name, _ in names)
-        yield _Measured(pair.name, partners, law, _facing(bodies, one, two, pair.gap, reach))
+        directions = mean_directions(one, two, reach)
+        segments = common_refinement(one, two, directions, reach)
+        xi = points_between(max(one.space.degree, two.space.degree))
+        places = facing_points(segments, one, two, directions, xi, np.ones_like(xi))
+        xi, row = places.xi, places.row
+        before, half = np.cumsum(one.lengths) - one.lengths, 0.5 * one.lengths[row, None]
+        return cls(
+            placement,
+            is_swapped,
+            (
+                Interpolation.at(bodies[0], one.elements[row], xi),
+                Interpolation.at(bodies[1], two.elements[places.partner], places.eta),
+            ),
+            (before[row, None] + half * (1.0 + xi)).ravel(),
+            one.points(row, xi).reshape(-1, 2),
+            np.asarray(one.directions(directions, row, xi)).reshape(-1, 2),
+            places.gap.reshape(-1, 2),
+        )
 
-
-def _facing(
-    bodies: Sequence[SolvedBody], one: ContactSide, two: ContactSide, gap: float, reach: float
-) -> PointsBetween:
-    """Return what is known at points of two sides, with the tractions of the first and then those of the second."""
-    directions = mean_directions(one, two, reach)
-    segments = common_refinement(one, two, directions, reach)
-    xi = points_between(max(one.space.degree, two.space.degree))
-    places = facing_points(segments, one, two, directions, xi, np.ones_like(xi))
-    (first, xi), (second, eta) = (one.elements[places.row], places.xi), (two.elements[places.partner], places.eta)
-    along = np.asarray(one.directions(directions, places.row, xi)).reshape(-1, 2)
-    apart = places.gap - displacement_at(bodies[0], first, xi) + displacement_at(bodies[1], second, eta)
-    before, half = np.cumsum(one.lengths) - one.lengths, 0.5 * one.lengths[places.row, None]
-    traction = np.concatenate([traction_at(bodies[0], first, xi), -traction_at(bodies[1], second, eta)])
-    both = np.tile(along, (2, 1))
-    return PointsBetween(
-        np.tile(one.points(places.row, xi).reshape(-1, 2), (2, 1)),
-        np.tile((before[places.row, None] + half * (1.0 + xi)).ravel(), 2),
-        both,
-        np.tile(gap + np.sum(apart.reshape(-1, 2) * along, axis=1), 2),
-        *np.einsum("nkc,nc->kn", contact_frame(both), traction.reshape(-1, 2)),
-    )
+    def values(self, bodies: tuple[SolvedBody, SolvedBody], placement: Placement, gap: float) -> PointsBetween:
+        """Return what is known at the points, with the tractions of the first side and then those of the second."""
+        first, second = bodies[::-1] if self.is_swapped else bodies
+        points = placement.forward(self.placement.back(self.points))
+        along, apart = (placement.turned(self.placement.turned_back(each)) for each in (self.directions, self.gap))
+        one, two = self.sides
+        apart = apart - one.displacement(first).reshape(-1, 2) + two.displacement(second).reshape(-1, 2)
+        traction = np.concatenate([one.traction(first), -two.traction(second)]).reshape(-1, 2)
+        both = np.tile(along, (2, 1))
+        return PointsBetween(
+            np.tile(points, (2, 1)),
+            np.tile(self.s, 2),
+            both,
+            np.tile(gap + np.sum(apart * along, axis=1), 2),
+            *np.einsum("nkc,nc->kn", contact_frame(both), traction),
+        )

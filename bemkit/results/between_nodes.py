@@ -13,7 +13,7 @@ from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.contact.slip_history import SlipHistory
-from bemkit.geometry.local_values import values_on_elements
+from bemkit.geometry.local_values import from_own_nodes
 from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.contact_table import ContactTable
@@ -147,27 +147,53 @@ def points_at_obstacle(body: SolvedBody, obstacle: Obstacle, elements: IntArray)
     at = np.broadcast_to(xi, (elements.size, xi.size))
     lengths = mesh.lengths[elements]
     s = (np.cumsum(lengths) - lengths)[:, None] + 0.5 * lengths[:, None] * (xi + 1.0)
-    u_n, _ = np.einsum("nkc,nc->kn", contact_frame(directions), displacement_at(body, elements, at).reshape(-1, 2))
-    traction = traction_at(body, elements, at).reshape(-1, 2)
-    sigma_n, sigma_t = np.einsum("nkc,nc->kn", contact_frame(directions), traction)
+    fields, frame = Interpolation.at(body, elements, at), contact_frame(directions)
+    u_n, _ = np.einsum("nkc,nc->kn", frame, fields.displacement(body).reshape(-1, 2))
+    sigma_n, sigma_t = np.einsum("nkc,nc->kn", frame, fields.traction(body).reshape(-1, 2))
     return PointsBetween(points, s.ravel(), directions, gap - u_n, sigma_n, sigma_t)
 
 
-def displacement_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
-    """Return displacements (m, q, 2) [m] at xi (m, q) of elements (m,)."""
-    space = body.scene.discretisation.displacement_space(body.mesh)
-    return _combined(space, values_on_elements(space, body.boundary.displacement, elements), xi)
+@dataclass(frozen=True, eq=False)
+class Interpolation:
+    """How the fields of a body, and of its copies, are interpolated at points (m, q) of elements (m,).
+
+    Parameters
+    ----------
+    elements : (m,) int array
+    dofs : (m, n_local) int array
+        Of the displacements.
+    of_displacement, of_traction : (m, q, n_local) arrays
+    """
+
+    elements: IntArray
+    dofs: IntArray
+    of_displacement: FloatArray
+    of_traction: FloatArray
+
+    @classmethod
+    def at(cls, body: SolvedBody, elements: IntArray, xi: FloatArray) -> Interpolation:
+        """Prepare places xi (m, q) of elements (m,) of a body."""
+        moved, loaded = (
+            each(body.mesh)
+            for each in (body.scene.discretisation.displacement_space, body.scene.discretisation.traction_space)
+        )
+        dofs = moved.element_dofs[elements]
+        lifted = from_own_nodes(moved, np.broadcast_to(np.eye(dofs.shape[1]), (*dofs.shape, dofs.shape[1])), elements)
+        return cls(elements, dofs, _basis(moved, xi) @ lifted, _basis(loaded, xi))
+
+    def displacement(self, body: SolvedBody) -> FloatArray:
+        """Return displacements (m, q, 2) [m]."""
+        return np.asarray(self.of_displacement @ body.boundary.displacement[self.dofs])
+
+    def traction(self, body: SolvedBody) -> FloatArray:
+        """Return tractions (m, q, 2) [Pa]."""
+        at_nodes = body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)
+        return np.asarray(self.of_traction @ at_nodes[self.elements])
 
 
-def traction_at(body: SolvedBody, elements: IntArray, xi: FloatArray) -> FloatArray:
-    """Return tractions (m, q, 2) [Pa] at xi (m, q) of elements (m,)."""
-    space = body.scene.discretisation.traction_space(body.mesh)
-    return _combined(space, body.boundary.traction_dofs.reshape(body.mesh.n_elements, -1, 2)[elements], xi)
-
-
-def _combined(space: BoundarySpace, values: FloatArray, xi: FloatArray) -> FloatArray:
-    """Return (m, q, 2) values at xi (m, q) from those of the local basis (m, n, 2)."""
-    return np.asarray(np.einsum("leq,elc->eqc", space.basis(xi.ravel()).reshape(-1, *xi.shape), values))
+def _basis(space: BoundarySpace, xi: FloatArray) -> FloatArray:
+    """Return the local basis (m, q, n_local) at xi (m, q)."""
+    return space.basis(xi.ravel()).reshape(-1, *xi.shape).transpose(1, 2, 0)
 
 
 def law_between(

@@ -321,11 +321,11 @@ class _Run:
         """Return the iterate without contact tractions, if the body needs none where the iterate has brought it.
 
         Drivers only come ever closer to tractions that vanish. What they leave is no small error, having nothing to be
-        small against.
+        small against; a body that has been carried far may be moved out of the obstacle by a last little.
         """
         if untouched is None or not iterate.state.is_finite:
             return iterate
-        state = untouched.nearest(iterate.state.displacement)
+        state = untouched.nearest_clear(iterate.state.displacement, self.problem.gap)
         if not certify(self.problem, state).is_below(self.tolerance):
             return iterate
         return replace(iterate, state=state, message="the body rests without touching")

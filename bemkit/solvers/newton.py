@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.certificate import certificate_scales
+from bemkit.contact.certificate import DEFORMED, certificate_scales
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
 from bemkit.contact.rigid_motions import RigidMotions, as_dense, as_rows
@@ -27,6 +27,9 @@ a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an ob
 
 _UNFELT = 1e-12
 """Squared size of slips, relative to the largest, below which a motion makes no slip."""
+
+_JAMMED = 1e-12
+"""Rest of a least-squares problem below which there is no way out of the obstacle."""
 
 _MOST_PINNED = 60
 """Of more free motions than that the forces are not sorted out: springs hold them."""
@@ -138,6 +141,34 @@ class FloatingResponse:
         way = (displacement - self.state.displacement).ravel()
         shift = np.linalg.lstsq(motions.T, way, rcond=None)[0] @ motions
         return ContactState(self.state.displacement + shift.reshape(-1, 2), self.state.traction)
+
+    def nearest_clear(self, displacement: FloatArray, gap: FloatArray) -> ContactState:
+        """Return the nearest position, moved by the least that takes all nodes out of the obstacle.
+
+        That is done only where it is little beside the displacement, and where it can be. The least c with
+        ``motions_n^T c >= u_n - gap`` is the rest of a least-squares problem whose factors are not negative; of the
+        nodes only those count that have been the deepest.
+
+        Parameters
+        ----------
+        displacement : (n_contact, 2) array [m]
+        gap : (n_contact,) array [m]
+        """
+        from scipy.optimize import nnls
+
+        state = self.nearest(displacement)
+        motions = np.linalg.qr(self.free_motions.reshape(len(self.free_motions), -1).T)[0]
+        depth, shift, asked = state.u_n - gap, np.zeros(len(motions)), []
+        if depth.max() > DEFORMED * np.abs(state.displacement).max():
+            return state
+        while (deepest := int(np.argmax(depth - shift[0::2]))) not in asked and depth[deepest] > shift[2 * deepest]:
+            asked.append(deepest)
+            rows = np.vstack([motions[2 * np.array(asked)].T, depth[asked] / np.abs(depth[asked]).max()])
+            rest = rows @ nnls(rows, np.eye(len(rows))[-1])[0] - np.eye(len(rows))[-1]
+            if abs(rest[-1]) < _JAMMED:
+                return state
+            shift = motions @ (np.abs(depth[asked]).max() * rest[:-1] / -rest[-1])
+        return ContactState(state.displacement - shift.reshape(-1, 2), state.traction)
 
 
 def untouched_response(body: LinearBody) -> FloatingResponse | None:

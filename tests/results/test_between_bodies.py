@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import h5py
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.results import between_bodies
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.result_file import read_result, write_result
@@ -75,6 +77,37 @@ def test_tension_on_either_side_is_seen(pressed: AssemblySolution, body: str) ->
     assert changed(pressed, body).tension == 0.0
     size = np.hypot(1.0, SHEAR)
     assert changed(pressed, body, normal=1.0 + RISE).tension == pytest.approx(RISE / size, rel=1e-8)
+
+
+@pytest.mark.parametrize("turn", [0.0, 33.0])
+def test_pairs_that_are_copies_of_each_other_are_measured_as_if_alone(
+    turn: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three pairs of blocks; a node of the second one moves, and the contact there, and no other, sees it."""
+    pair = patch(2)
+    base, load = bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Pressure(1.0), ("top",))
+    places = bk.ListedCopies(tuple(bk.Placement((3.0 * k, 0.0), turn * k) for k in range(3)))
+    lower, upper = (
+        replace(each, parts=(part,), copies=places) for each, part in zip(pair.bodies, (base, load), strict=True)
+    )
+    contacts = tuple(bk.ContactPair((f"upper-{k}.bottom", f"lower-{k}.top"), reach=0.1) for k in (1, 2, 3))
+    solution = bk.run(replace(pair, bodies=(lower, upper), contacts=contacts))
+    moved = solution.bodies["upper-2"]
+    u = moved.boundary.displacement.copy()
+    node = moved.scene.discretisation.displacement_space(moved.mesh).element_dofs[moved.mesh.part("bottom")[2], 1]
+    u[node] += bk.Placement(turn=turn).rotation @ [0.0, -DEPTH]
+    solution = replace(
+        solution,
+        bodies={**solution.bodies, "upper-2": replace(moved, boundary=replace(moved.boundary, displacement=u))},
+    )
+    alike = [each.as_dict() for each in solution.contacts_between_nodes.values()]
+    assert [each["penetration_depth"] > 0.5 * DEPTH for each in alike] == [False, True, False]
+    keys = count()
+    monkeypatch.setattr(between_bodies, "stand_alike", lambda one, two, reach: next(keys))
+    alone = [each.as_dict() for each in replace(solution).contacts_between_nodes.values()]
+    assert next(keys) == 3
+    for one, other in zip(alike, alone, strict=True):
+        assert one == pytest.approx(other, abs=1e-12)  # round-off of coordinates of ten
 
 
 def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: AssemblySolution) -> None:

@@ -112,34 +112,53 @@ def test_uniform_pressure_and_shear_pass_a_joint_of_meshes_that_do_not_match(deg
     np.testing.assert_allclose(others, -tractions[0] + 0.0 * others, atol=1e-9)
 
 
-def test_nine_blocks_pass_the_patch() -> None:
-    """Three by three, every block with another number of elements, pressed from the sides and the top."""
-    rng = np.random.default_rng(0)
-    counts = rng.permutation(np.arange(12, 48, 4))
+@pytest.mark.parametrize("degree", [2, 4])
+@pytest.mark.parametrize("turn", [0.0, 33.0])
+def test_nine_blocks_pass_the_patch(degree: int, turn: float) -> None:
+    """Three by three, every block with another number of elements, under two pressures and a shear, held below.
+
+    The strains of a uniform stress are ``((1 + nu) sigma - nu (1 + nu) tr(sigma) I) / E``.
+    """
+    placed, nu = bk.Placement(turn=turn), STEEL.poisson_ratio
+    turned = placed.rotation
+    stress = turned @ np.array([[-0.6, SHEAR], [SHEAR, -1.0]]) @ turned.T
+    strain = (1.0 + nu) * (stress - nu * np.trace(stress) * np.eye(2))
+    base = bk.PrescribedDisplacement(*((lambda x, y, row=row: row[0] * x + row[1] * y) for row in strain))
+    normals = {"left": (-1.0, 0.0), "right": (1.0, 0.0), "top": (0.0, 1.0)}
+    loads = {name: bk.Traction(*(stress @ turned @ normal).tolist()) for name, normal in normals.items()}
+    counts = np.random.default_rng(0).permutation(np.arange(12, 48, 4))
     blocks = []
     for k in range(9):
         column, row = k % 3, k // 3
-        supports = [("left", bk.Roller())] * (column == 0) + [("bottom", bk.Roller())] * (row == 0)
-        loads = [("right", bk.Pressure(0.5))] * (column == 2) + [("top", bk.Pressure(1.0))] * (row == 2)
-        parts = tuple(bk.Part(side, condition, (side,)) for side, condition in supports + loads)
+        outer = {"left": column == 0, "right": column == 2, "top": row == 2}
+        conditions = {side: loads[side] for side, is_outer in outer.items() if is_outer}
+        if row == 0:
+            conditions["bottom"] = base
         blocks.append(
             bk.Body(
                 name=f"block {k}",
                 shape=bk.Rectangle(1.0, 1.0),
                 material=STEEL,
-                parts=parts,
-                placement=bk.Placement((float(column), float(row))),
+                parts=tuple(bk.Part(side, condition, (side,)) for side, condition in conditions.items()),
+                placement=placed.after(bk.Placement((float(column), float(row)))),
                 mesh=bk.MeshOptions(elements=int(counts[k])),
             )
         )
     wall = bk.Assembly(
-        title="Nine blocks", bodies=tuple(blocks), touching=bk.Touching(1e-6), discretisation=bk.QuadraticGalerkin()
+        title="Nine blocks",
+        bodies=tuple(blocks),
+        touching=bk.Touching(1e-6),
+        law=bk.Coulomb(0.5),
+        discretisation=bk.Galerkin(degree),
     )
     solution = bk.run(wall)
     assert solution.is_converged
     assert len(solution.contacts) == 12
-    directions, pressure = np.abs(solution.contact_directions), -solution.contact.sigma_n
-    np.testing.assert_allclose(pressure, directions @ np.array([0.5, 1.0]), atol=1e-10)  # round-off, condition 1e4
+    normal = solution.contact_directions
+    tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    for found, along in ((solution.contact.sigma_n, normal), (solution.contact.sigma_t, tangent)):
+        exact = np.einsum("nc,cd,nd->n", along, stress, normal)
+        np.testing.assert_allclose(found, exact, atol=1e-10)  # round-off, condition 1e4
 
 
 def test_columns_between_smooth_walls_settle_under_their_weight() -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from bemkit.contact.conditions import separated, slip, stick
 from bemkit.contact.laws import Coulomb, Frictionless
@@ -11,7 +12,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
-from bemkit.solvers.newton import floating_response
+from bemkit.solvers.newton import FloatingResponse, floating_response
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import block_body
@@ -62,6 +63,35 @@ def test_a_load_that_would_move_the_body_has_no_floating_response(net):
     assert floating_response(block_body(is_held_sideways=False), OPEN) is None
 
 
+def test_a_floating_body_is_moved_out_of_the_obstacle_by_the_least() -> None:
+    """A shift where one node is in the way, a shift and a turn where three are."""
+    response = floating_response(LOOSE, OPEN)
+    far = response.nearest(1e4 * (LOOSE.motions[0] + LOOSE.motions[1])).displacement
+    np.testing.assert_array_equal(response.nearest_clear(far, np.full(N, 1e5)).displacement, far)
+    for depth in ([(4, 0.3)], [(0, 0.2), (5, 0.9), (12, 0.1)]):
+        gap = np.full(N, 1e5)
+        for node, deep in depth:
+            gap[node] = far[node, 0] - deep
+        moved = response.nearest_clear(far, gap).displacement
+        clearance = gap - moved[:, 0]
+        assert clearance.min() == pytest.approx(0.0, abs=1e-11)  # round-off of displacements of 1e4
+        # the least of all: the shift is a combination, with one sign, of what moves the touching nodes
+        touching = np.flatnonzero(clearance < 1e-10)
+        motions = np.linalg.qr(response.free_motions.reshape(3, -1).T)[0]
+        factors, rest = nnls(motions[2 * touching].T, -(motions.T @ (moved - far).ravel()))
+        assert rest < 1e-10
+        assert factors.max() > 0.1
+    too_deep = far[:, 0] - 20.0
+    np.testing.assert_array_equal(response.nearest_clear(far, too_deep).displacement, far)
+
+
+def test_a_body_that_is_jammed_stays_where_it_is() -> None:
+    """Two obstacles that face each other, one at each end of a sliding motion."""
+    far = np.array([[0.0, 100.0], [0.0, 100.0]])
+    response = FloatingResponse(ContactState(far, np.zeros((2, 2))), np.array([[[1.0, 0.0], [-1.0, 0.0]]]))
+    np.testing.assert_array_equal(response.nearest_clear(far, np.array([-0.01, -0.01])).displacement, far)
+
+
 DRIVERS = [SemismoothNewton(), SemismoothNewton(rho=1e-3), AugmentedLagrangian(), FixedPoint(), LemkePivoting()]
 
 
@@ -73,7 +103,7 @@ def test_a_loose_body_gives_way_to_an_overlap_and_keeps_no_traction(driver, law)
     solution = solve(problem, driver)
     np.testing.assert_array_equal(solution.state.traction, 0.0)
     furthest = np.abs(solution.state.displacement).max()
-    assert np.max(solution.state.u_n - gap) <= 1e-9 * furthest  # the tolerance of the certificate
+    assert np.max(solution.state.u_n - gap) <= 1e-12 * furthest  # 1e-9 of a thousandth, as certificates measure
     assert furthest <= 1e-2  # nor does it leave for no reason
     again = solve(problem, driver, start=ContactState(solution.state.displacement, solution.state.traction))
     np.testing.assert_array_equal(again.state.traction, 0.0)

@@ -15,6 +15,10 @@ from bemkit.geometry.placement import Placement
 
 _DIGITS = 12
 """Decimals of distances, relative to the coordinates of the pair, to which congruent pairs agree."""
+_DIGITS_OF_SUMS = 9
+"""The same of sums that tell meshes apart that somebody has made of one array of elements."""
+_FAR = 4.0
+"""Sizes of a pair within which both bodies are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,15 +28,12 @@ class PlacedSide:
     Parameters
     ----------
     side : ContactSide
-        In its place.
-    mesh : BoundaryMesh
-        The mesh that was placed; copies have one in common.
+        In its place; copies have the array of elements in common.
     placement : Placement
-        Of this mesh.
+        Where its mesh was brought from where it was drawn.
     """
 
     side: ContactSide
-    mesh: BoundaryMesh
     placement: Placement
 
 
@@ -54,12 +55,35 @@ class CongruentCouplings:
 
 
 def _key(non_mortar: PlacedSide, mortar: PlacedSide, without: IntArray, reach: float) -> Hashable:
-    one, two = non_mortar.placement, mortar.placement
-    shift = one.turned_back(np.subtract(two.shift, one.shift))
-    size = max(non_mortar.mesh.diameter, mortar.mesh.diameter, float(np.abs(shift).max()))
-    meshes = (id(non_mortar.mesh), non_mortar.side.elements.tobytes(), id(mortar.mesh), mortar.side.elements.tobytes())
-    relative = (*np.round(shift / size, _DIGITS).tolist(), round((two.turn - one.turn) % 360.0, _DIGITS))
-    return (*meshes, *relative, without.tobytes(), reach)
+    one, two = ((each.side.mesh, each.placement) for each in (non_mortar, mortar))
+    sides = (non_mortar.side.elements.tobytes(), mortar.side.elements.tobytes())
+    return (stand_alike(one, two, reach), sides, without.tobytes())
+
+
+def stand_alike(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Placement], reach: float) -> Hashable:
+    """Return a key that pairs of meshes have in common that are copies of each other, moved as a whole.
+
+    Parameters
+    ----------
+    one, two : (BoundaryMesh, Placement)
+        In their places, and where they were brought from where they were drawn.
+    reach : float [m]
+        A distance that has to be the same as well.
+    """
+    (mesh, place), (other, other_place) = one, two
+    shift = place.turned_back(np.subtract(other_place.shift, place.shift))
+    size = float(max(mesh.lengths.sum(), other.lengths.sum(), np.abs(shift).max()))
+    lengths = np.round(np.append(shift, min(reach, _FAR * size)) / size, _DIGITS)
+    turn = round((other_place.turn - place.turn) % 360.0, _DIGITS)
+    return *_shape(*one, size), *_shape(*two, size), *lengths.tolist(), turn
+
+
+def _shape(mesh: BoundaryMesh, placement: Placement, size: float) -> tuple[float, ...]:
+    """Return what copies of a mesh share: the array of elements, and weighted sums of places in their own axes."""
+    points = np.concatenate([mesh.start, mesh.centres])
+    weights = np.modf(np.arange(1, len(points) + 1) * 0.6180339887498949)[0]
+    sums = placement.turned_back(weights @ (points - points[0]))
+    return id(mesh.elements), *np.round(sums / size, _DIGITS_OF_SUMS).tolist()
 
 
 def _moved(coupling: MortarCoupling, before: Placement, now: Placement) -> MortarCoupling:

@@ -90,6 +90,13 @@ class ContactRows:
         """Number of nodes."""
         return self.nodes.size
 
+    def is_coupled_like(self, other: ContactRows) -> bool:
+        """Whether its nodes take part in both sides as they do in another step of the same load history."""
+        if isinstance(self.on_other, sparse.csr_array):
+            return self.on_body is other.on_body and self.on_other is other.on_other
+        columns = ((self.nodes, other.nodes), (self.weights, other.weights))
+        return self.name == other.name and all(np.array_equal(one, two) for one, two in columns)
+
 
 def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[ContactPair, ...]:
     """Return all contacts between bodies: those that are listed, and those of bodies found touching."""
@@ -146,8 +153,8 @@ def body_rows(
         try:
             reach = reach_of(pairs[k], bodies[first].mesh, bodies[second].mesh)
             coupling = couplings.couple(
-                PlacedSide(side, bodies[first].own_mesh, bodies[first].turn),
-                PlacedSide(other_side, bodies[second].own_mesh, bodies[second].turn),
+                PlacedSide(side, bodies[first].body.placement),
+                PlacedSide(other_side, bodies[second].body.placement),
                 without,
                 reach,
             )

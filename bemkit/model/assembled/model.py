@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from bemkit.arrays import FloatArray, blended
+from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.assembled.contact_tractions import contact_tractions
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
@@ -143,7 +142,10 @@ class AssembledModel:
             1/2 a(u, u) [J/m].
         """
         prepared, units = self.prepared, self.prepared.units
-        of_contacts = contact_tractions(prepared.bodies, prepared.rows, state.traction * units.stress)
+        in_place = prepared.column("weights")[:, None] * np.einsum("nk,nkc->nc", state.traction, prepared.frame)
+        of_contacts: list[list[tuple[IntArray, FloatArray]]] = [[] for _ in prepared.bodies]
+        for number, elements, values in prepared.spread.tractions(units.stress * in_place):
+            of_contacts[number].append((elements, values))
         fields: list[tuple[FloatArray, FloatArray, float]] = []
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
         for body, elastic, condensed, own in zip(

@@ -10,13 +10,14 @@ from itertools import zip_longest
 import numpy as np
 from scipy import sparse
 
-from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.laws import FrictionLaw, Frictionless
+from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
+from bemkit.model.assembled.contact_tractions import ContactSpread
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
 from bemkit.model.assembled.obstacles import obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
@@ -82,6 +83,11 @@ class PreparedAssembly:
         return np.concatenate([np.zeros((0, 2, 2)), *(rows.frame for rows in self.rows)])
 
     @cached_property
+    def spread(self) -> ContactSpread:
+        """How forces of contact nodes become tractions of elements."""
+        return ContactSpread.of(self.bodies, self.rows)
+
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """The contact of each contact node."""
         return tuple(rows.name for rows in self.rows for _ in range(rows.n_contact))
@@ -101,21 +107,23 @@ class PreparedAssembly:
         LawError
             If a coefficient is not finite or negative somewhere; the message names the contact.
         """
-        laws: list[FrictionLaw] = []
-        nodes, first = [], 0
+        laws: dict[object, tuple[FrictionLaw, list[IntArray]]] = {}
+        first = 0
         for rows in self.rows:
             numbers = first + np.arange(rows.n_contact)
             first += rows.n_contact
             for law, chosen in ((rows.law, ~rows.is_held), (Frictionless(), rows.is_held)):
+                if not chosen.any():
+                    continue
+                is_uniform = isinstance(law, LawOfCoefficients) and law.is_uniform
                 try:
-                    laws.append(law.at(rows.points[chosen]))
+                    own = law if is_uniform else law.at(rows.points[chosen])
                 except ValueError as error:
                     raise LawError(f"contact {rows.name!r}: friction law: {error}") from error
-                nodes.append(numbers[chosen])
-        pairs = [(law, own) for law, own in zip(laws, nodes, strict=True) if own.size]
-        if len(pairs) == 1:
-            return pairs[0][0]
-        return PiecewiseLaw(*zip(*pairs, strict=True)) if pairs else Frictionless()
+                laws.setdefault(law if is_uniform else first, (own, []))[1].append(numbers[chosen])
+        if len(laws) < 2:
+            return next((law for law, _ in laws.values()), Frictionless())
+        return PiecewiseLaw(*zip(*((law, np.concatenate(nodes)) for law, nodes in laws.values()), strict=True))
 
     @property
     def tangent_is_eliminated(self) -> BoolArray:
@@ -145,7 +153,11 @@ class PreparedAssembly:
             If its bodies have other names, a rigid body becomes another one, or a load drives another of its motions.
         """
         _check_rigid(self.assembly, assembly)
-        return _prepared(assembly, _under(assembly, self.bodies), self.units, self)
+        following = _prepared(assembly, _under(assembly, self.bodies), self.units, self)
+        pairs = zip(self.rows, following.rows, strict=False)
+        if len(self.rows) == len(following.rows) and all(one.is_coupled_like(two) for one, two in pairs):
+            following.__dict__["spread"] = self.spread
+        return following
 
     def rows_under(self, assembly: Assembly) -> tuple[ContactRows, ...] | None:
         """Return the contacts of elastic bodies with the gaps and laws of another assembly, None if they are others."""

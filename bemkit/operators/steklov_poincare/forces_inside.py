@@ -189,9 +189,18 @@ class HeavyElasticity:
         do the first on the interpolant of u_p, and the tractions, which hold normals only by interpolation, on the
         small rest.
         """
-        inside, space, moved_space = self.inside, self.traction_space, self.displacement_space
-        displacement, force = displacement - inside.displacement, force - inside.force
+        displacement, force = displacement - self.inside.displacement, force - self.inside.force
         traction = self.weightless.element_tractions(displacement, force)
+        at_nodes, rest, of_heat = self._work_on_particular
+        work = sum(
+            float(np.sum(one * two)) for one, two in ((force, at_nodes), (traction, rest), (of_heat, displacement))
+        )
+        return work + self._particular_energy
+
+    @cached_property
+    def _work_on_particular(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What forces (n_nodes, 2), tractions (n_elements, n_local, 2) and displacements (n_nodes, 2) work on."""
+        inside, space, moved_space = self.inside, self.traction_space, self.displacement_space
         xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
         elements = np.arange(space.mesh.n_elements)
         points = space.mesh.points(elements, xi)
@@ -200,10 +209,8 @@ class HeavyElasticity:
         interpolated = np.einsum("pq,epc->eqc", moved_space.basis(xi), values_on_elements(moved_space, at_nodes))
         rest = of_forces.displacement(points.reshape(-1, 2)).reshape(points.shape) - interpolated
         measure = space.mesh.jacobian(elements, xi) * weights
-        work = float(np.sum(force * at_nodes))
-        work += float(np.einsum("eq,lq,elc,eqc->", measure, space.basis(xi), traction, rest, optimize=True))
-        of_heat = integrate_traction(self.displacement_space, elements, inside.solution.expansions.traction)
-        return work + float(np.sum(of_heat * displacement)) + self._particular_energy
+        of_heat = integrate_traction(moved_space, elements, inside.solution.expansions.traction)
+        return at_nodes, np.einsum("eq,lq,eqc->elc", measure, space.basis(xi), rest, optimize=True), of_heat
 
 
 def projected_tractions(solution: ParticularSolution, space: BoundarySpace) -> FloatArray:

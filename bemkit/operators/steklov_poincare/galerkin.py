@@ -212,12 +212,17 @@ class GalerkinElasticity:
         if self.material.is_incompressible or self.mesh.is_exterior:
             return rest.reshape(-1, 2)
         # the pressure by the work on the dilatation, whose forces are the flux over the compressibility
-        everywhere, centre = np.arange(self.mesh.n_elements), self.mesh.centre
-        arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
-        flux = self._fluxes[:, 0]
+        arms, flux, of_dilatation = self._dilatation
         work = flux @ displacement.ravel() / self.material.plane_compressibility
-        tension = (work - arms @ rest) / (flux @ dilatation_of(self.displacement_space))
+        tension = (work - arms @ rest) / of_dilatation
         return np.asarray(rest + tension * self._pressures[:, 0]).reshape(-1, 2)
+
+    @cached_property
+    def _dilatation(self) -> tuple[FloatArray, FloatArray, float]:
+        """The work of tractions on the dilatation x, of pressures on displacements, and of pressures on x."""
+        everywhere, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._fluxes[:, 0]
+        arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
+        return arms, flux, float(flux @ dilatation_of(self.displacement_space))
 
     def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
         """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""

@@ -20,7 +20,7 @@ NOTHING = np.zeros(0, np.intp)
 
 
 def placed(mesh: BoundaryMesh, part: str, placement: Placement) -> PlacedSide:
-    return PlacedSide(ContactSide(space_of(placement.mesh(mesh), 2), mesh.part(part)), mesh, placement)
+    return PlacedSide(ContactSide(space_of(placement.mesh(mesh), 2), mesh.part(part)), placement)
 
 
 def pair(motion: Placement, shift: float = 0.4, turn: float = 0.0) -> tuple[PlacedSide, PlacedSide]:
@@ -53,6 +53,19 @@ def test_a_pair_that_stands_otherwise_is_coupled_anew(other: dict[str, float]) -
     couplings.couple(*pair(Placement()), NOTHING, 0.5)
     one, two = pair(Placement((4.0, 0.0)), **other)
     assert_alike(couplings.couple(one, two, NOTHING, 0.5), couple(one.side, two.side, without=NOTHING, reach=0.5))
+
+
+def test_meshes_that_share_no_more_than_the_array_of_elements_are_told_apart() -> None:
+    """The bottom of one is higher by a hundred millionth, which its contact is not to ignore."""
+    couplings = CongruentCouplings()
+    couplings.couple(*pair(Placement()), NOTHING, 0.5)
+    upper, lower = pair(Placement((4.0, 0.0)))
+    mesh = upper.side.mesh
+    is_bottom = mesh.nodes[:, 1] < 1.02
+    nodes = mesh.nodes + np.outer(is_bottom, [0.0, 1e-8])
+    bent = PlacedSide(ContactSide(space_of(mesh.unchecked_copy(nodes, ()), 2), upper.side.elements), upper.placement)
+    assert bent.side.mesh.elements is UPPER.elements
+    np.testing.assert_allclose(couplings.couple(bent, lower, NOTHING, 0.5).gap, 0.01 + 1e-8, rtol=0.0, atol=1e-12)
 
 
 def test_nodes_without_multipliers_and_another_reach_make_another_coupling() -> None:

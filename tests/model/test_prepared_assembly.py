@@ -1,0 +1,48 @@
+"""What an assembly says on meshes: laws of many contacts in few, couplings kept from one load step to the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bemkit.contact.laws import Coulomb, LawOfCoefficients
+from bemkit.contact.piecewise_law import PiecewiseLaw
+from bemkit.model.assembled.contact_tractions import ContactSpread
+from bemkit.model.assembled.prepared import prepare_assembly, prepare_assembly_steps
+from bemkit.scene.load_history import load_steps
+from tests.runs.masonry import wall
+
+
+def test_contacts_of_equal_laws_have_one_and_laws_of_the_place_each_their_own() -> None:
+    assembly = wall(2, 2, push=True)
+    prepared = prepare_assembly(replace(assembly, load_factors=(1.0,)))
+    assert isinstance(prepared.law, Coulomb)
+    pairs = prepared.assembly.contacts
+    other, placed = Coulomb(0.1), Coulomb(lambda x, y: 0.2 + 0.0 * x)
+    laws = [placed, other, placed, *(Coulomb(0.1) for _ in pairs[3:])]
+    listed = tuple(replace(pair, law=law) for pair, law in zip(pairs, laws, strict=True))
+    mixed = prepare_assembly(replace(assembly, touching=None, contacts=listed))
+    law = mixed.law
+    assert isinstance(law, PiecewiseLaw)
+    assert [each.is_uniform for each in law.laws if isinstance(each, LawOfCoefficients)] == [False, True, False, True]
+    expected = [0.2 if name in (pairs[0].name, pairs[2].name) else 0.1 for name in mixed.names]
+    on_floor = np.array([name.endswith(".floor") for name in mixed.names])
+    np.testing.assert_allclose(law.bound(np.full(mixed.n_contact, -1.0))[~on_floor], np.array(expected)[~on_floor])
+
+
+def test_forces_of_contacts_are_spread_alike_in_all_steps_of_a_history() -> None:
+    steps = prepare_assembly_steps(load_steps(replace(wall(2, 2, push=True), load_factors=(0.0, 1.0))))
+    known = steps[0].spread
+    following = steps[0].under(steps[1].assembly)
+    assert following.spread is known
+    anew = ContactSpread.of(following.bodies, following.rows)
+    np.testing.assert_array_equal(anew.by_force.toarray(), known.by_force.toarray())
+    # forces arrive whole: as many as there are on both sides, against each other
+    forces = np.random.default_rng(0).normal(size=(following.n_contact, 2))
+    sums = np.zeros((len(following.bodies), 2))
+    for number, elements, values in known.tractions(forces):
+        lengths = following.bodies[number].mesh.lengths[elements]
+        sums[number] += np.einsum("e,elc->c", lengths, values) / values.shape[1]  # of linear elements: constants
+    on_floor = np.array([name.endswith(".floor") for name in following.names])
+    np.testing.assert_allclose(sums.sum(axis=0), forces[on_floor].sum(axis=0), atol=1e-12)
