@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from threading import Lock
@@ -20,7 +20,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, consecutive_runs
+from bemkit.arrays import FloatArray, IntArray, Run, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
@@ -148,15 +148,9 @@ def assemble_together(forms: Sequence[PairForm]) -> tuple[list[FloatArray], int]
         msg = "the operators live on different meshes: assemble those of one mesh at a time"
         raise GeometryError(msg)
     everything = np.arange(mesh.n_elements)
-    found = list(_filled_by_degree(forms, everything, everything))
-    n_pairs = sum(n_own for _, n_own in found)
-    if len(found) == 1:
-        return [target.dofs_matrix() for target in found[0][0]], n_pairs
-    matrices = [np.zeros((form.test.n_dofs, form.trial.n_dofs)) for form in forms]
-    for targets, _ in found:
-        for matrix, target in zip(matrices, targets, strict=True):
-            target.add_to(matrix)
-    return matrices, n_pairs
+    matrices = [_Target.zeros(form, everything, everything) for form in forms]
+    n_pairs = _fill(matrices, everything, everything)
+    return [matrix.dofs_matrix() for matrix in matrices], n_pairs
 
 
 @assembling()
@@ -169,33 +163,38 @@ def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatAr
         np.flatnonzero(np.isin(space.element_dofs, dofs // 2).any(axis=1))
         for space, dofs in ((form.test, rows), (form.trial, columns))
     ]
-    for (target,), _ in _filled_by_degree([form], elements[0], elements[1]):
-        wanted, places = [], []
-        for dofs, own in zip((rows, columns), target.vector_dofs, strict=True):
-            wanted.append(np.flatnonzero(np.isin(dofs, own)))
-            places.append(np.searchsorted(own, dofs[wanted[-1]]))
-        block[np.ix_(*wanted)] += target.dofs_matrix()[np.ix_(*places)]
-    return block
+    target = _Target.zeros(form, *elements)
+    _fill([target], *elements)
+    places = [
+        np.searchsorted(nodes, dofs // 2) * 2 + dofs % 2
+        for nodes, dofs in zip((target.test_nodes, target.trial_nodes), (rows, columns), strict=True)
+    ]
+    return np.asarray(target.dofs_matrix()[np.ix_(*places)])
 
 
-def _filled_by_degree(
-    forms: Sequence[PairForm], test_elements: IntArray, trial_elements: IntArray
-) -> Iterator[tuple[list[_Target], int]]:
-    """Sweep over the pairs of elements of any two degrees; see `_filled`."""
+def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: IntArray) -> int:
+    """Add the pairs of some elements, of any two degrees in turn; return how many there are."""
+    forms = [target.form for target in targets]
     spaces = [space for form in forms for space in (form.test, form.trial)]
     kinds = [list(of_one_degree(spaces, elements)) for elements in (test_elements, trial_elements)]
+    n_pairs = 0
     for (tests, seen_by_test), (trials, seen_by_trial) in product(*kinds):
-        seen = zip(forms, seen_by_test[::2], seen_by_trial[1::2], strict=True)
-        yield _filled([replace(form, test=test, trial=trial) for form, test, trial in seen], tests, trials)
+        seen = zip(targets, forms, seen_by_test[::2], seen_by_trial[1::2], strict=True)
+        blocks = [
+            _TargetBlock(target, replace(form, test=test, trial=trial), tests, trials)
+            for target, form, test, trial in seen
+        ]
+        n_pairs += _fill_blocks(blocks, tests, trials)
+    return n_pairs
 
 
-def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: IntArray) -> tuple[list[_Target], int]:
-    """Sweep over the pairs of some elements; return the matrices of their dofs and the number of pairs."""
+def _fill_blocks(blocks: Sequence[_TargetBlock], test_elements: IntArray, trial_elements: IntArray) -> int:
+    """Sweep over the pairs of some elements; return their number."""
+    forms = [block.form for block in blocks]
     mesh = forms[0].test.mesh
     degrees = Degrees()
     for form in forms:
         degrees |= form.degrees
-    targets = [_Target(form, test_elements, trial_elements) for form in forms]
     n_images = mesh.whole.n_elements // mesh.n_elements
     trial = np.concatenate([image * mesh.n_elements + trial_elements for image in range(n_images)])
     sweep = PairSweep(mesh.whole, degrees, test_elements, trial)
@@ -205,103 +204,138 @@ def _filled(forms: Sequence[PairForm], test_elements: IntArray, trial_elements: 
     lock = Lock()
 
     def fill(rows: slice) -> int:
-        block = Block(sweep.chunk(rows), test_half[rows], trial_half, log_scale)
-        for target in targets:
-            gathered = target.gather(block)
+        integrals = Block(sweep.chunk(rows), test_half[rows], trial_half, log_scale)
+        for block in blocks:
+            gathered = block.gather(integrals)
             with lock:  # two chunks share the rows of the node between them
-                target.add(rows, gathered)
-        return block.test_half.size * block.trial_half.size
+                block.add(rows, gathered)
+        return integrals.test_half.size * integrals.trial_half.size
 
     n_integrals = sweep.test.size * sweep.trial.size * degrees.n_products
-    n_pairs = for_each_chunk(fill, sweep.row_slices(), n_integrals=n_integrals)
-    return targets, sum(n_pairs)
+    return sum(for_each_chunk(fill, sweep.row_slices(), n_integrals=n_integrals))
 
 
+@dataclass(frozen=True, eq=False)
 class _Target:
-    """A matrix being filled, indexed (test node, component, trial node, component); nodes are scalar dofs.
+    """A matrix being filled.
 
-    Only the nodes of some elements have a place in it: `test_nodes` and `trial_nodes`, in increasing order.
+    Parameters
+    ----------
+    form : PairForm
+    test_nodes, trial_nodes : (n,) int arrays
+        The scalar dofs that have a place in it, in increasing order.
+    matrix : (n_test, 2, n_trial, 2) array
+        By test node, component, trial node and component.
     """
 
-    def __init__(self, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> None:
-        self._form = form
-        self.test_nodes, test_dofs = np.unique(form.test.element_dofs[test_elements], return_inverse=True)
-        self.trial_nodes = np.unique(form.trial.element_dofs[trial_elements])
-        self.test_dofs = test_dofs.reshape(test_elements.size, -1)
-        self.test_coefficients = form.test_coefficients
-        self.terms = form.trial_terms()
-        self.images = [
-            (
-                slice(image * trial_elements.size, (image + 1) * trial_elements.size),
-                signs.tolist(),
-                [consecutive_runs(own) for own in np.searchsorted(self.trial_nodes, dofs[trial_elements]).T],
-            )
-            for image, (_, signs, dofs) in enumerate(element_images(form.trial))
-        ]
-        self.matrix = np.zeros((self.test_nodes.size, 2, self.trial_nodes.size, 2))
+    form: PairForm
+    test_nodes: IntArray
+    trial_nodes: IntArray
+    matrix: FloatArray
 
-    @property
-    def vector_dofs(self) -> tuple[IntArray, IntArray]:
-        """Return what rows and columns of `dofs_matrix` stand for."""
-        components = np.arange(2)
-        return (2 * self.test_nodes[:, None] + components).ravel(), (2 * self.trial_nodes[:, None] + components).ravel()
-
-    def add_to(self, matrix: FloatArray) -> None:
-        """Add the matrix to its places in the one of all dofs."""
-        own = self.dofs_matrix()
-        rows, columns = (_end_and_inner(dofs) for dofs in self.vector_dofs)
-        for (own_rows, to_rows), (own_columns, to_columns) in product(rows, columns):
-            if isinstance(to_rows, np.ndarray) and isinstance(to_columns, np.ndarray):
-                matrix[np.ix_(to_rows, to_columns)] += own[own_rows, own_columns]
-            else:
-                matrix[to_rows, to_columns] += own[own_rows, own_columns]
+    @classmethod
+    def zeros(cls, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> _Target:
+        """Return one for the pairs of some elements."""
+        test = np.unique(form.test.element_dofs[test_elements])
+        trial = np.unique(form.trial.element_dofs[trial_elements])
+        return cls(form, test, trial, np.zeros((test.size, 2, trial.size, 2)))
 
     def dofs_matrix(self) -> FloatArray:
         """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
-        if self._form.test.mesh.symmetry is not None:
-            self.matrix[antisymmetric_dofs(self._form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
-            self.matrix[:, :, antisymmetric_dofs(self._form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
+        if self.form.test.mesh.symmetry is not None:
+            self.matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
+            self.matrix[:, :, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
+
+
+class _TargetBlock:
+    """What elements of one test and one trial degree add to a matrix.
+
+    Only the trial nodes of these elements have a column in what is gathered.
+    """
+
+    def __init__(self, target: _Target, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> None:
+        self.form = form
+        self._matrix = target.matrix
+        self._test_dofs = np.searchsorted(target.test_nodes, form.test.element_dofs[test_elements])
+        trial_nodes = np.unique(form.trial.element_dofs[trial_elements])
+        self._n_columns = trial_nodes.size
+        self._columns = _end_and_inner(np.searchsorted(target.trial_nodes, trial_nodes))
+        self._test_coefficients = form.test_coefficients
+        self._terms = form.trial_terms()
+        n = trial_elements.size
+        self._images = [
+            (
+                slice(image * n, (image + 1) * n),
+                signs.tolist(),
+                _Scatter(np.searchsorted(trial_nodes, dofs[trial_elements])),
+            )
+            for image, (_, signs, dofs) in enumerate(element_images(form.trial))
+        ]
 
     def gather(self, block: Block) -> FloatArray:
         """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes, 2), by their own dofs."""
-        n_rows, test = block.test_half.shape[0], self.test_coefficients
-        gathered = np.zeros((test.shape[1], n_rows, 2, self.trial_nodes.size, 2))
-        for term in self.terms:
+        n_rows, test = block.test_half.shape[0], self._test_coefficients
+        gathered = np.zeros((test.shape[1], n_rows, 2, self._n_columns, 2))
+        for term in self._terms:
             degrees = slice(test.shape[1]), slice(term.coefficients.shape[1])
             for index, values in enumerate(term.tensor(block, *degrees)):
-                if values is not None:
-                    component = index % 2
-                    self._add_columns(gathered[:, :, index // 2, :, component], values, term.coefficients, component)
-        return _combined(test, gathered)
-
-    def _add_columns(self, target: FloatArray, values: FloatArray, coefficients: FloatArray, component: int) -> None:
-        """Add (n_test_polynomials, n_polynomials, n_rows, n_trial) values to the columns of the trial dofs."""
-        local = _combined(coefficients, values.swapaxes(0, 1))
-        for elements, signs, columns in self.images:
-            for own, runs in zip(local, columns, strict=True):
-                for positions, dofs in runs:
-                    added = own[..., elements][..., positions]
-                    target[..., dofs] += added if signs[component] == 1.0 else signs[component] * added
+                if values is None:
+                    continue
+                component = index % 2
+                local = _combined(term.coefficients, values)
+                for elements, signs, scatter in self._images:
+                    own = local[..., elements]
+                    scatter.add(gathered[:, :, index // 2, :, component], own if signs[component] == 1.0 else -own)
+        return _combined(test, gathered.reshape(1, test.shape[1], -1)).reshape(-1, *gathered.shape[1:])
 
     def add(self, rows: slice, gathered: FloatArray) -> None:
         """Add the gathered rows to the matrix."""
-        for values, dofs in zip(gathered, self.test_dofs[rows].T, strict=True):
+        for values, dofs in zip(gathered, self._test_dofs[rows].T, strict=True):
             for positions, nodes in consecutive_runs(dofs):
-                self.matrix[nodes] += values[positions]
+                for own, columns in self._columns:
+                    added = values[positions, :, own]
+                    if isinstance(nodes, np.ndarray) and isinstance(columns, np.ndarray):
+                        self._matrix[np.ix_(nodes, np.arange(2), columns)] += added
+                    else:
+                        self._matrix[nodes, :, columns] += added
 
 
-def _end_and_inner(dofs: IntArray) -> list[tuple[slice, slice | IntArray]]:
+class _Scatter:
+    """Adds values of the local dofs of elements to those of the dofs (n_elements, n_local)."""
+
+    def __init__(self, dofs: IntArray) -> None:
+        n_local = dofs.shape[1]
+        ranges = [range(first, last) for first in (0, 1) for last in (n_local, n_local - 1) if first < last]
+        # inner dofs are numbered element by element, all of them in one go
+        self._inner = next((each for each in ranges if (np.diff(dofs[:, each].ravel()) == 1).all()), range(0))
+        self._first = int(dofs[0, self._inner[0]]) if self._inner else 0
+        self._others = [(k, consecutive_runs(dofs[:, k])) for k in range(n_local) if k not in self._inner]
+
+    def add(self, target: FloatArray, values: FloatArray) -> None:
+        """Add (m, n_local, n_rows, n_elements) values to the columns of (m, n_rows, n_dofs)."""
+        if self._inner:
+            n_inner, n_elements = len(self._inner), values.shape[3]
+            inner = target[..., self._first : self._first + n_elements * n_inner]
+            inner = inner.reshape(*target.shape[:2], n_elements, n_inner)
+            inner += values[:, self._inner.start : self._inner.stop].transpose(0, 2, 3, 1)
+        for k, runs in self._others:
+            for positions, dofs in runs:
+                target[..., dofs] += values[:, k, :, positions]
+
+
+def _end_and_inner(dofs: IntArray) -> list[Run]:
     """Split ascending dofs into some and the last ones, which follow each other: positions and dofs.
 
     In a space of several degrees the inner dofs of elements of one degree do, and slices need no index for each entry.
     """
     first = int(np.max(np.flatnonzero(np.diff(dofs) != 1), initial=-1)) + 1
-    return [(slice(first), dofs[:first]), (slice(first, None), slice(int(dofs[first]), int(dofs[-1]) + 1))]
+    return [*consecutive_runs(dofs[:first]), (slice(first, None), slice(int(dofs[first]), int(dofs[-1]) + 1))]
 
 
 def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:
-    """Return the sums (n_local, ...) of (n_polynomials, ...) values with the coefficients (n_local, n_polynomials)."""
+    """Return sums (m, n_local, ...) of (m, n_polynomials, ...) values by coefficients (n_local, n_polynomials)."""
     if np.array_equal(coefficients, np.eye(*coefficients.shape)):
         return values
-    return np.asarray(coefficients @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+    m, n_polynomials, *shape = values.shape
+    return np.asarray(np.matmul(coefficients, values.reshape(m, n_polynomials, -1)).reshape(m, -1, *shape))

@@ -161,13 +161,14 @@ class Transition:
         }
 
 
-_FIT = (2, 4, 6, 12)
-"""Nodes from a transition on that tell its place (the first two) and the power of the distance (the last two). The
-values at the nodes before them are the least accurate."""
+_FIRST_FITTED, _LEAST_FITTED = 4, 8
+"""The node from which on a power law is fitted, as the nodes beside a transition are the least true, and how many nodes
+that takes."""
 _POWER_LAW_RANGE = 0.1
 """Distance, relative to the size of the zone, up to which that power holds closely."""
 _POWERS = (1.3, 1.7)
 """The powers that sliding friction may make of 3/2."""
+_MOST_STEPS = 20
 _LEAST_ZONE = 0.5
 """Least length of a zone, relative to its length if it ends halfway between its nodes and its neighbours'."""
 
@@ -191,9 +192,9 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     Near the end of a smooth contact zone at distance d the clearance grows like d^(3/2), and so does the slip near the
     end of a stick zone. Its power 2/3, extrapolated from the last two open (or slipping) nodes, therefore crosses zero
     at the transition; on the paper's examples this is within a quarter of the node distance. Sliding friction changes
-    the power somewhat (to 1.56 at the separation point of Example 1): on meshes that are fine there it is fitted too,
-    and the two nodes next to the transition, where the computed solution is least true, are passed over. Where that
-    says nothing, as at the edge of an obstacle, or where two of them would swallow a narrow zone between them, the
+    the power somewhat (to 1.44 and 1.56 on Example 1): on meshes that are fine there place and power are fitted to the
+    nodes of a tenth of the zone but the four next to the transition, where the computed solution is least true. Where
+    that says nothing, as at the edge of an obstacle, or where two of them would swallow a narrow zone between them, the
     transition is put halfway between the two nodes that differ.
     """
     words = contact.status_words()
@@ -272,17 +273,27 @@ def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str],
 
 def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
     """Extrapolate powers of the distance from a zone's nodes at s = 0, s[1], ...; None if they do not fall to zero."""
-    is_fine = len(s) > _FIT[-1] and s[_FIT[-1]] < _POWER_LAW_RANGE * s[-1]
-    near, far, *outer = _FIT if is_fine else (0, 1)
-    power, distance = 1.5, 0.0
-    values = field[[near, far, *outer]]
-    if not (np.isfinite(values).all() and np.all(np.diff(values) > 0.0) and values[0] >= 0.0):
+    if not (np.isfinite(field[:2]).all() and field[1] > field[0] >= 0.0):
         return None
-    for _ in range(4 if is_fine else 1):
-        share = (field[near] / field[far]) ** (1.0 / power)
-        distance = float((s[far] * share - s[near]) / (1.0 - share))
-        if is_fine:
-            inner, outermost = (max(s[k] + distance, s[1]) for k in outer)
-            ratio = np.log(field[outer[1]] / field[outer[0]]) / np.log(outermost / inner)
-            power = float(np.clip(ratio, *_POWERS))
-    return distance
+    share = (field[0] / field[1]) ** (2.0 / 3.0)
+    distance = float(s[1] * share / (1.0 - share))
+    fitted = slice(_FIRST_FITTED, int(np.searchsorted(s, _POWER_LAW_RANGE * s[-1])))
+    if s[fitted].size < _LEAST_FITTED or not np.all(field[fitted] > 0.0):
+        return distance
+    place, power = _fitted_power_law(s[fitted], field[fitted], distance)
+    is_likely = _POWERS[0] <= power <= _POWERS[1] and abs(place - distance) <= s[_FIRST_FITTED]
+    return place if is_likely else distance
+
+
+def _fitted_power_law(s: FloatArray, field: FloatArray, distance: float) -> tuple[float, float]:
+    """Fit log f = a + power log(s + distance) + b s by Newton's method; return distance and power."""
+    logarithms, power = np.log(field), 1.5
+    for _ in range(_MOST_STEPS):
+        known = np.stack([np.ones_like(s), np.log(s + distance), s / s[-1]], axis=1)
+        power = float(np.linalg.lstsq(known, logarithms, rcond=None)[0][1])
+        moved = np.column_stack([known, power / (s + distance)])
+        step = float(np.linalg.lstsq(moved, logarithms, rcond=None)[0][-1])
+        distance = max(distance + step, -0.9 * float(s[0]))
+        if abs(step) <= 1e-12 * s[0]:
+            break
+    return distance, power

@@ -43,6 +43,9 @@ LARGEST_RISE = 2
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
+FINE = 5e-3
+"""Accuracy below which the first mesh in layers is of degree 4, otherwise of 3: places where the status changes are
+then told well enough for two digits more at once."""
 MOST_LOOKS = 3
 """Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
 
@@ -106,7 +109,7 @@ class LayeredMeshes:
         cuts = {side: _settled(places) for side, places in zone_cuts(partition, ends).items()}
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
-            return Level(level.asked, fresh, 1)
+            return Level(level.asked, fresh, 2 if self.accuracy < FINE else 1)
         has_moved = has_same_pieces(partition, fresh)
         rise = self._rise(solution, ~is_at_end(partition)) if has_moved else 0
         following = Level(level.asked, fresh, level.number + rise)
@@ -180,10 +183,10 @@ class LayeredMeshes:
 
 
 def _settled(places: Sequence[float]) -> list[float]:
-    """Return the middles of places of change that `FLICKER` does not tell apart."""
+    """Return the medians of places of change that `FLICKER` does not tell apart."""
     ascending = np.sort(places)
     groups = np.split(ascending, 1 + np.flatnonzero(np.diff(ascending) > FLICKER))
-    return [float(0.5 * (group[0] + group[-1])) for group in groups]
+    return [float(np.median(group)) for group in groups]
 
 
 def _excess_of(squared: FloatArray, allowed: float) -> FloatArray:

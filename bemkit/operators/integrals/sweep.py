@@ -46,6 +46,9 @@ LISTED_COST = 1.5
 LISTED_PAIRS = 60
 """Listed pairs of an element, at most, where all are of like length: those within `DENSE_DISTANCE` and around corners
 (counted)."""
+FEW = 2 * LISTED_PAIRS
+"""Straight elements whose pairs are all listed: both orders of two elements then share their integrals, which in the
+dense sweep they do not."""
 LISTED_SHARE_OF_CURVED = 1.0 / 3.0
 """Share of all pairs that is listed on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
 BATCH_MEMORY = 0.6e6
@@ -101,7 +104,8 @@ class PairSweep:
         level = np.empty((self.test.size, self.trial.size), np.int8)
         is_close = np.empty(level.shape, bool)
         # curved elements have no closed form that needs a distance
-        reach = np.where(p.is_straight, DENSE_DISTANCE * p.half, -np.inf)[self.trial]
+        distance = np.inf if self.trial.size <= FEW else DENSE_DISTANCE
+        reach = np.where(p.is_straight, distance * p.half, -np.inf)[self.trial]
         for rows in self.row_slices():
             test = self.test[rows, None]
             level[rows] = gauss_levels(p, test, self.trial)
@@ -166,20 +170,23 @@ class PairSweep:
 
 def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *, is_curved: bool) -> int:
     """Foresee the largest memory of a sweep over elements of like length and of the chunks of its matrices [bytes]."""
-    (n_log, n_double), level = degrees.n_trial, 3 if n_trial <= 2 * LISTED_PAIRS else 2  # few elements are all near
+    (n_log, n_double), level = degrees.n_trial, 3 if n_trial <= FEW else 2  # few elements are all near
     n_points = GAUSS_LEVELS[level][0] + degrees.extra_points
     n_inner, n_outer = 3 * n_log + 2 * n_double, max(n_log, n_double)
     test_log, test_double = (0 if family is None else family[0] + 1 for family in (degrees.log, degrees.double))
     n_integrals = 3 * test_log * n_log + test_double * n_double
-    n_near = LISTED_SHARE_OF_CURVED * n_trial if is_curved else n_trial
-    n_listed = int(n_test * min(n_near, LISTED_PAIRS))
+    is_listed = n_trial <= FEW and not is_curved
+    n_near = (
+        min(LISTED_SHARE_OF_CURVED * n_trial, LISTED_PAIRS) if is_curved else n_trial if is_listed else LISTED_PAIRS
+    )
+    n_listed = int(n_test * n_near)
     n_chunk = n_trial * min(n_test, n_threads * _rows_per_chunk(degrees, n_trial, n_points))
     # while pairs are listed: what is kept of them, and the sums that serve both orders of two elements, four times
     listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
     listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
     # later: what is kept, and for each pair of a chunk its inner integrals at all points, those of the quotient copied,
     # and their sums
-    of_pair = n_points * (n_inner + 2 * n_log) + n_integrals
+    of_pair = (0 if is_listed else n_points * (n_inner + 2 * n_log)) + n_integrals
     sweeping = 8 * (n_listed * n_integrals + n_chunk * of_pair)
     return max(listing, sweeping)
 
