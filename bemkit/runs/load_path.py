@@ -27,6 +27,8 @@ _SETTLED = 1e-10
 
 _HOPELESS = (Status.UNSOLVABLE_LOAD, Status.TOO_FAR, Status.TOO_COSTLY)
 """What smaller increments do not change."""
+_UNDECIDED = (Status.MAX_STEPS, Status.STALLED, Status.CYCLING, Status.SINGULAR)
+"""What may be the driver's failure or a collapse."""
 
 Callback = Callable[[StepRecord], None] | None
 
@@ -191,9 +193,11 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
 
     Notes
     -----
-    Loads that contact can balance make a convex set, so that there is no collapse between two of them: an increment
-    that fails has stalled. Loads that nothing can balance are found by the static programme before any step, see
-    `bemkit.contact.solvability`, and are not approached.
+    Loads that nothing can balance are found by the static programme before any step, see `bemkit.contact.solvability`,
+    and are not approached. Loads that contact can balance make a convex set, so that without friction there is no
+    collapse between two of them: an increment that fails has stalled. With Coulomb friction, whose slip does not
+    dilate, the programme is a bound from above: bodies may give way below it, and which of the two has happened is not
+    decided.
     """
     reached, increment, end, n_increments, work = 0.0, 1.0, path.start, 0, StepWork()
     records: tuple[StepRecord, ...] = ()
@@ -220,11 +224,14 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     words = failure.message
     if failure.is_converged and n_increments > 1:
         words += f" The jump to this load stalled; {n_increments} increments in its place led there."
-    elif not (failure.is_converged or is_first) and failure.status not in _HOPELESS:
-        words += (
-            f" Increments down to {target - reached:.2g} of the step led to {reached:.3g} of it. The static programme "
-            "finds no collapse under this load: give load steps closer to each other."
+    elif not is_first and failure.status in _UNDECIDED:
+        bound = "" if problem.law.is_frictionless else ", but friction may give way before that does"
+        words = (
+            f"{Status.LOAD_NOT_REACHED.value} Increments down to {target - reached:.2g} of the step led to "
+            f"{reached:.3g} of it. The static programme finds no collapse under this load{bound}. The last increment "
+            f"ended {failure.status.name.lower().replace('_', ' ')}: {words}"
         )
+        failure = replace(failure, status=Status.LOAD_NOT_REACHED)
     return ReachedStep(attempt.problem, replace(failure, message=words), end, work, n_increments)
 
 

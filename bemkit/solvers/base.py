@@ -40,6 +40,7 @@ class Status(Enum):
         "The state satisfies contact and friction on its mesh, but the accuracy asked for was not reached; allow more "
         "elements or more time, or ask for less."
     )
+    LOAD_NOT_REACHED = "Ever smaller increments led to a part of this load alone; load less, or give more load steps."
     UNFINISHED = (
         "The load history has not come to its end; run its scene with the same result file again to go on from the "
         "last step that is finished."
