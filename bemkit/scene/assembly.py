@@ -213,9 +213,8 @@ class Assembly(ShownInNotebooks):
                 self._check_side(side)
         self._check_rigid()
         if self.symmetry is not None:
-            if self.rigid or self.touching is not None:
-                words = "rigid bodies" if self.rigid else "touching"
-                raise InputError(f"symmetry goes with listed contacts of elastic bodies alone: leave it or {words} out")
+            if self.rigid:
+                raise InputError("symmetry goes with elastic bodies alone: leave it or rigid bodies out")
             for body in self.placed_bodies:
                 check_place(body, self.symmetry)
         if self.mesh.accuracy is not None:

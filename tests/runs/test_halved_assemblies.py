@@ -186,21 +186,37 @@ def moved(number: int, **changes: object) -> tuple[bk.Body, ...]:
         ({"bodies": moved(2, placement=bk.Placement((0.6, 0.0)))}, "body 'left' lies beyond the symmetry line x = 0"),
         ({"bodies": moved(1, placement=bk.Placement((0.1, 0.0)))}, "body 'upper' has a placement, and x = 0 halves it"),
         (
-            {"touching": bk.Touching(1e-3)},
-            "symmetry goes with listed contacts of elastic bodies alone: leave it or",
-        ),
-        (
             {
                 "rigid": (bk.RigidBody(name="punch", obstacle=bk.HalfPlane((0.0, 1.0), (0.0, -1.0))),),
                 "contacts": (*blocks().contacts, bk.ContactPair(("upper.left", "punch"))),
             },
-            "symmetry goes with listed contacts of elastic bodies alone: leave it or rigid bodies out",
+            "symmetry goes with elastic bodies alone: leave it or rigid bodies out",
         ),
     ],
 )
 def test_what_does_not_go_with_a_line_is_refused(changes: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         blocks(**changes)
+
+
+def test_contacts_beside_a_line_are_found() -> None:
+    found, listed = solved(blocks(touching=bk.Touching(1e-3), contacts=())), solved(blocks())
+    assert {frozenset(pair.sides) for pair in found.assembly.contacts} == {
+        frozenset(pair.sides) for pair in listed.assembly.contacts
+    }
+    assert found.force_normal == pytest.approx(listed.force_normal, rel=1e-12)
+    np.testing.assert_allclose(np.sort(found.contact.sigma_n), np.sort(listed.contact.sigma_n), atol=1e-12)
+
+
+def test_sides_that_touch_their_own_images_are_not_found_but_named() -> None:
+    near = moved(2, placement=bk.Placement((-0.3004, 0.0)))
+    alone = replace(blocks(), bodies=(near[0], near[2]), contacts=(), touching=bk.Touching(1e-3))
+    with pytest.raises(
+        InputError, match=r"side 'left\.right' faces its own image at the symmetry line x = 0, .* give it an"
+    ):
+        bk.run(alone)
+    away = moved(2, placement=bk.Placement((-0.3006, 0.0)))
+    assert solved(replace(alone, bodies=(away[0], away[2]))).force_normal > 0.0
 
 
 def test_what_is_not_symmetric_is_refused() -> None:

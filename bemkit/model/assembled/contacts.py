@@ -17,6 +17,7 @@ from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
+from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 from bemkit.scene.assembly import Assembly, ContactPair
@@ -28,6 +29,8 @@ HELD_COSINE = 1e-3
 """Cosine of the angle between the free direction of a supported node and the direction of contact below which it does
 not approach."""
 
+_FACES_LINE = 0.5
+"""Component of a normal towards a symmetry line from which on an element faces it."""
 _DIGITS = 9
 """Decimals of lengths of contacts relative to the longest: round-off shall not decide which of two is longer."""
 
@@ -105,9 +108,13 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     sides, names, owners = [], [], []
     for number, body in enumerate(bodies):
         for part in assembly.contact_parts(body.body):
-            sides.append(ContactSide(body.space, body.part_elements(part)))
-            names.append(f"{body.name}.{part}")
-            owners.append(number)
+            elements = body.part_elements(part)
+            if elements.size:  # none beyond a symmetry line
+                sides.append(ContactSide(body.space, elements))
+                names.append(f"{body.name}.{part}")
+                owners.append(number)
+    if assembly.symmetry is not None:
+        _check_images(sides, names, assembly.symmetry, assembly.touching.within)
     known = {frozenset(pair.sides) for pair in assembly.contacts}
     law = assembly.law_of(assembly.touching)
     found = []
@@ -118,6 +125,19 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
         if frozenset(pair.sides) not in known:
             found.append(pair)
     return (*assembly.contacts, *found)
+
+
+def _check_images(sides: Sequence[ContactSide], names: Sequence[str], symmetry: Symmetry, within: float) -> None:
+    """Refuse sides (n,) of which a part faces its own image at a symmetry line."""
+    places = np.array([np.inf if place is None else place for place in (symmetry.x, symmetry.y)])
+    for side, name in zip(sides, names, strict=True):
+        normals = side.mesh.normals_at(side.elements, np.zeros(1))[:, 0]
+        is_near = places - side.mesh.centres[side.elements] <= 0.5 * within
+        if np.any(is_near & (normals > _FACES_LINE)):
+            raise InputError(
+                f"side {name!r} faces its own image at the symmetry line {symmetry}, which touching does not find: "
+                "give it an obstacle there, such as a half-plane, or list the contacts"
+            )
 
 
 def body_rows(
