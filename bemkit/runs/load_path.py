@@ -68,7 +68,7 @@ class Standing:
     gap : (n_contact,) array
         Dimensionless.
     forces, displacements : (n,) arrays [N/m], [m]
-        See `StepModel.acting`.
+        See `StepModel.acting`; a single zero at rest.
     """
 
     state: ContactState
@@ -80,9 +80,8 @@ class Standing:
     @classmethod
     def at_rest(cls, model: StepModel) -> Standing:
         """Return what is before any load: obstacles that overlap with the body have not come yet."""
-        n, (forces, displacements) = model.problem.n_contact, model.acting(_no_state(model.problem.n_contact))
-        nothing = np.zeros_like(forces), np.zeros_like(displacements)
-        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), *nothing)
+        n, nothing = model.problem.n_contact, np.zeros(1)
+        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), nothing, nothing)
 
     @classmethod
     def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> Standing:

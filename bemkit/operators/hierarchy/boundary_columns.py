@@ -136,8 +136,11 @@ class BoundaryColumns:
     def entries(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return entries (n_rows, n_columns) of the equations; rows are 2 * place + component."""
         points, number = np.unique(rows // 2, return_inverse=True)
-        block: FloatArray = self.fields(self.centre[points], points, columns)[2 * number + rows % 2]
-        return block
+        by_column = self.fields(self.centre[points], points, columns).T
+        chosen = 2 * number + rows % 2
+        if chosen.size < by_column.shape[1] or np.any(np.diff(chosen) != 1):
+            by_column = by_column.take(chosen, axis=1)
+        return by_column.T
 
     def fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> FloatArray:
         """Return displacements (2 n_points, n_columns) that columns cause at points; rows are 2 * point + component.

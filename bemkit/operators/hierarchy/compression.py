@@ -17,9 +17,6 @@ from bemkit.operators.hierarchy.skeletons import CollocationView, LevelView, Ske
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
-_FIRST_GUESS, _GROWTH = 90, 1.25
-"""Guesses of ranks: of a leaf, and from one level to the next."""
-
 
 @dataclass(frozen=True, eq=False)
 class Compression:
@@ -70,18 +67,17 @@ class Compression:
         candidates = [columns.felt(each) for each in unknowns]
         extent = extents(columns)
         levels: list[tuple[Skeleton, ...]] = []
-        guesses = [_FIRST_GUESS] * tree.n_leaves
         for level in range(tree.n_levels):
             discs = Discs.of(columns, tree, level)
-            view = (view_of or CollocationView)(columns, discs, rows, candidates, extent, tolerance, guesses)
+            view = (view_of or CollocationView)(
+                columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0
+            )
             n_integrals = columns.n_elements * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
             levels.append(skeletons)
             pairs = list(zip(skeletons[::2], skeletons[1::2], strict=True))
             rows = [np.concatenate([one.rows, two.rows]) for one, two in pairs]
             candidates = [np.concatenate([one.columns, two.columns]) for one, two in pairs]
-            ranks = [max(each.rows.size, each.columns.size) for each in skeletons]
-            guesses = [int(_GROWTH * max(pair)) for pair in zip(ranks[::2], ranks[1::2], strict=True)]
         return cls(columns, tree, unknowns, tuple(levels))
 
     def couplings(self, level: int, pair: int) -> tuple[FloatArray, FloatArray]:

@@ -251,21 +251,21 @@ class HierarchicalFactor:
         places, columns = compression.tree.places(0, number), compression.unknowns[number]
         rows = np.arange(2 * places.start, 2 * places.stop)
         n, n_border = places.stop - places.start, self.border.errors.shape[1]
-        entries = np.zeros((4 * n, rows.size))
-        entries[columns - 4 * places.start] = compression.columns.entries(rows, columns).T
-        own = compression.columns.felt(columns) - 4 * places.start
         skeleton = compression.skeletons[0][number]
-        outgoing = np.zeros((4 * n, skeleton.columns.size + n_border))
-        outgoing[own, : skeleton.columns.size] = skeleton.column_map.matrix()
-        outgoing[:, skeleton.columns.size :] = self.border.balances[:, 4 * places.start : 4 * places.stop].T
-        both = np.concatenate([entries, outgoing], axis=1).reshape(n, 4, -1)
-        of_unknowns = (factors.transpose(0, 2, 1) @ both).reshape(2 * n, -1)
+        own = compression.columns.felt(columns) - 4 * places.start
+        n_caused = rows.size + skeleton.columns.size
+        # columns: the equations, then what is caused and added to the balances
+        both = np.zeros((4 * n, n_caused + n_border))
+        both[columns - 4 * places.start, : rows.size] = compression.columns.entries(rows, columns).T
+        both[own, rows.size : n_caused] = skeleton.column_map.matrix()
+        both[:, n_caused:] = self.border.balances[:, 4 * places.start : 4 * places.stop].T
+        of_unknowns = (factors.transpose(0, 2, 1) @ both.reshape(n, 4, -1)).reshape(2 * n, -1)
         factor = _LU(of_unknowns[:, : rows.size].T, SingularClusterError(n))
         response = factor.solve(np.concatenate([skeleton.row_map.matrix(), self.border.errors[rows]], axis=1))
         outgoing_of_unknowns, at_rest = of_unknowns[:, rows.size :].T, np.zeros((2 * n, given.shape[1]))
         if given.any():
-            at_rest = -factor.solve(entries.T @ given)
-        alone = outgoing_of_unknowns @ at_rest + outgoing.T @ given
+            at_rest = -factor.solve(both[:, : rows.size].T @ given)
+        alone = outgoing_of_unknowns @ at_rest + both[:, rows.size :].T @ given
         return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
@@ -283,33 +283,34 @@ class HierarchicalFactor:
         n_border, n_one, n_two = self.border.errors.shape[1], len(on_one), len(on_two)
         parent = self._skeleton(level, cluster)
         n_rows = 0 if parent is None else parent.rows.size
-        # columns: what the rows feel, the border, and the loads
-        from_two = on_one @ np.column_stack([two.scattering, two.alone])[: on_one.shape[1]]
-        from_one = on_two @ np.column_stack([one.scattering, one.alone])[: on_two.shape[1]]
-        n_felt = n_rows + n_border
-        felt = np.zeros((n_one + n_two, n_felt + one.alone.shape[1]), order="F")
+        n_felt, n_loads = n_rows + n_border, one.alone.shape[1]
+        from_two, from_one = on_one @ two.scattering[: on_one.shape[1]], on_two @ one.scattering[: on_two.shape[1]]
+        # columns: what the rows of the parent feel, the border, and the loads
+        felt_one, felt_two = (np.zeros((n, n_felt + n_loads), order="F") for n in (n_one, n_two))
         if parent is not None:
-            felt[:, :n_rows] = parent.row_map.matrix()
-        felt[:n_one, n_rows:], felt[n_one:, n_rows:] = -from_two[:, n_two:], -from_one[:, n_one:]
-        felt[:, n_felt:] *= -1.0
-        twice = from_two[:, :n_two] @ from_one[:, :n_one]
-        felt[:n_one] -= from_two[:, :n_two] @ felt[n_one:]
-        felt[:n_one] = _LU(np.eye(n_one) - twice, self._singular(level, cluster), 1.0).solve(felt[:n_one])
-        felt[n_one:] -= from_one[:, :n_one] @ felt[:n_one]
+            passed = parent.row_map.matrix()
+            felt_one[:, :n_rows], felt_two[:, :n_rows] = passed[:n_one], passed[n_one:]
+        felt_one[:, n_rows:n_felt], felt_two[:, n_rows:n_felt] = -from_two[:, n_two:], -from_one[:, n_one:]
+        felt_one[:, n_felt:] = on_one @ two.alone[: on_one.shape[1]]
+        felt_two[:, n_felt:] = on_two @ one.alone[: on_two.shape[1]]
+        felt_one -= from_two[:, :n_two] @ felt_two
+        left = np.eye(n_one) - from_two[:, :n_two] @ from_one[:, :n_one]
+        felt_one = _LU(left, self._singular(level, cluster), 1.0).solve(felt_one)
+        felt_two -= from_one[:, :n_one] @ felt_one
         caused = []
-        for each, of_rows in ((one, felt[:n_one]), (two, felt[n_one:])):
+        for each, of_rows in ((one, felt_one), (two, felt_two)):
             causes = each.scattering[:, : len(of_rows)] @ of_rows
             causes[:, n_rows:n_felt] += each.scattering[:, len(of_rows) :]
             causes[:, n_felt:] -= each.alone
             caused.append(causes)
         skeletons = np.concatenate([causes[: len(causes) - n_border] for causes in caused])
         balances = sum(causes[len(causes) - n_border :] for causes in caused)
-        of_parent = np.zeros((0, felt.shape[1])) if parent is None else parent.column_map.gather(skeletons)
-        scattering = np.concatenate([of_parent, balances])
+        of_parent = np.zeros((0, n_felt + n_loads)) if parent is None else parent.column_map.gather(skeletons)
+        scattering, felt = np.concatenate([of_parent, balances]), np.concatenate([felt_one, felt_two])
         return _Cluster(
             np.ascontiguousarray(scattering[:, :n_felt]),
             -scattering[:, n_felt:],
-            np.ascontiguousarray(-felt[:, :n_felt]),
+            -felt[:, :n_felt],
             felt[:, n_felt:].copy(),
         )
 
@@ -328,5 +329,5 @@ class HierarchicalFactor:
 
     def _of_border(self, root: _Cluster) -> FloatArray:
         """Return the unknowns (n_border, k) of the boundary as a whole."""
-        error = SingularMatrixError("the balance of the body is singular: check that supports and contacts hold it")
+        error = SingularMatrixError("the balance of forces is singular: check that supports and contacts hold the body")
         return _LU(root.scattering - self.border.own, error).solve(root.alone)

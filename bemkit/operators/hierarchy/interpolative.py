@@ -8,6 +8,7 @@ first multiplied from the left by a few random rows: its columns depend on each 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,9 +17,9 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 
 _SPARE = 10
-"""Random rows beyond the rank and a quarter of it; with fewer of them a decomposition is made anew from more."""
+"""Random rows beyond the rank; with fewer of them a decomposition is made anew from more."""
 _SKETCHED = 0.3
-"""Tolerance of a sketch by that asked for: random combinations know what is left out to such a factor."""
+"""Tolerance of a sketch by that asked for: LU of random combinations leaves a few times more out than pivoted QR."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,7 @@ class Interpolation:
     skeleton : (k,) array
         Ascending.
     rest : (n - k,) array
-        The others, ascending.
+        The others.
     weights : (k, n - k) array
         Value ``rest[j]`` is the sum of ``weights[i, j]`` times value ``skeleton[i]``.
     """
@@ -95,43 +96,116 @@ def interpolative(matrix: FloatArray, tolerance: float) -> Interpolation:
     weights = np.zeros((0, n))
     if rank:
         weights = dtrtrs(factored[:rank, :rank], factored[:rank, rank:])[0] if rank < n else np.zeros((rank, 0))
-    by_row, by_column = np.argsort(order[:rank]), np.argsort(order[rank:])
-    return Interpolation(
-        order[:rank][by_row], order[rank:][by_column], np.ascontiguousarray(weights[np.ix_(by_row, by_column)])
-    )
+    return _sorted(order, weights)
 
 
-def sketched(
-    matrix: FloatArray, row_weights: FloatArray, column_sizes: FloatArray, tolerance: float, guess: int | None
-) -> Interpolation:
-    """Interpolate the columns of a matrix from random combinations of its rows.
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Rows of a matrix.
 
     Parameters
     ----------
-    matrix : (m, n) array
-    row_weights : (m,) array
-        What a row counts.
-    column_sizes : (n,) array
+    entries : (m, n) array
+    weights : (m,) array
+        What each row counts.
+    """
+
+    entries: FloatArray
+    weights: FloatArray
+
+    def combined(self, n_rows: int | None, first: int) -> FloatArray:
+        """Return random combinations (n_rows, n) of the rows, or all of them weighted."""
+        if n_rows is None:
+            return self.entries * self.weights[:, None]
+        m = len(self.entries)
+        random = _random(_power_of_two(n_rows), _power_of_two(first + m))[:n_rows, first : first + m]
+        combinations: FloatArray = (random * self.weights) @ self.entries
+        return combinations
+
+
+def sketched(
+    blocks: Sequence[Block],
+    sizes: FloatArray,
+    tolerance: float,
+    guess: int | None,
+    *,
+    chosen: IntArray | None = None,
+    kinds: IntArray | None = None,
+) -> Interpolation:
+    """Interpolate columns of a matrix from random combinations of its rows.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        The rows; each block is compared with its own largest column, so that all of them count.
+    sizes : (n,) array
         By which columns are multiplied before they are compared; the weights returned hold without.
     tolerance : float
         As of `interpolative`.
     guess : int or None
         Of the rank; a wrong one costs time, nothing else. None takes all rows, which keeps more digits of rows that are
         far smaller than others.
+    chosen : (n,) array, optional
+        The columns that are interpolated, by default all.
+    kinds : (n,) array, optional
+        Numbers 0, 1 ...: a column is compared with the largest one of its kind, by default of all.
     """
-    m, n = matrix.shape
+    m, columns = sum(len(block.entries) for block in blocks), slice(None) if chosen is None else chosen
     while True:
-        n_rows = m if guess is None else guess + guess // 3 + _SPARE
-        if guess is None or n_rows >= min(m, 2 * n):
-            guess = None
-            sketch = (matrix * row_weights[:, None]) * column_sizes
-        else:
-            random = _random(_power_of_two(n_rows), _power_of_two(m))[:n_rows, :m]
-            sketch = ((random * row_weights) @ matrix) * column_sizes
-        result = interpolative(sketch, tolerance if guess is None else _SKETCHED * tolerance)
-        if guess is None or result.skeleton.size + result.skeleton.size // 4 + _SPARE <= n_rows:
-            return result.scaled(column_sizes)
-        guess *= 2
+        n_rows = None if guess is None or guess + _SPARE >= m else guess + _SPARE
+        parts, first = [], 0
+        for block in blocks:
+            part = block.combined(n_rows, first)[:, columns] * sizes
+            parts.append(part / (_norms(part).max(initial=0.0) or 1.0))
+            first += len(block.entries)
+        sketch = np.concatenate(parts) if n_rows is None else sum(parts[1:], start=parts[0])
+        scales = sizes
+        if kinds is not None:
+            norms = _norms(sketch)
+            of_kind = np.array([norms[kinds == kind].max(initial=0.0) or 1.0 for kind in range(kinds.max() + 1)])
+            sketch /= of_kind[kinds]
+            scales = sizes / of_kind[kinds]
+        result = interpolative(sketch, tolerance) if n_rows is None else _of_sketch(sketch, _SKETCHED * tolerance)
+        if result is not None:
+            return result.scaled(scales)
+        assert guess is not None  # all rows are always enough
+        guess += guess // 2
+
+
+def _of_sketch(sketch: FloatArray, tolerance: float) -> Interpolation | None:
+    """Interpolate the columns of random combinations (n_rows, n) by LU; None if these are too few for the rank.
+
+    Overwrites `sketch`. Each combination knows what the pivots before leave out of every column, to a factor of order
+    one, so that a pivot is the largest column left. The last ones are looked at to find that all are small.
+    """
+    from scipy.linalg.lapack import dgetrf, dtrtrs
+
+    n_rows, n = sketch.shape
+    largest = _norms(sketch).max(initial=0.0) / np.sqrt(n_rows)
+    factored, swaps, _ = dgetrf(sketch.T, overwrite_a=1)
+    left = np.flatnonzero(np.abs(np.diagonal(factored)) > tolerance * largest)
+    rank = int(left[-1]) + 1 if left.size else 0
+    if rank + _SPARE > n_rows and rank < n:
+        return None
+    order = np.arange(n)
+    for one, two in enumerate(swaps.tolist()):
+        order[one], order[two] = order[two], order[one]
+    weights = np.zeros((rank, n - rank))
+    if weights.size:
+        weights = dtrtrs(factored[:rank, :rank], factored[rank:, :rank].T, lower=1, trans=1, unitdiag=1)[0]
+    return _sorted(order, weights)
+
+
+def _sorted(order: IntArray, weights: FloatArray) -> Interpolation:
+    """Return an interpolation whose skeleton comes first in an order (n,) of all values."""
+    rank = len(weights)
+    by_row = np.argsort(order[:rank])
+    return Interpolation(order[:rank][by_row], order[rank:], np.ascontiguousarray(weights[by_row]))
+
+
+def _norms(matrix: FloatArray) -> FloatArray:
+    norms: FloatArray = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
+    return norms
 
 
 @cache

@@ -15,12 +15,12 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.columns import Columns
-from bemkit.operators.hierarchy.interpolative import Interpolation, sketched
+from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, n_proxies, point_forces
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
-_UNEVEN = 10.0
+_UNEVEN = 1e3
 """Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
 
 
@@ -56,7 +56,7 @@ class LevelView(ABC):
     candidates: list[IntArray]
     extent: FloatArray
     tolerance: float
-    guesses: list[int]
+    is_lowest: bool
 
     @abstractmethod
     def skeleton(self, cluster: int) -> Skeleton:
@@ -82,11 +82,12 @@ class LevelView(ABC):
         )
         return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
 
-    def guess(self, cluster: int, elements: IntArray) -> int | None:
+    def guess(self, n_candidates: int, elements: IntArray) -> int | None:
         """Return a guess of the rank; none where random combinations would lose the smallest elements."""
         lengths = self.columns.lengths[elements]
-        is_even = lengths.max(initial=0.0) <= _UNEVEN * lengths.min(initial=np.inf)
-        return self.guesses[cluster] if is_even else None
+        if lengths.max(initial=0.0) > _UNEVEN * lengths.min(initial=np.inf):
+            return None
+        return 50 + n_candidates // 6 if self.is_lowest else 2 * n_candidates // 3
 
     def proxies(self, cluster: int) -> ComplexArray:
         """Return the points that stand for all that is far from a cluster."""
@@ -116,13 +117,13 @@ class CollocationView(LevelView):
         fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
         spacing = 2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / proxies.size
         weights = np.repeat(np.sqrt(np.append(np.full(proxies.size, spacing), of.lengths[points])), 2)
-        sizes = 1.0 / np.sqrt(of.lengths[candidates // 4])
-        norms = sizes * np.sqrt(np.square(weights) @ np.square(fields))
-        for kind in (0, 1):
-            own = (candidates // 2) % 2 == kind
-            sizes[own] /= norms[own].max(initial=0.0) or 1.0
-        guess = self.guess(cluster, np.append(points, candidates // 4))
-        return sketched(fields, weights, sizes, self.tolerance_at(cluster, candidates // 4), guess)
+        return sketched(
+            [Block(fields, weights)],
+            1.0 / np.sqrt(of.lengths[candidates // 4]),
+            self.tolerance_at(cluster, candidates // 4),
+            self.guess(candidates.size, np.append(points, candidates // 4)),
+            kinds=(candidates // 2) % 2,
+        )
 
     def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
         """Interpolate the rows of a cluster under near columns and under forces on the proxy circle."""
@@ -131,12 +132,14 @@ class CollocationView(LevelView):
         x, proxies = of.centre[points], self.proxies(cluster)
         circle = PROXY_RATIO * float(self.discs.radius[cluster])
         forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
-        fields = np.concatenate([of.fields(x, points, near_columns).T, forces])[:, 2 * number + rows % 2]
-        weights = np.append(1.0 / np.sqrt(of.lengths[near_columns // 4]), np.ones(len(forces)))
-        sizes = np.sqrt(of.lengths[rows // 2])
-        kind = np.append((near_columns // 2) % 2, np.full(len(forces), 2))
-        groups = (kind == np.arange(3)[:, None]) * np.square(weights)
-        largest = np.sqrt(np.max((groups @ np.square(fields)) * np.square(sizes), axis=1, initial=0.0))
-        weights /= np.where(largest > 0.0, largest, 1.0)[kind]
-        guess = self.guess(cluster, np.append(points, near_columns // 4))
-        return sketched(fields, weights, sizes, self.tolerance_at(cluster, rows // 2), guess)
+        blocks = [Block(forces, np.ones(len(forces)))]
+        for kind in (0, 1):
+            seen = near_columns[(near_columns // 2) % 2 == kind]
+            blocks.append(Block(of.fields(x, points, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
+        return sketched(
+            blocks,
+            np.sqrt(of.lengths[rows // 2]),
+            self.tolerance_at(cluster, rows // 2),
+            self.guess(rows.size, np.append(points, near_columns // 4)),
+            chosen=None if rows.size == 2 * points.size else 2 * number + rows % 2,
+        )

@@ -6,7 +6,7 @@ import numpy as np
 
 from bemkit.arrays import IntArray
 from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
-from bemkit.operators.hierarchy.interpolative import sketched
+from bemkit.operators.hierarchy.interpolative import Block, sketched
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO
 from bemkit.operators.hierarchy.skeletons import LevelView, Skeleton
 
@@ -33,8 +33,8 @@ class SymmetricView(LevelView):
         weights = np.append(np.ones(near.size), np.full(2 * proxies.size, of.material.plane_modulus))
         fields = np.concatenate([entries, of.fields(proxies, candidates)])
         own = candidates // 4
-        guess = self.guess(cluster, np.append(own, near // 4))
-        map_ = sketched(fields, weights, np.ones(own.size), self.tolerance_at(cluster, own), guess)
+        guess = self.guess(own.size, np.append(own, near // 4))
+        map_ = sketched([Block(fields, weights)], np.ones(own.size), self.tolerance_at(cluster, own), guess)
         columns = candidates[map_.skeleton]
         return Skeleton(of.rows_of(columns), map_, columns, map_)
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.operators.hierarchy.interpolative import interpolative, sketched
+from bemkit.operators.hierarchy.interpolative import Block, interpolative, sketched
 
 
 @given(
@@ -21,7 +21,9 @@ def test_columns_follow_from_those_of_the_skeleton(m: int, n: int, rank: int, se
     rng = np.random.default_rng(seed)
     matrix = rng.normal(size=(m, rank)) @ np.diag(10.0 ** -np.arange(rank)) @ rng.normal(size=(rank, n))
     weights = np.exp(rng.normal(size=m))
-    result = interpolative(matrix.copy(), 1e-5) if guess is None else sketched(matrix, weights, np.ones(n), 1e-5, guess)
+    result = interpolative(matrix.copy(), 1e-5)
+    if guess is not None:
+        result = sketched([Block(matrix, weights)], np.ones(n), 1e-5, guess)
     weighted = matrix if guess is None else matrix * weights[:, None]
     assert result.skeleton.size <= min(m, n, rank)
     np.testing.assert_array_equal(np.sort(np.concatenate([result.skeleton, result.rest])), np.arange(n))
@@ -38,15 +40,38 @@ def test_columns_follow_from_those_of_the_skeleton(m: int, n: int, rank: int, se
 def test_a_rank_above_the_guess_is_found() -> None:
     rng = np.random.default_rng(0)
     matrix = rng.normal(size=(400, 60)) @ rng.normal(size=(60, 150))
-    assert sketched(matrix, np.ones(400), np.ones(150), 1e-9, 5).skeleton.size == 60
+    assert sketched([Block(matrix, np.ones(400))], np.ones(150), 1e-9, 5).skeleton.size == 60
 
 
 def test_weights_hold_for_the_columns_as_they_are() -> None:
     rng = np.random.default_rng(0)
     matrix, sizes = rng.normal(size=(90, 5)) @ rng.normal(size=(5, 40)), 10.0 ** rng.uniform(-3, 3, 40)
-    result = sketched(matrix, np.ones(90), sizes, 1e-10, 8)
+    result = sketched([Block(matrix, np.ones(90))], sizes, 1e-10, 8)
     assert result.skeleton.size == 5
     np.testing.assert_allclose(matrix[:, result.skeleton] @ result.matrix().T, matrix, atol=1e-8 * np.abs(matrix).max())
+
+
+def test_blocks_and_kinds_of_columns_count_alike_whatever_their_sizes() -> None:
+    rng = np.random.default_rng(0)
+    large, small = (rng.normal(size=(120, 4)) @ rng.normal(size=(4, 50)) for _ in range(2))
+    kinds = np.repeat([0, 1], 25)
+    units = np.where(kinds == 0, 1.0, 1e-9)
+    for guess in (None, 12):
+        blocks = [Block(large * units, np.ones(120)), Block(1e-9 * small * units, np.ones(120))]
+        result = sketched(blocks, np.ones(50), 1e-6, guess, kinds=kinds)
+        assert result.skeleton.size == 8
+        for block in (large, small):
+            error = (block * units)[:, result.skeleton] @ result.matrix().T - block * units
+            assert np.abs(error / units).max() < 1e-5 * np.abs(block).max()
+
+
+def test_columns_may_be_chosen() -> None:
+    rng = np.random.default_rng(0)
+    matrix, chosen = rng.normal(size=(90, 5)) @ rng.normal(size=(5, 40)), np.arange(3, 40, 2)
+    result = sketched([Block(matrix, np.ones(90))], np.ones(chosen.size), 1e-10, 8, chosen=chosen)
+    assert result.n == chosen.size
+    own = matrix[:, chosen]
+    np.testing.assert_allclose(own[:, result.skeleton] @ result.matrix().T, own, atol=1e-8 * np.abs(own).max())
 
 
 def test_nothing_has_no_skeleton() -> None:
