@@ -163,6 +163,9 @@ def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
 def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
     if isinstance(solution.plan.linear_solver, Krylov):
         yield _CONJUGATE_GRADIENTS
+    if any("fast multipole" in item.reason for item in solution.plan.items):
+        yield Method("products by the fast multipole method", ("GreengardRokhlin1987", "Muskhelishvili1953"))
+        yield Method("GMRES with sums over a hierarchy", ("SaadSchultz1986", "BramblePasciakXu1990"))
     if any(item.is_needed and "multigrid" in item.name for item in solution.plan.items):
         yield Method("algebraic multigrid", ("RugeStueben1987",))
     messages = [record.message for record in solution.history]

@@ -225,6 +225,7 @@ LINEAR_SOLVERS = Registry(
         "direct": "bemkit.operators.linear.solvers:DenseCholesky",
         "krylov": "bemkit.operators.linear.solvers:Krylov",
         "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
+        "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
     },
 )
 

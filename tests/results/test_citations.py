@@ -105,6 +105,15 @@ def test_a_run_cites_the_linear_solver_that_it_used() -> None:
     assert "OLeary1980" not in keys(cite(bk.run(replace(scene, linear_solver=bk.DenseCholesky()))))
 
 
+def test_a_run_without_stored_equations_cites_its_products_and_its_iteration() -> None:
+    scene = replace(
+        with_overrides(PAPER_1, elements=240, discretisation="constant"), linear_solver=bk.MatrixFree(tolerance=1e-6)
+    )
+    works = {"GreengardRokhlin1987", "SaadSchultz1986", "BramblePasciakXu1990", "RugeStueben1987"}
+    assert works <= keys(cite(bk.run(scene)))
+    assert not works & keys(cite(bk.run(replace(scene, linear_solver=bk.DenseCholesky()))))
+
+
 def test_a_run_cites_the_path_of_solutions_if_it_was_followed() -> None:
     scene = with_overrides(PAPER_1, elements=40)
     assert "Lemke1965" not in keys(cite(bk.run(scene)))

@@ -91,10 +91,9 @@ class FastMultipole(_LinearOperator):
 
         def from_nearby(leaf: int) -> None:
             own = self.tree.places(0, leaf)
-            sources = np.concatenate([np.r_[self.tree.places(0, other)] for other in sorted(self._near[leaf].tolist())])
-            near[own] = self.columns.layers(np.arange(own.start, own.stop), sources, densities)
+            near[own] = self.columns.layers(np.arange(own.start, own.stop), self._near[leaf], densities)
 
-        for_each_chunk(from_nearby, range(self.tree.n_leaves), n_integrals=n_near * LEAF_SIZE**2)
+        for_each_chunk(from_nearby, range(self.tree.n_leaves), n_integrals=n_near * LEAF_SIZE)
         total = far + near
         return np.stack([total.real, total.imag], axis=1) + 0.5 * displacement
 
@@ -216,7 +215,8 @@ def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Le
         del levels[0]
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     sources = np.split(pairs[:, 1], np.searchsorted(pairs[:, 0], np.arange(1, tree.n_leaves)))
-    return levels[::-1], sources
+    near = [np.concatenate([np.r_[tree.places(0, other)] for other in of_leaf.tolist()]) for of_leaf in sources]
+    return levels[::-1], near
 
 
 def _discs(columns: BoundaryColumns, tree: ClusterTree, level: int) -> tuple[ComplexArray, FloatArray]:

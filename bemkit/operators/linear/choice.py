@@ -18,6 +18,7 @@ from bemkit.operators.linear.solvers import (
     Hierarchical,
     Krylov,
     LinearSolverChoice,
+    MatrixFree,
 )
 
 _BYTES = 8
@@ -92,9 +93,10 @@ def choose_linear_solver(
     ChosenLinearSolver
         A linear solver that was asked for, or the faster one of those that fit.
     """
-    if isinstance(requested, Hierarchical):
+    if isinstance(requested, Hierarchical | MatrixFree):
         automatic = choose_linear_solver(Automatic(), n_dofs, n_retained, memory)
-        return ChosenLinearSolver(automatic.solver, f"not compressed over a tree, but {automatic.reason}")
+        without = "compressed over a tree" if isinstance(requested, Hierarchical) else "matrix-free"
+        return ChosenLinearSolver(automatic.solver, f"not {without}, but {automatic.reason}")
     if not isinstance(requested, Automatic):
         return ChosenLinearSolver(requested, "asked for")
     direct, krylov = direct_cost(n_dofs, n_retained), krylov_cost(n_dofs, n_retained)

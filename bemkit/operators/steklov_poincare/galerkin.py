@@ -18,7 +18,14 @@ from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Hierarchical, LinearSolver, LinearSolverChoice
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    DenseCholesky,
+    Hierarchical,
+    LinearSolver,
+    LinearSolverChoice,
+    MatrixFree,
+)
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
@@ -95,7 +102,7 @@ class GalerkinElasticity:
         self.material = material
         self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
-        if isinstance(linear_solver, Automatic | Hierarchical):
+        if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
                 f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), Krylov(), or what "
                 "bemkit.operators.linear.choice.choose_linear_solver returns for it"
