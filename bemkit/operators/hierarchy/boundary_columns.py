@@ -191,7 +191,7 @@ class BoundaryColumns:
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
         """Return complex tractions, constant parts and slopes of displacements, each (n,), from (n, 2) arrays."""
-        t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
+        t, u = (each[:, 0] + 1j * each[:, 1] for each in (traction, displacement))
         if self.slopes is None or self.means is None:
             return t, u, np.zeros_like(u)
         around = u[self.neighbours]

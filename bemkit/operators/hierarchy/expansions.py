@@ -20,11 +20,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import comb
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
+
+Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
 
 @dataclass(frozen=True)
@@ -55,19 +58,6 @@ class Expansions:
         m, k = np.meshgrid(self._powers, self._powers, indexing="ij")
         return np.asarray(np.where(k > 0, comb(m + k - 1, m), 0.0))
 
-    @cached_property
-    def _of_parent(self) -> FloatArray:
-        """(order + 1, order + 1): what x^(m - k) is multiplied by in row m; the logarithm is a - sum x^m / m."""
-        row, k = np.meshgrid(self._powers, self._powers, indexing="ij")
-        of_log = np.where(row > 0, -1.0 / np.maximum(row, 1.0), 1.0)
-        return np.asarray(np.where(row >= k, np.where(k > 0, comb(row - 1, k - 1), of_log), 0.0))
-
-    @cached_property
-    def _of_child(self) -> FloatArray:
-        """(order + 1, order + 1): (y + x)^k = sum C(k, m) x^(k - m) y^m, rows m."""
-        m, k = np.meshgrid(self._powers, self._powers, indexing="ij")
-        return np.asarray(comb(k, m))
-
     def of_sources(
         self, arm: ComplexArray, radius: FloatArray, f: ComplexArray, g: ComplexArray, e: FloatArray, first: IntArray
     ) -> ComplexArray:
@@ -84,17 +74,16 @@ class Expansions:
         first : (n_clusters,) int array
             The first source of each cluster.
         """
-        result = np.empty((first.size, 2, self.order + 1), complex)
         x, g, e = arm / radius, g / radius, e / radius
-        inner = e - x.conj() * f
-        on_psi = -self.kappa * f.conj()
-        result[:, 0, 0], result[:, 1, 0] = np.add.reduceat(f, first), np.add.reduceat(on_psi, first)
-        power, g_twice, before = np.ones_like(x), x.conj() * g, np.zeros_like(x)
-        for k in range(1, self.order + 1):
-            of_log = power * x / -k
-            result[:, 0, k] = np.add.reduceat(f * of_log + g * power, first)
-            result[:, 1, k] = np.add.reduceat(on_psi * of_log + inner * power + (k - 1.0) * g_twice * before, first)
-            before, power = power, power * x
+        on_psi, powers = -self.kappa * f.conj(), self._powers_of(x)
+        columns = np.stack([f, on_psi, g, e - x.conj() * f, x.conj() * g], axis=1)
+        ends = np.append(first[1:], x.size)
+        # sums over the sources of a cluster, by power
+        sums = np.stack([powers[i:j].T @ columns[i:j] for i, j in zip(first, ends, strict=True)])
+        result = np.ascontiguousarray(sums[:, :, :2].transpose(0, 2, 1))
+        result[:, :, 1:] /= -self._powers[1:]
+        result[:, :, 1:] += sums[:, :-1, 2:4].transpose(0, 2, 1)
+        result[:, 1, 2:] += self._powers[1:-1] * sums[:, :-2, 4]
         return result
 
     def of_parents(
@@ -113,8 +102,16 @@ class Expansions:
         """
         own = series.copy()
         own[:, 1, 1:] -= (arm.conj() / radius)[:, None] * self._of_gradient(series[:, 0])
-        own *= (radius / parent)[:, None, None] ** self._powers
-        return np.asarray(own @ self._moving(self._of_parent, arm / parent).transpose(0, 2, 1))
+        own *= self._powers_of(radius / parent)[:, None]
+        x = arm / parent
+        logs = own[:, :, :1] * self._powers_of(x)[:, None, 1:] / self._powers[1:]
+        terms = _by_power(own)
+        for j in range(self.order - 1, 0, -1):  # (1 - x)^-k, Taylor's shift transposed
+            for k in range(j, self.order):
+                terms[k + 1] += x * terms[k]
+        moved = _by_cluster(terms)
+        moved[:, :, 1:] -= logs
+        return moved
 
     def of_fields(
         self, series: ComplexArray, arm: ComplexArray, radius: FloatArray, target: FloatArray
@@ -131,16 +128,13 @@ class Expansions:
             Radii of the sources and of the disc.
         """
         logs = series[:, :, 0]
-        weighted = series * (-radius / arm)[:, None, None] ** self._powers
-        result = (
-            weighted.reshape(-1, self.order + 1).view(float).reshape(-1, self.order + 1, 2).transpose(0, 2, 1)
-            @ self._of_local.T
-        ).transpose(0, 2, 1)
-        own = np.ascontiguousarray(result).view(complex)[..., 0].reshape(series.shape)
+        weighted = series * self._powers_of(-radius / arm)[:, None]
+        parts = np.stack([weighted.real, weighted.imag]).reshape(-1, self.order + 1) @ self._of_local.T
+        own = (parts[: parts.shape[0] // 2] + 1j * parts[parts.shape[0] // 2 :]).reshape(series.shape)
         own[:, :, 0] += logs * np.log(-arm / self.log_length)[:, None]
         own[:, 0, 0] -= logs[:, 0] / self.kappa  # the displacement -f / (2 mu)
         own[:, :, 1:] -= logs[:, :, None] / self._powers[1:]
-        own *= (target / arm)[:, None, None] ** self._powers
+        own *= self._powers_of(target / arm)[:, None]
         own[:, 1, :-1] -= (arm.conj() / target)[:, None] * own[:, 0, 1:] * self._powers[1:]
         return own
 
@@ -160,8 +154,11 @@ class Expansions:
         """
         own = series.copy()
         own[:, 1, :-1] += (arm.conj() / radius)[:, None] * series[:, 0, 1:] * self._powers[1:]
-        moved = own @ self._moving(self._of_child.T, arm / radius)
-        return np.asarray(moved * (child / radius)[:, None, None] ** self._powers)
+        terms, x = _by_power(own), arm / radius
+        for j in range(self.order):  # Taylor's shift by Horner's rule
+            for k in range(self.order - 1, j - 1, -1):
+                terms[k] += x * terms[k + 1]
+        return _by_cluster(terms) * self._powers_of(child / radius)[:, None]
 
     def displacements(self, series: ComplexArray, arm: ComplexArray, radius: FloatArray) -> ComplexArray:
         """Return 2 mu u (n,) at points of discs.
@@ -187,8 +184,18 @@ class Expansions:
         factors = np.concatenate([[1.0], -self._powers[1:-1]])
         return np.asarray(phi[:, :-1] * factors)
 
-    def _moving(self, factors: FloatArray, x: ComplexArray) -> ComplexArray:
-        """Return lower triangles (n, order + 1, order + 1) of factors times x^(row - column)."""
-        rows, columns = np.indices(factors.shape)
-        powers: ComplexArray = x[:, None] ** self._powers
-        return np.where(rows >= columns, factors * powers[:, np.abs(rows - columns)], 0.0)
+    def _powers_of(self, x: Numbers) -> Numbers:
+        """Return the powers (n, order + 1) of numbers (n,)."""
+        powers = np.repeat(x[:, None], self.order + 1, axis=1)
+        powers[:, 0] = 1.0
+        return np.multiply.accumulate(powers, axis=1, out=powers)
+
+
+def _by_power(series: ComplexArray) -> ComplexArray:
+    """Return series (n, 2, order + 1) as (order + 1, 2, n)."""
+    return np.ascontiguousarray(series.transpose(2, 1, 0))
+
+
+def _by_cluster(terms: ComplexArray) -> ComplexArray:
+    """Return series (order + 1, 2, n) as (n, 2, order + 1)."""
+    return np.ascontiguousarray(terms.transpose(2, 1, 0))

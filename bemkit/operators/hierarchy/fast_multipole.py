@@ -17,7 +17,8 @@ from scipy.sparse.linalg import LinearOperator
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
+from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns, Densities
 from bemkit.operators.hierarchy.expansions import Expansions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
@@ -54,6 +55,21 @@ class _Level:
     source: IntArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """Leaves that are near each leaf, itself among them, ascending.
+
+    Parameters
+    ----------
+    first : (n_leaves + 1,) array
+        Where those of each leaf begin in `source`.
+    source : (n_pairs,) array
+    """
+
+    first: IntArray
+    source: IntArray
+
+
 class FastMultipole(_LinearOperator):
     """(1/2 + T) u - U t in the middle of all straight elements, from their tractions t and displacements u.
 
@@ -86,16 +102,29 @@ class FastMultipole(_LinearOperator):
         """Return (1/2 + T) u - U t, (n, 2), from tractions and displacements (n, 2); all by place."""
         densities = self.columns.densities(traction, displacement)
         far = self._from_afar(self._locals(self._series(densities)))
-        near = np.empty_like(far)
-        n_near = sum(each.size for each in self._near)
+        far += self._from_nearby(densities)
+        return far.view(float).reshape(-1, 2) + 0.5 * displacement
 
-        def from_nearby(leaf: int) -> None:
-            own = self.tree.places(0, leaf)
-            near[own] = self.columns.layers(np.arange(own.start, own.stop), self._near[leaf], densities)
+    def _from_nearby(self, densities: Densities) -> ComplexArray:
+        """Return what the elements of the leaves that are not far from each one cause there, (n,) by place."""
+        columns, tree, near, first = self.columns, self.tree, self._near.source, self._near.first
+        fast = compiled.products()
 
-        for_each_chunk(from_nearby, range(self.tree.n_leaves), n_integrals=n_near * LEAF_SIZE)
-        total = far + near
-        return np.stack([total.real, total.imag], axis=1) + 0.5 * displacement
+        def of_leaves(some: slice) -> ComplexArray:
+            if fast is not None:
+                geometry = columns.centre, columns.start, columns.end
+                caused: ComplexArray = fast.nearby(
+                    columns.constants.numbers, *geometry, *densities, tree.bounds, first, near, some.start, some.stop
+                )
+                return caused
+            parts = []
+            for leaf in range(some.start, some.stop):
+                elements = np.concatenate([np.r_[tree.places(0, k)] for k in near[first[leaf] : first[leaf + 1]]])
+                parts.append(columns.layers(np.r_[tree.places(0, leaf)], elements, densities))
+            return np.concatenate(parts)
+
+        chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
+        return np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2))
 
     def _series(self, densities: tuple[ComplexArray, ComplexArray, ComplexArray]) -> list[ComplexArray]:
         """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
@@ -196,8 +225,8 @@ class FastMultipole(_LinearOperator):
         return np.asarray(result / (2.0 * self._shear_modulus))
 
 
-def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Level], list[IntArray]]:
-    """Return the levels from the leaves up to the last one with pairs, and the elements near each leaf."""
+def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Level], _Near]:
+    """Return the levels from the leaves up to the last one with pairs, and the leaves near each leaf."""
     discs = [_discs(columns, tree, level) for level in range(tree.n_levels + 1)]
     pairs, levels = np.zeros((1, 2), np.intp), []
     for number in range(tree.n_levels, -1, -1):
@@ -214,8 +243,7 @@ def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Le
     while len(levels) > 1 and not levels[0].target.size:
         del levels[0]
     pairs = pairs[np.lexsort(pairs.T[::-1])]
-    sources = np.split(pairs[:, 1], np.searchsorted(pairs[:, 0], np.arange(1, tree.n_leaves)))
-    near = [np.concatenate([np.r_[tree.places(0, other)] for other in of_leaf.tolist()]) for of_leaf in sources]
+    near = _Near(np.searchsorted(pairs[:, 0], np.arange(tree.n_leaves + 1)), np.ascontiguousarray(pairs[:, 1]))
     return levels[::-1], near
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import NoResultError
@@ -15,6 +14,7 @@ from bemkit.operators.hierarchy.fast_multipole import LEAF_SIZE, FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.linear.gmres import gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
 
@@ -22,8 +22,6 @@ _PRODUCTS = 1e-3
 """Error of a product by the tolerance of the iteration; tractions feel it by elements on which it oscillates."""
 _FINEST = 1e-13
 """Errors of products below that are round-off."""
-_KEPT = 25
-"""Steps after which the iteration starts again from where it is, and forgets its directions."""
 
 
 class NotConvergedError(NoResultError):
@@ -116,46 +114,42 @@ class MatrixFreeSystem(HierarchicalSystem):
         """Find the state and the unknowns of the boundary as a whole that fulfil the equations under laws."""
         n = 2 * self._order.size
         normal = laws.factors.transpose(0, 2, 1)
-        unknowns: FloatArray = np.linalg.solve(normal @ laws.factors, normal @ (self._state - laws.given)[:, :, None])[
-            :, :, 0
-        ].astype(float)
+        start: FloatArray = (
+            np.linalg.solve(normal @ laws.factors, normal @ (self._state - laws.given)[:, :, None])
+            .ravel()
+            .astype(float)
+        )
         units = np.where(inverse.is_traction, self._traction_unit, 1.0).ravel()
-        state, errors = self._under(laws, unknowns), self._errors
-        right = self._scaled(inverse.apply(-self._left(state, errors)), units)
-        target = self._tolerance * max(self._size(state, errors), float(np.linalg.norm(right)))
-        homogeneous = ElementLaws(laws.factors, np.zeros_like(laws.given))
+
+        def preconditioned(state: FloatArray, errors: FloatArray) -> FloatArray:
+            result = inverse.apply(self._left(state, errors))
+            result[:n] /= units
+            return result
 
         def product(x: FloatArray) -> FloatArray:
-            of_unknowns = self._under(homogeneous, (units * x[:n]).reshape(-1, 2))
-            return self._scaled(inverse.apply(self._left(of_unknowns, x[n:])), units)
+            return preconditioned(_combined(laws.factors, units * x[:n]), x[n:])
 
-        operator = LinearOperator((right.size, right.size), matvec=product, dtype=float)
-        found: list[float] = []
-        cycles = -(-self._max_steps // _KEPT)
-        x, has_failed = gmres(
-            operator, right, rtol=0.0, atol=target, restart=min(_KEPT, self._max_steps), maxiter=cycles,
-            callback=lambda residual: found.append(float(residual)), callback_type="pr_norm",
-        )  # fmt: skip
-        self.steps.append(len(found))
-        if has_failed:
+        state = _combined(laws.factors, start) + laws.given
+        right = -preconditioned(state, self._errors)
+        target = self._tolerance * max(self._size(state), float(np.linalg.norm(right)))
+        x, n_steps, left = gmres(product, right, target=target, max_steps=self._max_steps)
+        self.steps.append(n_steps)
+        if left > target:
             raise NotConvergedError(
-                f"{len(found)} steps of GMRES leave {self._tolerance * found[-1] * np.linalg.norm(right) / target:.1e} "
-                f"of the solution, above the tolerance {self._tolerance:g}: allow more max_steps, or choose the linear "
-                "solver 'hierarchical'"
+                f"{n_steps} steps of GMRES leave {self._tolerance * left / target:.1e} of the solution, above the "
+                f"tolerance {self._tolerance:g}: "
+                + ("allow more max_steps" if n_steps >= self._max_steps else "round-off is reached, take a larger one")
+                + ", or choose the linear solver 'hierarchical'"
             )
-        self._state = self._under(laws, unknowns + (units * x[:n]).reshape(-1, 2))
-        self._errors = errors + x[n:]
+        self._state = _combined(laws.factors, start + units * x[:n]) + laws.given
+        self._errors = self._errors + x[n:]
 
-    def _size(self, state: FloatArray, errors: FloatArray) -> float:
-        scaled = np.concatenate([(state[:, :2] / self._traction_unit).ravel(), state[:, 2:].ravel(), errors])
-        return float(np.linalg.norm(scaled))
+    def _size(self, state: FloatArray) -> float:
+        """Return the norm of tractions and displacements in the units of the iteration."""
+        return float(np.hypot(np.linalg.norm(state[:, :2]) / self._traction_unit, np.linalg.norm(state[:, 2:])))
 
-    @staticmethod
-    def _under(laws: ElementLaws, unknowns: FloatArray) -> FloatArray:
-        """Return (t_x, t_y, u_x, u_y) of all elements from their unknowns (n, 2)."""
-        state: FloatArray = (laws.factors @ unknowns[:, :, None])[:, :, 0] + laws.given
-        return state
 
-    @staticmethod
-    def _scaled(x: FloatArray, units: FloatArray) -> FloatArray:
-        return np.concatenate([x[: units.size] / units, x[units.size :]])
+def _combined(factors: FloatArray, unknowns: FloatArray) -> FloatArray:
+    """Return what unknowns (2 n_elements,) make of (t_x, t_y, u_x, u_y), without what is given."""
+    state: FloatArray = np.einsum("nqz,nz->nq", factors, unknowns.reshape(-1, 2))
+    return state

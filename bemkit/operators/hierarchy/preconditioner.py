@@ -105,7 +105,8 @@ def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, colu
     border = boundary_border(groups.mesh, material, order, takes_slopes, has_holes=True)
     entries = of_groups.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 4)
     balances = border.balances.reshape(-1, n, 4)
-    matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)))
+    # by columns: the LU of what is stored by rows is that of the transpose, whose pivots grow on graded groups
+    matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")
     matrix[: 2 * n, : 2 * n] = np.einsum("rnq,nqz->rnz", entries, factors).reshape(2 * n, -1)
     matrix[2 * n :, : 2 * n] = np.einsum("bnq,nqz->bnz", balances, factors).reshape(len(balances), -1)
     matrix[: 2 * n, 2 * n :] = border.errors

@@ -81,6 +81,6 @@ def test_nothing_is_stored_that_grows_like_the_square_of_the_elements() -> None:
     counts = []
     for n in (2000, 8000):
         operator = multipole_of(mesh_of("rectangle", n))
-        pairs = sum(level.target.size for level in operator._levels) + sum(near.size for near in operator._near)
+        pairs = sum(level.target.size for level in operator._levels) + operator._near.source.size
         counts.append(pairs / operator.tree.n_leaves)
     assert counts[1] < 1.2 * counts[0]
