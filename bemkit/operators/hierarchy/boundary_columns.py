@@ -194,8 +194,11 @@ class BoundaryColumns:
         t, u = (each[:, 0] + 1j * each[:, 1] for each in (traction, displacement))
         if self.slopes is None or self.means is None:
             return t, u, np.zeros_like(u)
-        around = u[self.neighbours]
-        return t, u + np.sum(self.means * around, axis=0), np.sum(self.slopes * around, axis=0)
+        mean, slope = u.copy(), np.zeros_like(u)
+        for k, places in enumerate(self.neighbours):
+            mean += self.means[k] * u[places]
+            slope += self.slopes[k] * u[places]
+        return t, mean, slope
 
     def layers(self, places: IntArray, elements: IntArray, densities: Densities) -> ComplexArray:
         """Return T u - U t, complex (n,), in the middle of some elements, as caused by other ones.

@@ -30,7 +30,7 @@ else:
 
 LEAF_SIZE = 32
 """Elements of a leaf: integrals nearby and series from afar then take about the same time."""
-_CHUNK, _FEW = 256, 64
+_CHUNK, _FEW = 256, 32
 """Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""
 _SEPARATION = 3.0
 _FEW_POINTS, _SHORT = 4, 0.08

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.collocation_system import boundary_border
 from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.hierarchy.fast_multipole import LEAF_SIZE, FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
@@ -17,11 +19,50 @@ from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.gmres import gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
+from bemkit.operators.rigid_modes import traction_free_modes
 
 _PRODUCTS = 1e-3
 """Error of a product by the tolerance of the iteration; tractions feel it by elements on which it oscillates."""
 _FINEST = 1e-13
 """Errors of products below that are round-off."""
+
+
+@dataclass(frozen=True, eq=False)
+class WholeBoundary:
+    """Unknowns and equations of the boundary as a whole, of which as little as possible is stored.
+
+    Parameters
+    ----------
+    errors : (2 n_elements, n_motions + n_loops) array
+        Rigid motions and the fields of reciprocities: errors of the equations.
+    on_resultant : (2 n_elements,) array [m^2/Pa]
+        By which the work of tractions on rigid motions becomes a balance.
+    on_traction, on_displacement : (n_loops, 2 n_elements) arrays
+        Of the reciprocities; see `bemkit.operators.collocation.reciprocity`.
+    """
+
+    errors: FloatArray
+    on_resultant: FloatArray
+    on_traction: FloatArray
+    on_displacement: FloatArray
+
+    @classmethod
+    def of(cls, mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> WholeBoundary:
+        """Return what `collocation_system.boundary_border` does, by place."""
+        reciprocity = Reciprocity.of(mesh, material, takes_slopes=takes_slopes)
+        compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
+        places = (2 * order[:, None] + np.arange(2)).ravel()
+        errors = np.column_stack([traction_free_modes(mesh, mesh.centres), reciprocity.fields])
+        weights = compliance * np.repeat(mesh.lengths[order], 2)
+        rows = (each[:, places] for each in (reciprocity.on_traction, reciprocity.on_displacement))
+        return cls(errors[places], weights, *rows)
+
+    def balances(self, state: FloatArray) -> FloatArray:
+        """Return both sides of the additional equations, one less the other, of (t_x, t_y, u_x, u_y) by place."""
+        traction, displacement = state[:, :2].ravel(), state[:, 2:].ravel()
+        n_motions = self.errors.shape[1] - len(self.on_traction)
+        resultants = (self.on_resultant * traction) @ self.errors[:, :n_motions]
+        return np.concatenate([resultants, self.on_traction @ traction - self.on_displacement @ displacement])
 
 
 class NotConvergedError(NoResultError):
@@ -61,9 +102,9 @@ class MatrixFreeSystem(HierarchicalSystem):
         self._tolerance, self._max_steps = options.tolerance, options.max_steps
         columns = BoundaryColumns.of(mesh, material, tree.order, takes_slopes=slopes)
         self._layers = FastMultipole(columns, tree, max(_PRODUCTS * options.tolerance, _FINEST))
-        self._border = boundary_border(mesh, material, tree.order, slopes, has_holes=True)
+        self._whole = WholeBoundary.of(mesh, material, tree.order, takes_slopes=slopes)
         self._traction_unit = material.plane_modulus / mesh.diameter
-        self._state, self._errors = np.zeros((self._order.size, 4)), np.zeros(self._border.errors.shape[1])
+        self._state, self._errors = np.zeros((self._order.size, 4)), np.zeros(self._whole.errors.shape[1])
         self._laws: ElementLaws | None = None
         self._inverse: Preconditioner | None = None
         self.steps: list[int] = []
@@ -102,13 +143,14 @@ class MatrixFreeSystem(HierarchicalSystem):
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
         left = self._layers.applied(traction[self._order], displacement[self._order])
-        left += (self._border.errors @ self._errors).reshape(-1, 2)
+        left += (self._whole.errors @ self._errors).reshape(-1, 2)
         return np.asarray(left[self._place[elements]])
 
     def _left(self, state: FloatArray, errors: FloatArray) -> FloatArray:
         """Return both sides of the equations and of the balances, one less the other."""
-        equations = self._layers.matvec(state.ravel()) + self._border.errors @ errors
-        return np.concatenate([equations, self._border.balances @ state.ravel()])
+        equations = self._layers.applied(state[:, :2], state[:, 2:]).ravel()
+        equations += self._whole.errors @ errors
+        return np.concatenate([equations, self._whole.balances(state)])
 
     def _solve(self, laws: ElementLaws, inverse: Preconditioner) -> None:
         """Find the state and the unknowns of the boundary as a whole that fulfil the equations under laws."""
@@ -129,9 +171,9 @@ class MatrixFreeSystem(HierarchicalSystem):
         def product(x: FloatArray) -> FloatArray:
             return preconditioned(_combined(laws.factors, units * x[:n]), x[n:])
 
-        state = _combined(laws.factors, start) + laws.given
-        right = -preconditioned(state, self._errors)
-        target = self._tolerance * max(self._size(state), float(np.linalg.norm(right)))
+        self._state = _combined(laws.factors, start) + laws.given
+        right = -preconditioned(self._state, self._errors)
+        target = self._tolerance * max(self._size(self._state), float(np.linalg.norm(right)))
         x, n_steps, left = gmres(product, right, target=target, max_steps=self._max_steps)
         self.steps.append(n_steps)
         if left > target:
@@ -141,7 +183,7 @@ class MatrixFreeSystem(HierarchicalSystem):
                 + ("allow more max_steps" if n_steps >= self._max_steps else "round-off is reached, take a larger one")
                 + ", or choose the linear solver 'hierarchical'"
             )
-        self._state = _combined(laws.factors, start + units * x[:n]) + laws.given
+        self._state += _combined(laws.factors, units * x[:n])
         self._errors = self._errors + x[n:]
 
     def _size(self, state: FloatArray) -> float:

@@ -22,6 +22,9 @@ from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 
+_CHUNK = 64
+"""Groups whose columns are evaluated at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class Preconditioner:
@@ -84,8 +87,10 @@ class Preconditioner:
         of_groups = self.coarse.solve(np.concatenate([means.ravel(), right[n:]]))
         unknowns = of_groups[: means.size].reshape(-1, 2)[self.groups.group]
         rest = np.einsum("nij,nj->ni", self.turn, felt - means[self.groups.group])
-        unknowns += np.where(self.is_traction, 0.0, 2.0 * rest)
-        unknowns[self.is_traction] -= self.tractions.apply(rest[self.is_traction])
+        of_tractions = self.tractions.apply(rest[self.is_traction])
+        rest *= 2.0
+        rest[self.is_traction] = -of_tractions
+        unknowns += rest
         return np.concatenate([unknowns.ravel(), of_groups[means.size :]])
 
 
@@ -103,11 +108,14 @@ def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, colu
         groups.mesh, material, order, takes_slopes=takes_slopes, log_length=columns.constants.log_length
     )
     border = boundary_border(groups.mesh, material, order, takes_slopes, has_holes=True)
-    entries = of_groups.entries(np.arange(2 * n), np.arange(4 * n)).reshape(2 * n, n, 4)
     balances = border.balances.reshape(-1, n, 4)
     # by columns: the LU of what is stored by rows is that of the transpose, whose pivots grow on graded groups
     matrix = np.zeros((2 * n + len(balances), 2 * n + len(balances)), order="F")
-    matrix[: 2 * n, : 2 * n] = np.einsum("rnq,nqz->rnz", entries, factors).reshape(2 * n, -1)
+    for begin in range(0, n, _CHUNK):
+        own = np.arange(begin, min(begin + _CHUNK, n))
+        entries = of_groups.entries(np.arange(2 * n), (4 * own[:, None] + np.arange(4)).ravel())
+        of_unknowns = np.einsum("rnq,nqz->rnz", entries.reshape(2 * n, -1, 4), factors[own])
+        matrix[: 2 * n, 2 * begin : 2 * begin + 2 * own.size] = of_unknowns.reshape(2 * n, -1)
     matrix[2 * n :, : 2 * n] = np.einsum("bnq,nqz->bnz", balances, factors).reshape(len(balances), -1)
     matrix[: 2 * n, 2 * n :] = border.errors
     return DenseLU(matrix, "the system of the body on groups of elements")
