@@ -53,7 +53,8 @@ def test_solutions_are_those_of_dense_equations(name: str) -> None:
 def test_statuses_are_those_of_dense_equations_at_2000_elements() -> None:
     own, dense = (bk.run(with_solver(paper(1), 2000, each)) for each in (MatrixFree(), DenseCholesky()))
     assert (own.contact.status == dense.contact.status).all()
-    assert np.abs(own.contact.sigma_n - dense.contact.sigma_n).max() < 1e-7 * np.abs(dense.contact.sigma_n).max()
+    # a hundred times the tolerance, as the body says
+    assert np.abs(own.contact.sigma_n - dense.contact.sigma_n).max() < 1e-6 * np.abs(dense.contact.sigma_n).max()
     assert own.certificate.worst < 1e-9
 
 

@@ -52,8 +52,8 @@ def test_bodies_with_many_holes_are_stored() -> None:
 
 
 def test_galerkin_takes_what_automatic_takes() -> None:
-    choice = choose_linear_solver(ASKED, 640, 160)
-    assert choice.solver == choose_linear_solver(bk.Automatic(), 640, 160).solver
+    choice = choose_linear_solver(ASKED)
+    assert choice.solver == choose_linear_solver(bk.Automatic()).solver
     assert "not matrix-free, but" in choice.reason
     scene = scene_of(40, discretisation=bk.LinearGalerkin())
     with pytest.raises(ValueError, match="a map does not choose"):
@@ -67,7 +67,7 @@ def test_the_plan_says_what_is_used_and_that_it_takes_less_memory() -> None:
     )
     items = {item.name: item for item in free.items}
     assert "fast multipole" in items["boundary equations"].reason
-    assert "GMRES to 1e-09" in items["linear solver of the body"].reason
+    assert "GMRES to 1e-08" in items["linear solver of the body"].reason
     assert items["algebraic multigrid (pyamg)"].is_needed
     assert free.memory < 0.25 * direct.memory
     assert free.seconds > direct.seconds

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 else:
     _LinearOperator = LinearOperator
 
-LEAF_SIZE = 32
+LEAF_SIZE = 40
 """Elements of a leaf: integrals nearby and series from afar then take about the same time."""
 _CHUNK, _FEW = 256, 32
 """Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""

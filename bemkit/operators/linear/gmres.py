@@ -12,9 +12,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 
-KEPT = 16
+KEPT = 20
 """Directions of a round."""
-_GAIN = 1e-6
+_GAIN = 1e-7
 """A round ends where it has gained so much: more than that single precision does not hold."""
 _SHARE = 0.8
 """A round ends below this share of the target, because its own estimate of the residual is none of round-off."""

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.coarse_equations import ElementGroups
+from bemkit.operators.hierarchy.collocation_system import boundary_border
 from bemkit.operators.hierarchy.element_fields import Constants
-from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem, NotConvergedError
+from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem, NotConvergedError, WholeBoundary
+from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import MatrixFree
+from bemkit.operators.material import Material
 from tests.operators.hierarchy.test_system import MATERIAL, SHAPES, conditions_of, graded, mesh_of, system_of
 
 NOTHING = np.zeros(0, np.intp)
@@ -107,6 +114,34 @@ def test_conditions_that_hold_nothing() -> None:
     system = iterated(mesh, np.tile(np.eye(2), (400, 1, 1)))
     with pytest.raises(SingularMatrixError, match="on groups of elements is singular"):
         solved(system, free)
+
+
+def test_groups_lose_no_digits_on_fine_meshes() -> None:
+    # the LU of the transposed equations of these groups has pivots up to 1e7 and leaves 1e-9, this one 1e-15
+    scene = bk.load_scene("paper-1")
+    mesh = replace(scene, mesh=replace(scene.mesh, elements=100_000)).build_mesh()
+    mesh = BoundaryMesh((mesh.nodes - 0.5) / mesh.diameter, mesh.elements)
+    material = Material(1.0, 0.2)
+    side = np.repeat(np.arange(4), 25_000)
+    is_held = np.stack([side <= 1, side == 0], axis=1)
+    nothing = np.zeros_like(mesh.centres)
+    system = iterated(mesh, np.tile(np.eye(2), (mesh.n_elements, 1, 1)))
+    laws = system.laws(NodeConditions.given(is_held, nothing, nothing))
+    columns = BoundaryColumns.of(mesh, material, system._order, takes_slopes=True)
+    inverse = Preconditioner.of(mesh, material, columns, laws)
+    right = np.cos(np.arange(2.0 * mesh.n_elements + 4.0) / 1e4)
+    unknowns = inverse.apply(right)
+    assert np.abs(inverse.apply(3.0 * right) / 3.0 - unknowns).max() < 1e-12 * np.abs(unknowns).max()
+
+
+def test_what_is_not_stored_of_the_whole_boundary() -> None:
+    mesh = mesh_of("hole", 100)
+    order = np.random.default_rng(0).permutation(100)
+    own = WholeBoundary.of(mesh, MATERIAL, order, takes_slopes=True)
+    stored = boundary_border(mesh, MATERIAL, order, slopes=True, has_holes=True)
+    state = np.random.default_rng(1).standard_normal((100, 4))
+    np.testing.assert_allclose(own.errors, stored.errors)
+    np.testing.assert_allclose(own.balances(state), stored.balances @ state.ravel())
 
 
 def test_groups_are_short_where_conditions_change_and_their_number_hardly_grows() -> None:
