@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from bemkit.operators.linear.solvers import Automatic as Automatic
     from bemkit.operators.linear.solvers import DenseCholesky as DenseCholesky
     from bemkit.operators.linear.solvers import Hierarchical as Hierarchical
-    from bemkit.operators.linear.solvers import Krylov as Krylov
+    from bemkit.operators.linear.solvers import MatrixFree as MatrixFree
     from bemkit.operators.material import Material as Material
     from bemkit.operators.material import Plane as Plane
     from bemkit.operators.somigliana.fields import InteriorFields as InteriorFields
@@ -172,7 +172,7 @@ _HOME = {
     "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace"),
     "geometry.symmetry": ("Symmetry",),
     "operators.boundary": ("adjoint_double_layer", "assemble", "double_layer", "hypersingular", "mass", "single_layer"),
-    "operators.linear.solvers": ("Automatic", "DenseCholesky", "Hierarchical", "Krylov"),
+    "operators.linear.solvers": ("Automatic", "DenseCholesky", "Hierarchical", "MatrixFree"),
     "operators.material": ("Material", "Plane"),
     "operators.somigliana.fields": ("InteriorFields",),
     "operators.somigliana.stress": ("principal_stresses", "von_mises"),

@@ -7,15 +7,12 @@ from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.solvers import (
     Automatic,
     ChosenLinearSolver,
-    DenseCholesky,
     Hierarchical,
-    Krylov,
     LinearSolverChoice,
 )
 from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver, choose_galerkin_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.scene import LARGEST_KRYLOV_ERROR
 
 
 def linear_solver_of(
@@ -37,8 +34,7 @@ def linear_solver_of(
     hindrance = discretisation.why_dense(case.mesh)
     if not discretisation.is_symmetric:
         return choose_collocation_solver(requested, case, memory, hindrance)
-    is_inexact = isinstance(requested, Automatic) and Krylov().error_at(case.material) > LARGEST_KRYLOV_ERROR
-    dense = choose_linear_solver(DenseCholesky() if is_inexact else requested, space.n_dofs, case.n_retained, memory)
+    dense = choose_linear_solver(requested)
     if not isinstance(requested, Automatic | Hierarchical):
         return dense
     n_tractions = discretisation.traction_space(case.mesh).n_dofs

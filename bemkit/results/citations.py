@@ -8,7 +8,6 @@ from types import MappingProxyType
 
 from bemkit.geometry.curves import Segment
 from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody
-from bemkit.operators.linear.solvers import Krylov
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.bibliography import PACKAGE, Work, works
 from bemkit.results.solution import Solution
@@ -103,14 +102,7 @@ def cite(subject: Scene | Assembly | Solution | AssemblySolution) -> Citations:
     methods = [Method("bemkit", (PACKAGE,)), *_of_bodies(stated), *_of_contact(stated)]
     if not isinstance(subject, Scene | Assembly):
         methods += _of_run(subject)
-    elif isinstance(subject.linear_solver, Krylov):
-        methods.append(_CONJUGATE_GRADIENTS)
     return Citations(tuple(dict.fromkeys(methods)), stated.reference)
-
-
-_CONJUGATE_GRADIENTS = Method(
-    "block conjugate gradients with the hypersingular operator", ("OLeary1980", "Dubrulle2001", "SteinbachWendland1998")
-)
 
 
 def _of_bodies(stated: Scene | Assembly) -> Iterator[Method]:
@@ -161,8 +153,9 @@ def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:
 
 
 def _of_run(solution: Solution | AssemblySolution) -> Iterator[Method]:
-    if isinstance(solution.plan.linear_solver, Krylov):
-        yield _CONJUGATE_GRADIENTS
+    if any("fast multipole" in item.reason for item in solution.plan.items):
+        yield Method("products by the fast multipole method", ("GreengardRokhlin1987", "Muskhelishvili1953"))
+        yield Method("GMRES with sums over a hierarchy", ("SaadSchultz1986", "BramblePasciakXu1990"))
     if any(item.is_needed and "multigrid" in item.name for item in solution.plan.items):
         yield Method("algebraic multigrid", ("RugeStueben1987",))
     messages = [record.message for record in solution.history]

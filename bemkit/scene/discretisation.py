@@ -14,7 +14,13 @@ from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver
+from bemkit.operators.linear.solvers import (
+    ChosenLinearSolver,
+    DenseCholesky,
+    Hierarchical,
+    LinearSolver,
+    MatrixFree,
+)
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
@@ -104,8 +110,10 @@ class Discretisation(Protocol):
         """Whether the elastic energy may be negative on a mesh, so that the stiffness has to be examined."""
         return False
 
-    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
-        """Return the map with its equations compressed over a tree, the usual one unless `why_dense` is empty."""
+    def hierarchical_map(
+        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
+    ) -> SteklovPoincare:
+        """Return the map with its equations compressed or not stored, the usual one unless `why_dense` is empty."""
         return self.elastic_map(mesh, material, DenseCholesky())
 
     def chosen_map(self, mesh: BoundaryMesh, material: Material, chosen: ChosenLinearSolver) -> SteklovPoincare:
@@ -247,10 +255,13 @@ class Galerkin(SymmetricGalerkin):
             return "a half-plane has a map of its own"
         return "" if set(self._degrees) <= {self.largest_degree} <= {1, 2} else "elements are not of degree 1 or 2"
 
-    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
+    def hierarchical_map(
+        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
+    ) -> SteklovPoincare:
         """Return the compressed map."""
         from bemkit.operators.steklov_poincare.hierarchical_galerkin import HierarchicalGalerkin
 
+        assert isinstance(options, Hierarchical)  # `why_stored` leaves no other choice
         return HierarchicalGalerkin(mesh, material, options, self.displacement_space(mesh), self.traction_space(mesh))
 
     def _on(self, mesh: BoundaryMesh) -> IntArray | None:
@@ -360,8 +371,10 @@ class ConstantCollocation(Discretisation):
         """Whether elements are too long for the thickness of the body."""
         return bool(thinness_warnings(mesh))
 
-    def hierarchical_map(self, mesh: BoundaryMesh, material: Material, options: Hierarchical) -> SteklovPoincare:
-        """Return the compressed map."""
+    def hierarchical_map(
+        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree
+    ) -> SteklovPoincare:
+        """Return the map whose equations are compressed or not stored."""
         from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
         return HierarchicalCollocation(mesh, material, options, slopes=self.slopes)
@@ -370,6 +383,10 @@ class ConstantCollocation(Discretisation):
         """Return what collocation takes, and warn of bodies that are thin for their elements."""
         if case.linear_solver.hierarchical is None:
             needs = collocation_needs(case, takes_slopes=self.slopes)
+        elif isinstance(case.linear_solver.hierarchical, MatrixFree):
+            from bemkit.operators.steklov_poincare.matrix_free_needs import matrix_free_needs
+
+            needs = matrix_free_needs(case, case.linear_solver.hierarchical, takes_slopes=self.slopes)
         else:
             from bemkit.operators.steklov_poincare.hierarchical_needs import hierarchical_needs
 

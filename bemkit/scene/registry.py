@@ -26,12 +26,15 @@ class Registry:
         Name of the entry-point group by which installed packages add classes; empty if there is none.
     variants : mapping of (str, str, str) to str, optional
         A word, a key and a value of that key that together name another word.
+    retired : mapping of str to str, optional
+        Words of former versions, and what to take instead.
     """
 
     role: str
     built_in: Mapping[str, str] = field(repr=False)
     group: str = ""
     variants: Mapping[tuple[str, str, str], str] = field(default_factory=dict, repr=False)
+    retired: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     def without_variant(self, table: Mapping[str, Any]) -> dict[str, Any]:
         """Return a table whose kind is the word that its kind and another key name together."""
@@ -58,6 +61,8 @@ class Registry:
         if kind in installed:
             return self._load(installed[kind])
         known = self.words()
+        if kind in self.retired:
+            raise InputError(f"the {self.role} {kind!r} is no more: {self.retired[kind]}")
         raise InputError(
             f"unknown {self.role} {shorten(kind)}: the known ones are {', '.join(known)}{closest(kind, known)}"
         )
@@ -223,8 +228,11 @@ LINEAR_SOLVERS = Registry(
     {
         "automatic": "bemkit.operators.linear.solvers:Automatic",
         "direct": "bemkit.operators.linear.solvers:DenseCholesky",
-        "krylov": "bemkit.operators.linear.solvers:Krylov",
         "hierarchical": "bemkit.operators.linear.solvers:Hierarchical",
+        "matrix-free": "bemkit.operators.linear.solvers:MatrixFree",
+    },
+    retired={
+        "krylov": "take 'hierarchical', faster and smaller for constant, linear and quadratic elements, or 'automatic'"
     },
 )
 

@@ -24,7 +24,7 @@ from bemkit.geometry.selection import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
-from bemkit.operators.linear.solvers import Automatic, Krylov, LinearSolverChoice
+from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
 from bemkit.scene.conditions import Contact, Part
@@ -36,9 +36,6 @@ from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-
-LARGEST_KRYLOV_ERROR = 1e-4
-"""Largest relative error of conjugate gradients: energies and forces on the contact boundary err by its square."""
 
 
 class NoContactError(InputError):
@@ -88,7 +85,7 @@ class Scene(ShownInNotebooks):
     ValueError
         If the title is empty, two parts share a name, a part names an unknown side, a load factor is missing or not
         finite, times do not increase, a law needs slip or time without steps, body forces act in an exterior, an
-        accuracy is asked of collocation, conjugate gradients are asked of collocation, or a law with friction or a
+        accuracy is asked of collocation, or a law with friction or a
         solver is given without any contact.
     GeometryError
         If the outline of the shape is not a valid boundary.
@@ -122,8 +119,6 @@ class Scene(ShownInNotebooks):
         if not self.contact_parts:
             self._check_without_contact()
         check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
-        if isinstance(self.linear_solver, Krylov):
-            self._check_krylov(self.linear_solver)
         if self.mesh.accuracy is not None:
             self._check_accuracy(self.mesh.accuracy)
         elif self.discretisation.needs_accuracy:
@@ -156,19 +151,6 @@ class Scene(ShownInNotebooks):
                     f"{name} is {getattr(self, name)!r}, but no part is in contact: leave the {name} out, or give one "
                     "part the condition 'contact' with an obstacle"
                 )
-
-    def _check_krylov(self, solver: Krylov) -> None:
-        if not self.discretisation.is_symmetric:
-            raise InputError(
-                f"linear_solver is {solver}, which needs symmetric equations, and those of "
-                f"{self.discretisation.method} are not: choose the discretisation 'linear' or 'quadratic', or leave "
-                "the linear solver out"
-            )
-        if (error := solver.error_at(self.material)) > LARGEST_KRYLOV_ERROR:
-            raise InputError(
-                f"linear_solver is {solver} at the Poisson ratio {self.material.poisson_ratio}, where its rtol leaves "
-                f"errors of {error:.0e}: choose 'direct', or leave the linear solver out"
-            )
 
     def _check_accuracy(self, accuracy: float) -> None:
         if not self.discretisation.estimates_error:

@@ -372,8 +372,9 @@ try:
 except SystemExit as end:
     assert end.code == 0
 wanted = {"matplotlib", "meshio", "h5py", "rich", "pyamg", "distributed", "scipy.sparse"}
-names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.linear.multigrid", "operators.cache",
-    "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console", "runs.adaptive")
+names = ("operators.somigliana.fields", "operators.somigliana.moments", "operators.hierarchy.matrix_free",
+    "operators.cache", "results.interior", "pictures.files", "results.result_file", "hdf5", "cli.console",
+    "runs.adaptive")
 wanted |= {f"bemkit.{name}" for name in names}
 print(sorted(wanted & set(sys.modules)), file=sys.stderr)
 from importlib.util import find_spec

@@ -16,7 +16,6 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.linear.solvers import Krylov
 from bemkit.operators.material import Plane
 from bemkit.runs.history import UnsolvableSceneError
 
@@ -84,17 +83,6 @@ def test_nearly_and_fully_incompressible_blocks_carry_their_weight() -> None:
         solution = bk.run(block(material=bk.Material(1.0, ratio)))
         np.testing.assert_allclose(solution.contact.sigma_n, -1.0, rtol=1e-7)
         assert np.abs(solution.boundary.displacement).max() < 1e-6
-
-
-def test_iteration_gives_the_same() -> None:
-    direct, iterative = (
-        bk.run(block(shape=bk.Rectangle(1.0, 2.0), linear_solver=each))
-        for each in (
-            bk.DenseCholesky(),
-            Krylov(rtol=1e-10),
-        )
-    )
-    np.testing.assert_allclose(iterative.contact.sigma_n, direct.contact.sigma_n, rtol=1e-7)
 
 
 def rotating_displacement(r: FloatArray, material: bk.Material, a: float = 0.0, b: float = 1.0) -> FloatArray:

@@ -10,7 +10,6 @@ import pytest
 
 import bemkit as bk
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
-from bemkit.operators.linear.solvers import Krylov
 from bemkit.plan import make_plan
 from bemkit.results.result_file import read_result, write_result
 from bemkit.scene.toml import load_scene, with_overrides
@@ -76,9 +75,6 @@ SCENES: dict[str, Callable[[], bk.Scene]] = {
     "symmetry, constant": lambda: block("constant", symmetry=bk.Symmetry(x=1.0)),
     "held by contact alone": lambda: block("quadratic"),
     "nu = 1/2": lambda: block("linear", poisson_ratio=0.5),
-    "Krylov": lambda: paper("linear", linear_solver=Krylov(coarsest=20)),
-    "Krylov, quadratic, load history": lambda: paper("quadratic", linear_solver=Krylov(), load_factors=(0.5, 1.0)),
-    "Krylov, nu = 1/2": lambda: dataclasses.replace(block("linear", poisson_ratio=0.5), linear_solver=Krylov()),
     "nu = 1/2, quadratic": lambda: block("quadratic", poisson_ratio=0.5),
 }
 
@@ -121,9 +117,7 @@ LEFT_OUT = {
         "operators.linear.dense.DenseLU.__init__",
         "operators.integrals.inner.far_inner",
         "operators.integrals.curved_panels.fit",
-        "operators.linear.solvers.Krylov.factor",
     ),
-    "Krylov": ("operators.linear.solvers.DenseCholesky.factor", "operators.steklov_poincare.galerkin._symmetric_sum"),
     "no contact": (
         "contact.condensation.dense_body.DenseBody.__init__",
         "solvers.base._Run.finish",
@@ -177,7 +171,7 @@ def test_a_later_load_step_adds_right_hand_sides_at_most(discretisation: bk.Disc
     assert two.work == one.work + OperationCounts(right_hand_sides=n_columns)
 
 
-@pytest.mark.parametrize("kind", ["constant", "Krylov", "load history, linear"])
+@pytest.mark.parametrize("kind", ["constant", "load history, linear"])
 def test_plan_counts_and_memory_return_from_a_file(kind: str, tmp_path: Path) -> None:
     solution = dataclasses.replace(bk.run(SCENES[kind]()), memory={"solve": 123})
     write_result(tmp_path / "result.h5", solution)

@@ -14,7 +14,6 @@ from bemkit.cli.main import main
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
-from bemkit.operators.linear.solvers import DefiniteOperator, Factor, Krylov, LinearSolver
 from bemkit.operators.material import Material
 from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
@@ -33,20 +32,6 @@ def needed(scene: Scene) -> dict[str, bool]:
 
 def reasons(scene: Scene) -> dict[str, str]:
     return {item.name: item.reason for item in plan_of(scene).items}
-
-
-class Borrowed:
-    """A linear solver of somebody else, which iterates."""
-
-    forms_matrix = False
-
-    def factor(self, operator: DefiniteOperator, name: str) -> Factor:
-        """Return what Krylov returns."""
-        return Krylov().factor(operator, name)
-
-
-def replace_solver(scene: Scene, solver: LinearSolver) -> Scene:
-    return dataclasses.replace(scene, linear_solver=solver)
 
 
 def block(*conditions: tuple[str, Condition]) -> Scene:
@@ -113,15 +98,10 @@ def test_what_is_left_out_depends_on_the_scene() -> None:
     assert not needed(without)["columns of V on the free surface"]
 
 
-def test_pyamg_is_needed_only_where_the_preconditioner_is_coarsened() -> None:
-    name, linear = "algebraic multigrid (pyamg)", block(("left", Clamped()))
-    n_free = plan_of(linear).sizes.n_free
-    factored, coarsened = (replace_solver(linear, Krylov(coarsest=n)) for n in (n_free, n_free - 1))
-    assert reasons(linear)[name] == "the linear solver is direct"
-    assert not needed(factored)[name]
-    assert reasons(factored)[name] == f"the preconditioner is factored: its order {n_free} does not exceed {n_free}"
-    assert needed(coarsened)[name]
-    assert reasons(replace_solver(linear, Borrowed()))[name] == "the linear solver is Borrowed"
+def test_pyamg_is_not_needed_by_direct_solvers() -> None:
+    linear = block(("left", Clamped()))
+    assert not needed(linear)["algebraic multigrid (pyamg)"]
+    assert reasons(linear)["algebraic multigrid (pyamg)"] == "the linear solver is direct"
 
 
 def test_the_pressure_of_an_incompressible_body_is_one_more_unknown_of_galerkin_maps_alone() -> None:
@@ -161,9 +141,6 @@ TRACED = {
     "quadratic": with_overrides(load_scene("paper-1"), elements=120, discretisation="quadratic"),
     "frictionless": with_overrides(load_scene("wavy-obstacle"), elements=200, discretisation="linear"),
     "contact all along": with_overrides(load_scene("receding-layer"), elements=200, discretisation="constant"),
-    "Krylov": dataclasses.replace(
-        with_overrides(load_scene("paper-1"), elements=160, discretisation="linear"), linear_solver=Krylov()
-    ),
     "curved": with_overrides(load_scene("disc-between-plates"), elements=200, discretisation="linear"),
     "few linear": with_overrides(load_scene("paper-1"), elements=100, discretisation="linear"),
     "few curved": with_overrides(load_scene("disc-between-plates"), elements=50, discretisation="quadratic"),

@@ -23,9 +23,6 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap, LoadedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
-_ERROR = 10.0
-"""Largest error of tractions and displacements by the tolerance of the compression; two to four on bodies from a strip
-of 100 : 1 to a plate with a hole."""
 _SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 500_000, 100, 8
 """Points where a residual is evaluated: so many that their pairs with all elements take about as long as a response."""
 _KEPT = 3
@@ -79,8 +76,8 @@ class HierarchicalBody(LinearBody):
 
     @property
     def accuracy(self) -> float:  # type: ignore[override]
-        """Ten times the tolerance of the compression."""
-        return _ERROR * self.loaded.map.options.tolerance
+        """What the linear solver says."""
+        return self.loaded.map.options.accuracy
 
     @property
     def is_costly(self) -> bool:  # type: ignore[override]

@@ -20,7 +20,6 @@ from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_moti
 from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.block_cg import NotConvergedError
 from bemkit.operators.linear.blocks import diagonal_blocks
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
@@ -207,8 +206,6 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
     ------
     SingularMatrixError
         If supports and contacts, all sticking, do not hold a body; the message names it.
-    NotConvergedError
-        If an iterative linear solver does not converge.
     """
     bodies = prepared.bodies
     elastic: list[SteklovPoincare | None] = [None] * len(bodies)
@@ -223,7 +220,7 @@ def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
             map_ = first.scene.discretisation.chosen_map(first.own_mesh.unit, material, chosen)
             loaded = map_ if first_inside is None else HeavyElasticity(map_, first_inside)
             base = loaded.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
-        except (SingularMatrixError, NotConvergedError) as error:
+        except SingularMatrixError as error:
             raise type(error)(f"body {first.name!r}: {error}") from error
         work += base.work
         for number in group.tolist():

@@ -26,6 +26,8 @@ from bemkit.operators.material import Material
 
 _POINTS = 16
 """Of the Gauss rule on an element; round-off where the element is not longer than the hole is wide."""
+_POINTS_OF_LINES = 2
+"""Enough for a dilatation along straight elements; the points of a million of them take memory."""
 _CANDIDATES = 64
 """Places along a hole from which the middle of it is sought."""
 
@@ -98,7 +100,8 @@ class _Field:
 
 def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
     """Return the field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor."""
-    whole, arcs = mesh.whole, Arcs.of(mesh.whole)
+    whole = mesh.whole
+    arcs = Arcs.of(whole, _POINTS_OF_LINES if whole.is_straight.all() else _POINTS)
     z, arm, dz = arcs.z, arcs.arm, arcs.dz
     centre, factor = _plane(mesh.centre), 1.0 - 2.0 * material.effective_poisson_ratio
     return _Field(
@@ -192,10 +195,10 @@ class Arcs:
     dz: ComplexArray
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh) -> Arcs:
+    def of(cls, mesh: BoundaryMesh, n_points: int = _POINTS) -> Arcs:
         """Return all elements of a mesh, images not counted."""
         elements = np.arange(mesh.n_elements)
-        xi, weights = gauss_legendre(_POINTS)
+        xi, weights = gauss_legendre(n_points)
         z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
         return cls(_plane(mesh.start), _plane(mesh.end), z, z - _plane(mesh.centres)[:, None], dz)
 

@@ -8,6 +8,7 @@ element; its entries are the displacement that a unit of it causes. Displacement
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,6 +26,7 @@ _PAIRS = 16384
 NOWHERE = -1
 """Element of a point that is the middle of none."""
 _NOTHING = np.zeros((0, 0), complex)
+Densities: TypeAlias = tuple[ComplexArray, ComplexArray, ComplexArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,22 +189,45 @@ class BoundaryColumns:
         traction, displacement : (n_elements, 2) arrays
             By place.
         """
-        t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
-        s, x = np.zeros_like(u), self.centre[places]
-        result = 0.5 * u[places]
-        if self.slopes is not None and self.means is not None:
-            around = u[self.neighbours]
-            s, u = np.sum(self.slopes * around, axis=0), u + np.sum(self.means * around, axis=0)
+        result = self.layers(places, np.arange(self.start.size), self.densities(traction, displacement))
+        return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[places]
+
+    def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
+        """Return complex tractions, constant parts and slopes of displacements, each (n,), from (n, 2) arrays."""
+        t, u = (each[:, 0] + 1j * each[:, 1] for each in (traction, displacement))
+        if self.slopes is None or self.means is None:
+            return t, u, np.zeros_like(u)
+        mean, slope = u.copy(), np.zeros_like(u)
+        for k, places in enumerate(self.neighbours):
+            mean += self.means[k] * u[places]
+            slope += self.slopes[k] * u[places]
+        return t, mean, slope
+
+    def layers(self, places: IntArray, elements: IntArray, densities: Densities) -> ComplexArray:
+        """Return T u - U t, complex (n,), in the middle of some elements, as caused by other ones.
+
+        Parameters
+        ----------
+        places : (n,) array
+        elements : (m,) array
+            Ascending.
+        densities : tuple of (n_elements,) complex arrays
+            As `densities` returns them.
+        """
+        x = self.centre[places]
+        t, u, s = (each[elements] for each in densities)
         if self.curved is None and (fast := compiled.functions()) is not None:
-            result += fast.applied(self.constants.numbers, x, places, self.start, self.end, t, u, s)
-            return np.stack([result.real, result.imag], axis=1)
+            ends = self.start[elements], self.end[elements]
+            values: ComplexArray = fast.applied(self.constants.numbers, x, _counted(places, elements), *ends, t, u, s)
+            return values
+        result = np.zeros(x.size, complex)
         step = max(1, _PAIRS // max(places.size, 1))
         for begin in range(0, t.size, step):
-            some = np.arange(begin, min(begin + step, t.size))
-            fields = self._element_fields(x, places, some)
-            for field, density in zip(fields, (-t, -t.conj(), u, u.conj(), s, s.conj()), strict=True):
-                result += field @ density[some]
-        return np.stack([result.real, result.imag], axis=1)
+            some = slice(begin, begin + step)
+            factors = -t[some], -t[some].conj(), u[some], u[some].conj(), s[some], s[some].conj()
+            for field, factor in zip(self._element_fields(x, places, elements[some]), factors, strict=True):
+                result += field @ factor
+        return result
 
     def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
         """Return complex displacements (n_points, n_columns)."""
@@ -229,9 +254,7 @@ class BoundaryColumns:
         """Return what some elements, ascending, cause; see `element_fields.element_fields`."""
         if self.curved is not None:
             return self.curved.fields(x, places, elements)
-        counted = np.searchsorted(elements, places)
-        counted[elements[np.minimum(counted, elements.size - 1)] != places] = NOWHERE
-        return element_fields(self.constants, x, counted, self.start[elements], self.end[elements])
+        return element_fields(self.constants, x, _counted(places, elements), self.start[elements], self.end[elements])
 
     def _moved(self, fields: ComplexArray, elements: IntArray, touched: IntArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the factors of displacements of elements and of their conjugates, with slopes."""
@@ -246,3 +269,9 @@ class BoundaryColumns:
             total += fields[4][:, at] * slopes + fields[2][:, at] * means
             total_conjugate += fields[5][:, at] * slopes.conj() + fields[3][:, at] * means.conj()
         return total, total_conjugate
+
+
+def _counted(places: IntArray, elements: IntArray) -> IntArray:
+    """Return where places stand among some elements, ascending; `NOWHERE` if they do not."""
+    counted = np.searchsorted(elements, places)
+    return np.where(elements[np.minimum(counted, elements.size - 1)] == places, counted, NOWHERE)

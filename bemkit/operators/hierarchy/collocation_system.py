@@ -56,7 +56,7 @@ def collocation_system(
     may_differ = np.repeat(np.stack([may_be_traction, may_be_displacement], axis=1), 2, axis=1)
     may_differ = np.concatenate([may_differ, np.tile([True, True, False, False], (len(holes), 1))])
     compression = Compression.of(columns, tree, may_differ[tree.order], tolerance)
-    border = _border(mesh, material, tree.order, slopes, has_holes=not holes)
+    border = boundary_border(mesh, material, tree.order, slopes, has_holes=not holes)
     return HierarchicalSystem(compression, border, frame, mesh.diameter / n / material.plane_modulus)
 
 
@@ -67,7 +67,9 @@ def _holes(mesh: BoundaryMesh) -> list[IntArray]:
     return [loop for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True) if area <= 0.0]
 
 
-def _border(mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool, *, has_holes: bool) -> Border:
+def boundary_border(
+    mesh: BoundaryMesh, material: Material, order: IntArray, slopes: bool, *, has_holes: bool
+) -> Border:
     """Return the errors and balances that the equations of collocation have besides, by place.
 
     Those of holes are among them unless these have places of their own.

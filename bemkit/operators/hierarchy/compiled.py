@@ -35,6 +35,15 @@ def functions() -> ModuleType | None:
     return _loaded()[0]
 
 
+def products() -> ModuleType | None:
+    """Return the module of the compiled products, None if numpy has to do."""
+    if functions() is None:
+        return None
+    from bemkit.operators.hierarchy import compiled_products
+
+    return compiled_products
+
+
 @cache
 def _loaded() -> tuple[ModuleType | None, str]:
     if not is_installed():

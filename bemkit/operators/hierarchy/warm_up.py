@@ -12,6 +12,7 @@ from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_pairs import ElementPairs
+from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
@@ -67,3 +68,5 @@ def _use(mesh: BoundaryMesh) -> None:
         columns = boundary_columns(mesh, Material(1.0, 0.3), tree.order, takes_slopes=takes_slopes)
         Compression.of(columns, tree, np.ones((n, 4), bool), 1e-6)
         columns.applied(np.arange(n), np.ones((n, 2)), np.ones((n, 2)))
+        if columns.curved is None:
+            FastMultipole(columns, tree, 1e-6).applied(np.ones((n, 2)), np.ones((n, 2)))

@@ -72,11 +72,6 @@ class Cholesky:
         return (self.factorisation,)
 
     @property
-    def iterations(self) -> tuple[()]:
-        """None: a factorisation does not iterate."""
-        return ()
-
-    @property
     def lower(self) -> FloatArray:
         """The factor L, zero above its diagonal."""
         return np.tril(self._factor)

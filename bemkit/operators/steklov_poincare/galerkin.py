@@ -18,12 +18,17 @@ from bemkit.geometry.vectors import turned_right
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.forms import mass_product
 from bemkit.operators.linear.dense import Cholesky, multiply
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Hierarchical, LinearSolver, LinearSolverChoice
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    DenseCholesky,
+    Hierarchical,
+    LinearSolver,
+    LinearSolverChoice,
+    MatrixFree,
+)
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
-from bemkit.operators.steklov_poincare.free_stiffness import FreeStiffness
-from bemkit.operators.steklov_poincare.iterative import IterativeCondensation, check_is_held
-from bemkit.operators.steklov_poincare.layer_operators import Layers, assemble_layers, dilatation_of
+from bemkit.operators.steklov_poincare.layer_operators import assemble_layers, dilatation_of
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.schur import SchurCondensation
@@ -95,30 +100,22 @@ class GalerkinElasticity:
         self.material = material
         self.displacement_space = LinearSpace(mesh) if displacement_space is None else displacement_space
         self.traction_space = ConstantSpace(mesh) if traction_space is None else traction_space
-        if isinstance(linear_solver, Automatic | Hierarchical):
+        if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
-                f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), Krylov(), or what "
+                f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), or what "
                 "bemkit.operators.linear.choice.choose_linear_solver returns for it"
             )
         self.linear_solver: LinearSolver = linear_solver
 
     @cached_property
     def factors(self) -> GalerkinFactors:
-        """What the map is made of when S is formed, computed on first use."""
-        layers = self.__dict__.get("layers") or self._assemble()
+        """What the map is made of, computed on first use."""
+        layers = assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
         whitened_trace = layers.whitened_trace()
         work = layers.work + OperationCounts(right_hand_sides=whitened_trace.shape[1])
         return GalerkinFactors(
             _symmetric_sum(layers.hypersingular, whitened_trace), layers.single_layer, whitened_trace, work
         )
-
-    @cached_property
-    def layers(self) -> Layers:
-        """What the map is made of when only products with S are wanted, computed on first use."""
-        return self._assemble()
-
-    def _assemble(self) -> Layers:
-        return assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
 
     @cached_property
     def _pressures(self) -> FloatArray:
@@ -177,8 +174,7 @@ class GalerkinElasticity:
 
     def _without_pressure(self, displacement: FloatArray) -> FloatArray:
         """Return S u for the columns of (n_dofs, m) displacements, without the uniform pressure."""
-        is_formed = "factors" in self.__dict__ or "layers" not in self.__dict__
-        return multiply(self.factors.matrix, displacement) if is_formed else self.layers.apply(displacement)
+        return multiply(self.factors.matrix, displacement)
 
     def keep(self, factors: GalerkinFactors) -> None:
         """Take over the factors of an equal map, so that nothing is assembled any more."""
@@ -186,20 +182,7 @@ class GalerkinElasticity:
 
     def condense(self, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
         """Eliminate every direction that is not retained, by a Schur complement, with the linear solver of the map."""
-        condense = self._condense_matrix if self.linear_solver.forms_matrix else self._condense_products
-        return condense(self.linear_solver, conditions, force)
-
-    def _condense_products(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Condense without forming S."""
-        stiffness = FreeStiffness(self.layers, self.displacement_space, conditions)
-        check_is_held(stiffness, dof_points(self.displacement_space), _HELD_BODY)
-        factor = solver.factor(stiffness, _HELD_BODY)
-        volume = self._volume.in_frames(conditions.frame)
-        return IterativeCondensation(stiffness, factor, volume).condense(force, self.layers.work)
-
-    def _condense_matrix(self, solver: LinearSolver, conditions: NodalConditions, force: FloatArray) -> CondensedMap:
-        """Condense the formed S."""
-        condensation = SchurCondensation(self.factors.matrix, self._volume, conditions, solver, _HELD_BODY)
+        condensation = SchurCondensation(self.factors.matrix, self._volume, conditions, self.linear_solver, _HELD_BODY)
         first = condensation.under(force, conditions.displacement)
         return replace(first, work=self.factors.work + condensation.work + first.work)
 
@@ -226,10 +209,8 @@ class GalerkinElasticity:
 
     def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
         """Return V^-1 (1/2 M + K) u (n_traction_dofs,) on tractions without uniform pressures."""
-        if "factors" in self.__dict__ or "layers" not in self.__dict__:
-            factors = self.factors
-            return factors.single_layer.solve_upper(factors.whitened_trace @ displacement)
-        return self.layers.tractions(displacement[:, None])[:, 0]
+        factors = self.factors
+        return factors.single_layer.solve_upper(factors.whitened_trace @ displacement)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells."""

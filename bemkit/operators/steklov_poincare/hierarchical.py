@@ -15,7 +15,7 @@ from bemkit.operators.hierarchy.collocation_system import collocation_system
 from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
-from bemkit.operators.linear.solvers import Hierarchical
+from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
@@ -31,7 +31,7 @@ class HierarchicalMap(ABC):
 
     mesh: BoundaryMesh
     material: Material
-    options: Hierarchical
+    options: Hierarchical | MatrixFree
     displacement_space: BoundarySpace
     keeps_rotations: bool
 
@@ -101,12 +101,14 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
     ----------
     mesh : BoundaryMesh
     material : Material
-    options : Hierarchical
+    options : Hierarchical or MatrixFree
     slopes : bool
         As of `CollocationElasticity`.
     """
 
-    def __init__(self, mesh: BoundaryMesh, material: Material, options: Hierarchical, *, slopes: bool = True) -> None:
+    def __init__(
+        self, mesh: BoundaryMesh, material: Material, options: Hierarchical | MatrixFree, *, slopes: bool = True
+    ) -> None:
         super().__init__(mesh, material, slopes=slopes)
         self.options, self.keeps_rotations = options, slopes
 
@@ -116,7 +118,11 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
         return self.mesh.lengths
 
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
-        """Return the compressed equations of elements."""
+        """Return the equations of elements, compressed or not stored."""
+        if isinstance(self.options, MatrixFree):
+            from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
+
+            return MatrixFreeSystem(self.mesh, self.material, conditions.frame, self.options, slopes=self.slopes)
         return collocation_system(
             self.mesh,
             self.material,

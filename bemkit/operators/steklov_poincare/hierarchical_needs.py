@@ -19,7 +19,9 @@ from bemkit.operators.linear.solvers import (
     Hierarchical,
     LinearSolver,
     LinearSolverChoice,
+    MatrixFree,
 )
+from bemkit.operators.steklov_poincare.matrix_free_needs import why_stored
 from bemkit.operators.steklov_poincare.needs import (
     BodyCase,
     BodyNeeds,
@@ -109,6 +111,11 @@ def choose_collocation_solver(
     ChosenLinearSolver
         The compressed equations if they are asked for, or promise to be at least twice as fast, or nothing else fits.
     """
+    if isinstance(requested, MatrixFree):
+        if not (stored := hindrance or why_stored(case)):
+            return ChosenLinearSolver(_DIRECT, "asked for", requested)
+        other = choose_collocation_solver(Automatic(), case, memory, hindrance)
+        return replace(other, reason=f"not matrix-free, because {stored}; {other.reason}")
     if not isinstance(requested, Automatic | Hierarchical):
         return ChosenLinearSolver(requested, "asked for")
     if hindrance := hindrance or why_dense(case):
@@ -174,7 +181,7 @@ def _gain(
 
 def hierarchical_galerkin_needs(case: BodyCase, degree: int) -> BodyNeeds:
     """Return what the compressed equations of Galerkin's method take, as `hierarchical_needs`."""
-    options, costs = case.linear_solver.hierarchical or Hierarchical(), _GALERKIN[degree]
+    options, costs = _options(case), _GALERKIN[degree]
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (
         PlanItem("boundary equations", True, f"single and double layer and hypersingular operator, {reason}"),
@@ -185,9 +192,14 @@ def hierarchical_galerkin_needs(case: BodyCase, degree: int) -> BodyNeeds:
     return replace(_needs(case, options, costs), items=items)
 
 
+def _options(case: BodyCase) -> Hierarchical:
+    chosen = case.linear_solver.hierarchical
+    return chosen if isinstance(chosen, Hierarchical) else Hierarchical()
+
+
 def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
     """Return what the compressed equations take; nothing of them is counted, because ranks are not foreseen."""
-    options = case.linear_solver.hierarchical or Hierarchical()
+    options = _options(case)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"
     reason = f"compressed over a tree to {options.tolerance:g}: {case.linear_solver.reason}"
     items = (

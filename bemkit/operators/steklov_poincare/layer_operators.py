@@ -1,4 +1,4 @@
-"""The boundary operators of a Galerkin map, and the products with S that they give without forming it."""
+"""The boundary operators of a Galerkin map."""
 
 from __future__ import annotations
 
@@ -47,31 +47,12 @@ class Layers:
     hypersingular: FloatArray
     work: OperationCounts
 
-    def whitened_trace(self, displacement: FloatArray | None = None) -> FloatArray:
-        """Return L^-1 B u less its projection on `resultant`.
-
-        Parameters
-        ----------
-        displacement : (n_dofs, m) array, optional
-            Columns u; all unit vectors if left out.
-        """
-        trace = self.trace_operator if displacement is None else multiply(self.trace_operator, displacement)
-        whitened = self.single_layer.solve_lower(trace)
+    def whitened_trace(self) -> FloatArray:
+        """Return L^-1 B less its projection on `resultant`."""
+        whitened = self.single_layer.solve_lower(self.trace_operator)
         if self.resultant.shape[1]:
             whitened -= multiply(multiply(whitened.T, self.resultant), self.resultant.T).T
         return whitened
-
-    def tractions(self, displacement: FloatArray) -> FloatArray:
-        """Return the traction dofs of the columns of (n_dofs, m) displacements."""
-        return self.single_layer.solve_upper(self.whitened_trace(displacement))
-
-    def beyond_hypersingular(self, displacement: FloatArray) -> FloatArray:
-        """Return (S - W) u for the columns of (n_dofs, m) displacements."""
-        return multiply(self.trace_operator.T, self.tractions(displacement))
-
-    def apply(self, displacement: FloatArray) -> FloatArray:
-        """Return S u for the columns of (n_dofs, m) displacements."""
-        return multiply(self.hypersingular, displacement) + self.beyond_hypersingular(displacement)
 
 
 def assemble_layers(

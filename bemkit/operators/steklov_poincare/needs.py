@@ -14,8 +14,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.integrals.sweep import CHUNK_PAIRS, sweep_memory
-from bemkit.operators.linear.choice import krylov_cost
-from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Krylov
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes
@@ -141,33 +140,24 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
         Of the displacements.
     """
     t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained
-    mesh, solver = case.mesh, case.linear_solver.solver
+    mesh = case.mesh
     assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
     holds_volume = case.material.is_incompressible and not mesh.is_exterior
     n_pressures = len(mesh.loops) if holds_volume else int(not mesh.is_exterior)
     # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
-    n_columns = len(admissible_modes(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads)
-    factorisations = [Factorisation(FactorKind.CHOLESKY, t)]
-    if solver.forms_matrix:
-        n_columns += u
-        factorisations.append(Factorisation(FactorKind.CHOLESKY, f))
-        # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
-        largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
-        own = f * f + 2 * f * r + u * case.n_fixed
-        largest, kept = max(largest, assembled + 2 * u * u + own + r * r), assembled + own
-        flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * r + 2.0 * f * r * r)
-    else:
-        # two of the free part of W, while it is factored, and the blocks of the iteration
-        iterating = assembled + 2 * f * f + int(13.5 * u * (r + 1))
-        largest = t * t + max(3 * t * u + u * u, t * u + 3 * u * u if is_curved else 0)
-        largest, kept = max(largest, iterating), assembled + f * f + 3 * u * (r + 1)
-        flops = krylov_cost(u, r).flops
+    n_columns = len(admissible_modes(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads) + u
+    factorisations = Factorisation(FactorKind.CHOLESKY, t), Factorisation(FactorKind.CHOLESKY, f)
+    # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
+    largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
+    own = f * f + 2 * f * r + u * case.n_fixed
+    largest, kept = max(largest, assembled + 2 * u * u + own + r * r), assembled + own
+    flops = 2.0 * (t**3 / 3.0 + t * t * u + t * u * u) + 2.0 * (f**3 / 3.0 + 2.0 * f * f * r + 2.0 * f * r * r)
     work = OperationCounts(
         element_pairs=mesh.n_elements * mesh.whole.n_elements,
         single_layer=Entries.full(t, t),
         double_layer=Entries.full(t, u),
         hypersingular=Entries.full(u, u),
-        factorisations=tuple(factorisations),
+        factorisations=factorisations,
         right_hand_sides=n_columns,
     )
     degrees, n_sources = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree)), mesh.whole.n_elements
@@ -182,8 +172,6 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
 def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
     t, u, choice = n_tractions, case.n_displacements, case.linear_solver
     inverse = f"V^-1 by Cholesky, because V is symmetric and positive definite; order {t}"
-    if not choice.solver.forms_matrix:
-        inverse += "; products with it are enough, it is not formed"
     is_incompressible = case.material.is_incompressible and not case.mesh.is_exterior
     volume = "Poisson's ratio is 1/2" if is_incompressible else "the body is compressible"
     return (
@@ -193,21 +181,9 @@ def _galerkin_items(case: BodyCase, n_tractions: int) -> tuple[PlanItem, ...]:
         PlanItem("hypersingular operator W", True, f"makes the Steklov-Poincare map symmetric; {u} x {u}"),
         PlanItem("Steklov-Poincare map", True, inverse),
         PlanItem("linear solver of the body", True, f"{choice.reason}; order {case.n_free}"),
-        _multigrid(case),
+        PlanItem("algebraic multigrid (pyamg)", False, "the linear solver is direct"),
         PlanItem("pressure that keeps the volume", is_incompressible, volume),
     )
-
-
-def _multigrid(case: BodyCase) -> PlanItem:
-    name, solver = "algebraic multigrid (pyamg)", case.linear_solver.solver
-    if solver.forms_matrix:
-        return PlanItem(name, False, "the linear solver is direct")
-    if not isinstance(solver, Krylov):
-        return PlanItem(name, False, f"the linear solver is {type(solver).__name__}")
-    if case.n_free <= solver.coarsest:
-        reason = f"the preconditioner is factored: its order {case.n_free} does not exceed {solver.coarsest}"
-        return PlanItem(name, False, reason)
-    return PlanItem(name, True, "preconditions the conjugate gradients")
 
 
 def collocation_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:

@@ -9,7 +9,6 @@ from typing import Protocol
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.block_cg import Iterations
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
@@ -36,9 +35,6 @@ class CondensedMap:
     sensitivity : (n_nodes, 2) array, optional
         Sum of the sizes of all forces that a unit displacement of each node causes. Of thin bodies it is many orders
         above the forces themselves, which then are differences and carry its round-off.
-    iterations : tuple of Iterations
-        What each solution for free displacements so far took that was found by iteration; see
-        `bemkit.operators.linear.solvers.Krylov`.
     work : OperationCounts
         Of the call that returned it: by `SteklovPoincare.condense` that includes the operators, by `under` it does not.
     volume_force : (3,) array, optional
@@ -57,7 +53,6 @@ class CondensedMap:
     under: Callable[[FloatArray, FloatArray], CondensedMap]
     follow: Callable[[IntArray], tuple[FloatArray, FloatArray]]
     sensitivity: FloatArray | None = None
-    iterations: tuple[Iterations, ...] = ()
     work: OperationCounts = field(default_factory=OperationCounts)
     volume_force: FloatArray | None = None
     inner_force: float = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import multiply
-from bemkit.operators.linear.solvers import Factor, LinearSolver, MatrixOperator
+from bemkit.operators.linear.solvers import Factor, LinearSolver
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
@@ -49,7 +49,7 @@ class SchurCondensation:
         self._free, self._retained, self._fixed = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_retained, conditions.is_fixed)
         )
-        self.factor = self.solver.factor(MatrixOperator(matrix[np.ix_(self._free, self._free)]), self.name)
+        self.factor = self.solver.factor(matrix[np.ix_(self._free, self._free)], self.name)
         self._coupling = matrix[np.ix_(self._free, self._retained)]
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change

@@ -12,7 +12,7 @@ from bemkit.formulas import Expression
 from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring, Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.operators.linear.solvers import Automatic, DenseCholesky, Krylov, LinearSolverChoice
+from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.discretisation import (
@@ -25,7 +25,7 @@ from bemkit.scene.discretisation import (
 )
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.scene import LARGEST_KRYLOV_ERROR, Scene
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
@@ -109,7 +109,7 @@ def _scene(draw: Draw, title: str, modulus: float, layout: dict[str, Any]) -> Sc
         factors = draw.one_of(((0.5, 1.0), (0.3, 0.6, 1.0), (1.0, 0.5), (1.0, -0.3, 0.7), (1.0, 0.0), (2.0,)))
     if mesh.accuracy is not None:
         factors = (1.0,)
-    solver, linear_solver = _solver(draw), _linear_solver(draw, discretisation, material)
+    solver, linear_solver = _solver(draw), _linear_solver(draw)
     if not any(part for part in layout["parts"] if "contact" in part.name or part.name == "shaft"):
         layout = {name: value for name, value in layout.items() if name != "law"}
         solver = SemismoothNewton()
@@ -165,11 +165,8 @@ def _solver(draw: Draw) -> ContactSolver:
     return draw.one_by_weight(drivers)
 
 
-def _linear_solver(draw: Draw, discretisation: Discretisation, material: Material) -> LinearSolverChoice:
-    weights: dict[LinearSolverChoice, float] = {Automatic(): 7.0, DenseCholesky(): 1.0, Krylov(): 2.0}
-    is_too_inexact = Krylov().error_at(material) > LARGEST_KRYLOV_ERROR
-    if not discretisation.is_symmetric or is_too_inexact:  # scenes refuse both
-        del weights[Krylov()]
+def _linear_solver(draw: Draw) -> LinearSolverChoice:
+    weights: dict[LinearSolverChoice, float] = {Automatic(): 7.0, DenseCholesky(): 3.0}
     return draw.one_by_weight(weights)
 
 

@@ -1,0 +1,261 @@
+"""Products with the single and the double layer of collocation, of which nothing is stored that grows like n^2.
+
+Elements are in the clusters of a tree, each in a disc. What a cluster causes in discs far from it comes from series of
+its complex potentials (`expansions`), what it causes nearby from the integrals in closed form, evaluated again for each
+product [GreengardRokhlin1987]. Pairs of clusters of one level are far if the distance of their centres is at least
+three times the larger radius and the smaller one together; then every power of a series is worth a factor of three.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns, Densities
+from bemkit.operators.hierarchy.expansions import Expansions
+from bemkit.operators.hierarchy.tree import ClusterTree
+from bemkit.operators.linear.threads import for_each_chunk
+
+if TYPE_CHECKING:
+    _LinearOperator: TypeAlias = LinearOperator[np.float64]
+else:
+    _LinearOperator = LinearOperator
+
+LEAF_SIZE = 40
+"""Elements of a leaf: integrals nearby and series from afar then take about the same time."""
+_CHUNK, _FEW = 256, 32
+"""Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""
+_SEPARATION = 3.0
+_FEW_POINTS, _SHORT = 4, 0.08
+"""Gauss points of an element that is so short by the radius of its leaf; a rule that is exact for all powers else."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Discs around the clusters of a level, and pairs that are far from each other but whose parents are not.
+
+    Parameters
+    ----------
+    centre : (n_clusters,) complex array [m]
+    radius : (n_clusters,) array [m]
+    target, source : (n_pairs,) arrays
+        Sorted by target.
+    """
+
+    centre: ComplexArray
+    radius: FloatArray
+    target: IntArray
+    source: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Near:
+    """Leaves that are near each leaf, itself among them, ascending.
+
+    Parameters
+    ----------
+    first : (n_leaves + 1,) array
+        Where those of each leaf begin in `source`.
+    source : (n_pairs,) array
+    """
+
+    first: IntArray
+    source: IntArray
+
+
+class FastMultipole(_LinearOperator):
+    """(1/2 + T) u - U t in the middle of all straight elements, from their tractions t and displacements u.
+
+    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryColumns.entries`.
+
+    Parameters
+    ----------
+    columns : BoundaryColumns
+        Of straight elements, without images and places of holes.
+    tree : ClusterTree
+        In whose order the elements are.
+    tolerance : float
+        Of the series, by the largest displacement that comes from afar.
+    """
+
+    def __init__(self, columns: BoundaryColumns, tree: ClusterTree, tolerance: float) -> None:
+        n = columns.n_elements
+        LinearOperator.__init__(self, np.dtype(float), (2 * n, 4 * n))  # type: ignore[call-arg]  # the stubs lack it
+        constants = columns.constants
+        self.columns, self.tree = columns, tree
+        order = math.ceil(math.log(1.0 / tolerance) / math.log(_SEPARATION)) + 1
+        self._expansions = Expansions(order, 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
+        self._levels, self._near = _interactions(columns, tree)
+
+    def _matvec(self, x: FloatArray) -> FloatArray:
+        state = np.reshape(x, (-1, 4))
+        return self.applied(state[:, :2], state[:, 2:]).ravel()
+
+    def applied(self, traction: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return (1/2 + T) u - U t, (n, 2), from tractions and displacements (n, 2); all by place."""
+        densities = self.columns.densities(traction, displacement)
+        far = self._from_afar(self._locals(self._series(densities)))
+        far += self._from_nearby(densities)
+        return far.view(float).reshape(-1, 2) + 0.5 * displacement
+
+    def _from_nearby(self, densities: Densities) -> ComplexArray:
+        """Return what the elements of the leaves that are not far from each one cause there, (n,) by place."""
+        columns, tree, near, first = self.columns, self.tree, self._near.source, self._near.first
+        fast = compiled.products()
+
+        def of_leaves(some: slice) -> ComplexArray:
+            if fast is not None:
+                geometry = columns.centre, columns.start, columns.end
+                caused: ComplexArray = fast.nearby(
+                    columns.constants.numbers, *geometry, *densities, tree.bounds, first, near, some.start, some.stop
+                )
+                return caused
+            parts = []
+            for leaf in range(some.start, some.stop):
+                elements = np.concatenate([np.r_[tree.places(0, k)] for k in near[first[leaf] : first[leaf + 1]]])
+                parts.append(columns.layers(np.r_[tree.places(0, leaf)], elements, densities))
+            return np.concatenate(parts)
+
+        chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
+        return np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2))
+
+    def _series(self, densities: tuple[ComplexArray, ComplexArray, ComplexArray]) -> list[ComplexArray]:
+        """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
+        bounds, n_leaves = self.tree.bounds, self.tree.n_leaves
+        chunks = [slice(i, min(i + _FEW, n_leaves)) for i in range(0, n_leaves, _FEW)]
+
+        def of_leaves(some: slice) -> ComplexArray:
+            places = slice(int(bounds[some.start]), int(bounds[some.stop]))
+            leaf = np.repeat(np.arange(some.start, some.stop), np.diff(bounds[some.start : some.stop + 1]))
+            return self._of_elements(places, leaf, tuple(each[places] for each in densities))
+
+        found = [np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=50 * self.columns.n_elements))]
+        for level, coarse in zip(self._levels[:-1], self._levels[1:], strict=True):
+            n = coarse.centre.size
+            parents = np.empty((n, 2, self._expansions.order + 1), complex)
+            for begin in range(0, n, _CHUNK):
+                own = np.arange(begin, min(begin + _CHUNK, n))
+                parents[own] = sum(
+                    self._expansions.of_parents(
+                        found[-1][child], level.centre[child] - coarse.centre[own], level.radius[child],
+                        coarse.radius[own],
+                    )
+                    for child in (2 * own, 2 * own + 1)
+                )  # fmt: skip
+            found.append(parents)
+        return found
+
+    def _of_elements(self, places: slice, leaf: IntArray, densities: tuple[ComplexArray, ...]) -> ComplexArray:
+        """Return the series of consecutive leaves from the densities of their elements."""
+        columns, leaves = self.columns, self._levels[0]
+        start, end, (t, u, s) = columns.start[places], columns.end[places], densities
+        half, middle = 0.5 * (end - start), 0.5 * (end + start) - leaves.centre[leaf]
+        radius, size = leaves.radius[leaf], np.abs(half)
+        is_short = size < _SHORT * radius
+        result = np.zeros((leaf[-1] + 1 - leaf[0], 2, self._expansions.order + 1), complex)
+        b, mu = columns.constants.double, self._shear_modulus
+        for n_points, chosen in ((_FEW_POINTS, is_short), (self._expansions.order // 2 + 2, ~is_short)):
+            some = np.flatnonzero(chosen)
+            if not some.size:
+                continue
+            present, first = np.unique(leaf[some], return_index=True)
+            xi, weights = gauss_legendre(n_points)
+            number = np.repeat(some, n_points)
+            x, w = np.tile(xi, some.size), np.tile(weights, some.size) * size[number]
+            density = u[number] + s[number] * x
+            normal = -1j * half[number] / size[number]
+            f = (0.5 * b) * w * t[number]  # of -t: the single layer is subtracted
+            g, e = (b * mu * w) * normal * density, (-2.0 * b * mu * w) * (normal.conj() * density).real
+            result[present - leaf[0]] += self._expansions.of_sources(
+                middle[number] + half[number] * x, radius[number], f, g, e, n_points * first
+            )
+        return result
+
+    @property
+    def _shear_modulus(self) -> float:
+        constants = self.columns.constants
+        return 0.5 * constants.double / constants.single
+
+    def _locals(self, series: list[ComplexArray]) -> ComplexArray:
+        """Return the series in the discs of all leaves of what comes from afar."""
+        inherited: ComplexArray | None = None
+        for number in range(len(self._levels) - 1, -1, -1):
+            level, n = self._levels[number], self._levels[number].centre.size
+            own = np.zeros((n, 2, self._expansions.order + 1), complex)
+            if inherited is not None:
+                above = self._levels[number + 1]
+                for begin in range(0, n, _CHUNK):
+                    some = np.arange(begin, min(begin + _CHUNK, n))
+                    arm = level.centre[some] - above.centre[some // 2]
+                    own[some] = self._expansions.of_children(
+                        inherited[some // 2], arm, above.radius[some // 2], level.radius[some]
+                    )
+            self._add_far(own, level, series[number])
+            inherited = own
+        assert inherited is not None
+        return inherited
+
+    def _add_far(self, own: ComplexArray, level: _Level, series: ComplexArray) -> None:
+        """Add to the series in discs what the clusters far from them cause."""
+        for begin in range(0, level.target.size, _CHUNK):
+            target, source = level.target[begin : begin + _CHUNK], level.source[begin : begin + _CHUNK]
+            fields = self._expansions.of_fields(
+                series[source], level.centre[source] - level.centre[target], level.radius[source], level.radius[target]
+            )
+            present, first = np.unique(target, return_index=True)
+            own[present] += np.add.reduceat(fields, first)
+
+    def _from_afar(self, series: ComplexArray) -> ComplexArray:
+        """Return complex displacements (n,) in the middle of the elements from the series in their leaves."""
+        leaves, bounds, n_leaves = self._levels[0], self.tree.bounds, self.tree.n_leaves
+        result = np.empty(self.columns.n_elements, complex)
+        for begin in range(0, n_leaves, _FEW):
+            end = min(begin + _FEW, n_leaves)
+            places = slice(int(bounds[begin]), int(bounds[end]))
+            leaf = np.repeat(np.arange(begin, end), np.diff(bounds[begin : end + 1]))
+            arm = self.columns.centre[places] - leaves.centre[leaf]
+            result[places] = self._expansions.displacements(series[leaf], arm, leaves.radius[leaf])
+        return np.asarray(result / (2.0 * self._shear_modulus))
+
+
+def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Level], _Near]:
+    """Return the levels from the leaves up to the last one with pairs, and the leaves near each leaf."""
+    discs = [_discs(columns, tree, level) for level in range(tree.n_levels + 1)]
+    pairs, levels = np.zeros((1, 2), np.intp), []
+    for number in range(tree.n_levels, -1, -1):
+        centre, radius = discs[number]
+        if number < tree.n_levels:
+            children = 2 * pairs[:, None, :] + np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+            pairs = children.reshape(-1, 2)
+        of_pair = radius[pairs]
+        distance = np.abs(centre[pairs[:, 0]] - centre[pairs[:, 1]])
+        is_far = _SEPARATION * of_pair.max(axis=1) + of_pair.min(axis=1) < distance
+        far, pairs = pairs[is_far], pairs[~is_far]
+        far = far[np.argsort(far[:, 0], kind="stable")]
+        levels.append(_Level(centre, radius, far[:, 0], far[:, 1]))
+    while len(levels) > 1 and not levels[0].target.size:
+        del levels[0]
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    near = _Near(np.searchsorted(pairs[:, 0], np.arange(tree.n_leaves + 1)), np.ascontiguousarray(pairs[:, 1]))
+    return levels[::-1], near
+
+
+def _discs(columns: BoundaryColumns, tree: ClusterTree, level: int) -> tuple[ComplexArray, FloatArray]:
+    """Return centres and radii of discs around the clusters of a level, from the boxes around their end nodes."""
+    begins = tree.bounds[: -1 : 2**level]
+    counts = np.diff(np.append(begins, columns.n_elements))
+    ends = np.stack([columns.start, columns.end])
+    low, high = (
+        of.reduceat(of.reduce(ends.real), begins) + 1j * of.reduceat(of.reduce(ends.imag), begins)
+        for of in (np.minimum, np.maximum)
+    )
+    centre = 0.5 * (low + high)
+    farthest = np.abs(ends - np.repeat(centre, counts)).max(axis=0)
+    return centre, np.maximum.reduceat(farthest, begins)
