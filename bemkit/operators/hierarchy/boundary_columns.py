@@ -273,5 +273,7 @@ class BoundaryColumns:
 
 def _counted(places: IntArray, elements: IntArray) -> IntArray:
     """Return where places stand among some elements, ascending; `NOWHERE` if they do not."""
+    if not elements.size:
+        return np.full_like(places, NOWHERE)
     counted = np.searchsorted(elements, places)
     return np.where(elements[np.minimum(counted, elements.size - 1)] == places, counted, NOWHERE)
