@@ -151,7 +151,7 @@ class _Near:
         self.log = 0.5 * (log_start - log_end) - 1j * angle
         turned = self.zeta * self.log
         self.moment = turned - 2.0
-        self.quotient = 2.0 / np.where(is_own, -1.0, plus * minus)  # on the element eta is zero
+        self.quotient = np.asarray(2.0 / np.where(is_own, -1.0, plus * minus), complex)  # on the element eta is zero
         self.of_moment = self.zeta * self.quotient - self.log
         self.logs = 0.5 * (log_start + log_end) - 2.0 * np.log(half) + turned.real
 
