@@ -93,7 +93,8 @@ def element_fields(
     square = inverse * inverse
     series, rest = _power_series(SERIES, square), _power_series(REST, square)
     log, moment = near.put(2.0 * (inverse + inverse * series), near.log), near.put(2.0 * series, near.moment)
-    quotient, of_moment = near.put(2.0 * (series + rest), near.quotient), near.put(2.0 * inverse * rest, near.of_moment)
+    quotient: ComplexArray = near.put(2.0 * (series + rest), near.quotient)
+    of_moment = near.put(2.0 * inverse * rest, near.of_moment)
     # log|zeta^2 - 1| + Re(zeta L)
     squared = (np.square(zeta.real) + np.square(zeta.imag)) * np.abs(1.0 - square)
     logs = near.put(np.log(squared) + 2.0 + moment.real, near.logs)
