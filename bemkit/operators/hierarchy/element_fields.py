@@ -17,13 +17,16 @@ there L = 2 sum zeta^-(2k+1) / (2k+1), and the others follow from the same sum.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.series import FAR, SERIES
+from bemkit.operators.hierarchy.series import FAR, REST, SERIES
 from bemkit.operators.material import Material
+
+Values = TypeVar("Values", FloatArray, ComplexArray)
 
 
 @dataclass(frozen=True)
@@ -81,61 +84,79 @@ def element_fields(
     if (fast := compiled.functions()) is not None:
         values: ComplexArray = fast.element_fields(constants.numbers, x, places, start, end)
         return values
-    place = _Place(x, start, end, places[:, None] == np.arange(start.size))
-    result = np.empty((6, *place.eta.shape), complex)
-    log, moment, quotient, of_moment = place.integrals()
+    near = _Near(x, start, end, places)
+    half = 0.5 * np.abs(end - start)
+    tangent = (end - start) / (2.0 * half)
+    zeta = (x[:, None] - 0.5 * (start + end)) * (tangent.conj() / half)
+    zeta[near.pairs] = FAR  # anything far: these are replaced
+    inverse = 1.0 / zeta
+    square = inverse * inverse
+    series, rest = _power_series(SERIES, square), _power_series(REST, square)
+    log, moment = near.put(2.0 * (inverse + inverse * series), near.log), near.put(2.0 * series, near.moment)
+    quotient: ComplexArray = near.put(2.0 * (series + rest), near.quotient)
+    of_moment = near.put(2.0 * inverse * rest, near.of_moment)
+    # log|zeta^2 - 1| + Re(zeta L)
+    squared = (np.square(zeta.real) + np.square(zeta.imag)) * np.abs(1.0 - square)
+    logs = near.put(np.log(squared) + 2.0 + moment.real, near.logs)
+    eta = near.put(zeta.imag.copy(), near.zeta.imag)
+    result = np.empty((6, *zeta.shape), complex)
     nu = constants.poisson_ratio
-    a, kappa = constants.single * place.half, 3.0 - 4.0 * nu
-    logs = 0.5 * (place.log_start + place.log_end) + place.zeta.real * log.real - place.eta * log.imag
-    result[0] = a * (1.0 + kappa * (2.0 + 2.0 * np.log(constants.log_length) - logs))
-    result[1].real, result[1].imag = 1.0 + place.eta * log.imag, place.eta * log.real
-    result[1] *= a * place.tangent**2
+    a, kappa = constants.single * half, 3.0 - 4.0 * nu
+    result[0] = a * (1.0 + kappa * (2.0 + 2.0 * np.log(constants.log_length / half) - logs))
+    result[1].real, result[1].imag = 1.0 + eta * log.imag, eta * log.real
+    result[1] *= a * tangent**2
     rates = -constants.double * (2.0 - 2.0 * nu), -constants.double * (1.0 - 2.0 * nu)
     result[2].real, result[2].imag = -rates[0] * log.imag, rates[1] * log.real
     result[4].real, result[4].imag = -rates[0] * moment.imag, rates[1] * moment.real
-    turned = (-constants.double * place.tangent**2) * place.eta
-    result[3] = turned * quotient.conj()
-    result[5] = turned * of_moment.conj()
+    turned = (-constants.double * tangent**2) * eta
+    np.multiply(turned, quotient.conj(), out=result[3])
+    np.multiply(turned, of_moment.conj(), out=result[5])
     return result
 
 
-class _Place:
-    """Where points are, seen from elements: all arrays (n_points, n_elements) but those of elements alone."""
+def _power_series(factors: tuple[float, ...], q: ComplexArray) -> ComplexArray:
+    """Return f1 q + f2 q^2 + ...; the last factor comes first."""
+    result = factors[0] * q
+    for factor in factors[1:]:
+        result += factor
+        result *= q
+    return result
 
-    def __init__(self, x: ComplexArray, start: ComplexArray, end: ComplexArray, is_own: BoolArray) -> None:
-        span = end - start
-        self.is_own = is_own
-        self.half = 0.5 * np.abs(span)
-        self.tangent = span / (2.0 * self.half)
-        to_start, to_end = x[:, None] - start, x[:, None] - end
-        to_local = self.tangent.conj() / self.half
+
+class _Near:
+    """Closed forms of all pairs of points and elements that are not far from each other.
+
+    `pairs` are their indices; all other arrays are by pair: zeta, L, zeta L - 2, G, -L + zeta G, and log|zeta^2 - 1|
+    with Re(zeta L).
+    """
+
+    def __init__(self, x: ComplexArray, start: ComplexArray, end: ComplexArray, places: IntArray) -> None:
+        away, span = x[:, None] - 0.5 * (start + end), end - start
+        of_span = np.square(span.real) + np.square(span.imag)
+        self.pairs = np.nonzero(np.square(away.real) + np.square(away.imag) <= (0.25 * FAR**2) * of_span)
+        point, element = self.pairs
+        is_own, span = places[point] == element, span[element]
+        half = 0.5 * np.abs(span)
+        to_start, to_end = x[point] - start[element], x[point] - end[element]
+        to_local = (span / (2.0 * half)).conj() / half
         # near an end node the coordinate across the element is known from there alone
         plus, minus = to_start * to_local, to_end * to_local
-        self.product = plus * minus  # zeta^2 - 1
         self.zeta = 0.5 * (plus + minus)
         squared_start = np.square(to_start.real) + np.square(to_start.imag)
         squared_end = np.square(to_end.real) + np.square(to_end.imag)
-        self.log_start, self.log_end = np.log(squared_start), np.log(squared_end)
-        self.log_ratio = 0.5 * (self.log_start - self.log_end)
+        self.zeta.imag = np.where(squared_start < squared_end, plus.imag, minus.imag)
+        self.zeta.imag[is_own] = 0.0
         turn = to_start.conj() * to_end
-        self.angle = np.where(is_own, 0.0, np.arctan2(turn.imag, turn.real))
-        is_nearer_start = squared_start < squared_end
-        eta = np.where(is_own, 0.0, np.where(is_nearer_start, plus.imag, minus.imag))
-        self.zeta.imag = eta
-        self.eta = eta
+        angle = np.where(is_own, 0.0, np.arctan2(turn.imag, turn.real))
+        log_start, log_end = np.log(squared_start), np.log(squared_end)
+        self.log = 0.5 * (log_start - log_end) - 1j * angle
+        turned = self.zeta * self.log
+        self.moment = turned - 2.0
+        self.quotient = np.asarray(2.0 / np.where(is_own, -1.0, plus * minus), complex)  # on the element eta is zero
+        self.of_moment = self.zeta * self.quotient - self.log
+        self.logs = 0.5 * (log_start + log_end) - 2.0 * np.log(half) + turned.real
 
-    def integrals(self) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """Return L, zeta L - 2, G and -L + zeta G, far from the element by the series."""
-        quotient = np.asarray(2.0 / np.where(self.is_own, -1.0, self.product), complex)  # on the element eta is zero
-        log = np.asarray(self.log_ratio - 1j * self.angle, complex)
-        moment = self.zeta * log - 2.0
-        of_moment: ComplexArray = self.zeta * quotient - log
-        far = np.nonzero(np.square(self.zeta.real) + np.square(self.zeta.imag) > FAR**2)
-        inverse = 1.0 / self.zeta[far]
-        square = inverse * inverse
-        series = np.zeros_like(square)
-        for factor in SERIES:
-            series = (series + factor) * square
-        log[far], moment[far] = 2.0 * inverse * (1.0 + series), 2.0 * series
-        of_moment[far] = 2.0 * inverse * (square / (1.0 - square) - series)
-        return log, moment, quotient, of_moment
+    def put(self, of_all: Values, values: Values) -> Values:
+        """Replace the values of these pairs in an array (n_points, n_elements)."""
+        of_all[self.pairs] = values
+        return of_all

@@ -83,11 +83,11 @@ class LevelView(ABC):
         return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
 
     def guess(self, n_candidates: int, elements: IntArray) -> int | None:
-        """Return a guess of the rank; none where random combinations would lose the smallest elements."""
+        """Return a guess of the rank, none where random combinations would lose the smallest elements."""
         lengths = self.columns.lengths[elements]
         if lengths.max(initial=0.0) > _UNEVEN * lengths.min(initial=np.inf):
             return None
-        return 50 + n_candidates // 6 if self.is_lowest else 2 * n_candidates // 3
+        return 34 + n_candidates // 5 if self.is_lowest else 3 * n_candidates // 5
 
     def proxies(self, cluster: int) -> ComplexArray:
         """Return the points that stand for all that is far from a cluster."""
@@ -134,8 +134,8 @@ class CollocationView(LevelView):
         forces = of.of_forces(point_forces(x, proxies, of.constants.poisson_ratio, circle), points, proxies)
         blocks = [Block(forces, np.ones(len(forces)))]
         for kind in (0, 1):
-            seen = near_columns[(near_columns // 2) % 2 == kind]
-            blocks.append(Block(of.fields(x, points, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
+            if (seen := near_columns[(near_columns // 2) % 2 == kind]).size:
+                blocks.append(Block(of.fields(x, points, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
         return sketched(
             blocks,
             np.sqrt(of.lengths[rows // 2]),

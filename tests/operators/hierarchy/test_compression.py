@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
+from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, extents, n_proxies
@@ -39,6 +40,26 @@ def test_blocks_between_leaves_follow_from_their_skeletons(
             error = np.abs(leaves[one].row_map.matrix() @ few @ leaves[two].column_map.matrix().T - block).max()
             # ten times: interpolation multiplies what pivoted QR leaves out, which is measured in mean squares
             assert error <= 10.0 * tolerance * np.abs(block).max() + 1e-14
+
+
+@pytest.mark.parametrize("is_compiled", [False, True], ids=["numpy", "numba"])
+def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatch, is_compiled: bool) -> None:
+    if is_compiled:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(compiled, "functions", lambda: None)
+    mesh = discretise(L_SHAPE.outline(), n_elements=240).unit
+    tree = ClusterTree.of(mesh.centres, 24)
+    columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
+    place = columns.centre.real + 2.0 * columns.centre.imag
+    for kind in (0, 1):
+        may_differ = np.tile(np.arange(4) // 2 == kind, (mesh.n_elements, 1))
+        compression = Compression.of(columns, tree, may_differ, 1e-9)
+        values = may_differ * np.cos(place[:, None] + np.arange(4))
+        exact = columns.applied(np.arange(mesh.n_elements), values[:, :2], values[:, 2:])
+        error = compression.product(values.reshape(-1, 1))[:, 0] - exact.ravel()
+        # sums over all elements of errors below the tolerance each
+        assert np.abs(error).max() <= 1e-8 * np.abs(exact).max()
 
 
 def test_skeletons_stay_small_on_thin_bodies() -> None:
