@@ -11,6 +11,9 @@ from bemkit.contact.problem import ContactProblem, ContactState
 _ROUND_OFF = 1e-13
 """Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
 ones mean something, however small they are."""
+_HELD = 100.0
+"""Tractions of the sticking state measure those in a state that are so many times smaller at most: to 1e-9 of them
+these are known to 1e-7, and where few nodes carry all, by the mean of an element, to 1e-6."""
 DEFORMED = 1e-3
 """Share of its displacement by which a body counts as deformed that contact does not touch: more than round-off of the
 displacement leaves to a tolerance of 1e-9, less than the load may deform a body that has given way to an overlap."""
@@ -75,7 +78,7 @@ def certify(problem: ContactProblem, state: ContactState) -> Certificate:
     Notes
     -----
     Tractions are measured by the largest traction in the state or in the sticking state (all nodes held), whichever is
-    larger, so that a nearly lifted body is judged by its load; but by no more than a thousand times those in the state.
+    larger, so that a nearly lifted body is judged by its load; but by no more than a hundred times those in the state.
     Of several bodies each contact is measured so by the one of its partners that carries less, down to a thousandth of
     what the others carry: a light block is not judged by the heaviest; see `LinearBody.shares`.
     A node to which that would give more than the largest nodal force is measured by this force, so that tractions of
@@ -135,11 +138,11 @@ def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
         # Holding a nearly incompressible body may take a million times the tractions of the answer, which these must
         # not excuse.
         stress, force = (
-            max(float((by * present).max()), min(float((by * sticking).max()), 1e3 * float((by * at_hand).max())))
+            max(float((by * present).max()), min(float((by * sticking).max()), _HELD * float((by * at_hand).max())))
             for by in (1.0, weights)
         )
         least = 1e-6 * furthest
-        share = problem.body.shares(weights * np.maximum(present, np.minimum(sticking, 1e3 * at_hand)))
+        share = problem.body.shares(weights * np.maximum(present, np.minimum(sticking, _HELD * at_hand)))
         return _Scales(stress, force, max(force / modulus, least), least, share)
     # Contact does nothing here, so the displacement is the only length there is. A body that has not moved is measured
     # by what would hold it or, if even that is nothing, by the gaps.

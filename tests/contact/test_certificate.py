@@ -142,7 +142,7 @@ def test_what_is_left_of_tractions_is_measured_by_itself_not_by_those_that_would
     assert certify(problem, clean).worst < 1e-12
     left = clean.traction.copy()
     left[4, 0] = 1e-9 * sticking
-    assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-3)
+    assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-2)
     left[4, 0] = 1e-14 * sticking  # the round-off of sums of terms as large as the tractions of the sticking state
     assert certify(problem, ContactState(lifted, left)).tension == pytest.approx(1e-14)
 
@@ -164,4 +164,4 @@ def test_friction_without_pressure_is_not_excused_by_the_tractions_that_would_ho
     state = ContactState(slid, np.zeros_like(slid))
     assert certify(problem, state).worst < 1e-12
     resisted = problem.with_law(Tresca(1e-10 * sticking))
-    assert certify(resisted, state).slip_opposition == pytest.approx(1e-3)
+    assert certify(resisted, state).slip_opposition == pytest.approx(1e-2)

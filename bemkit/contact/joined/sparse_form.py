@@ -63,7 +63,9 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     ties = scaled @ (on_displacement @ compliance.by_force + on_force) @ given.by_kept @ scaled
     moved = scaled @ on_displacement @ compliance.by_motion @ sparse.diags_array(motion)
     balance = sparse.diags_array(motion) @ compliance.by_motion.T @ given.by_kept @ scaled
-    matrix = sparse.block_array([[ties, moved], [balance, None]], format="csr")
+    # all blocks in one format, also the empty one, are put together without sorting their entries anew
+    blocks = [[ties, moved], [balance, sparse.csr_array((motion.size, motion.size))]]
+    matrix = sparse.block_array([[sparse.csr_array(block) for block in row] for row in blocks], format="csr")
     values = row * (conditions.value.ravel()[kept] - on_displacement @ at_rest - on_force @ given.at_rest)
     rest = motion * -(joined.motions.T @ joined.load + compliance.by_motion.T @ given.at_rest)
     solution = _solved(matrix, np.append(values, rest), n_motions=motion.size)
@@ -111,16 +113,19 @@ def _blocks(blocks: FloatArray) -> sparse.csr_array:
 
 def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) -> FloatArray:
     """Return the solution, with every row scaled to a largest entry of one and its residual checked."""
-    sizes = abs(matrix).max(axis=1).toarray().ravel()
+    terms = abs(matrix)
+    sizes = terms.max(axis=1).toarray().ravel()
     if not sizes.all():
         raise SingularResponse("a condition at a contact node involves neither displacement nor stiffness")
-    scaled = sparse.csr_array(sparse.diags_array(1.0 / sizes) @ matrix)
-    right_side, terms = right_side / sizes, abs(scaled)
+    by_row = np.repeat(1.0 / sizes, np.diff(matrix.indptr))
+    scaled = sparse.csr_array((matrix.data * by_row, matrix.indices, matrix.indptr), matrix.shape)
+    terms.data *= by_row
+    right_side = right_side / sizes
     probe = 0.5 + np.modf(np.arange(1, len(right_side) + 1) * 0.6180339887498949)[0]
     right_sides, is_motion = np.stack([right_side, probe], axis=1), np.arange(len(right_side)) >= len(probe) - n_motions
     rcond = 0.0
     for penalty in _PENALTIES:
-        solutions, residual = _refined(scaled, right_sides, np.where(is_motion, -penalty, 0.0))
+        solutions, residual = _refined(scaled, terms, right_sides, np.where(is_motion, -penalty, 0.0))
         if residual <= _LARGEST_RESIDUAL:
             rcond = 1.0 / (float(terms.sum(axis=1).max()) * float(np.abs(solutions[:, 1]).max()))
             if rcond > _SMALLEST_RCOND:
@@ -129,9 +134,13 @@ def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) ->
     raise SingularResponse(f"the contact conditions do not hold the bodies (reciprocal condition {rcond:.1e})")
 
 
-def _refined(matrix: sparse.csr_array, right_sides: FloatArray, penalty: FloatArray) -> tuple[FloatArray, float]:
-    """Solve with the factors of a matrix with a penalty until residuals fall no more; return the largest one."""
-    terms = abs(matrix)
+def _refined(
+    matrix: sparse.csr_array, terms: sparse.csr_array, right_sides: FloatArray, penalty: FloatArray
+) -> tuple[FloatArray, float]:
+    """Solve with the factors of a matrix with a penalty until residuals fall no more; return the largest one.
+
+    The terms are the sizes of its entries.
+    """
     solutions, before = np.zeros_like(right_sides), np.inf
     try:
         with factored(sparse.csr_array(matrix + sparse.diags_array(penalty))) as solve:
