@@ -142,13 +142,12 @@ class FastMultipole(_LinearOperator):
             parents = np.empty((n, 2, self._expansions.order + 1), complex)
             for begin in range(0, n, _CHUNK):
                 own = np.arange(begin, min(begin + _CHUNK, n))
-                parents[own] = sum(
-                    self._expansions.of_parents(
-                        found[-1][child], level.centre[child] - coarse.centre[own], level.radius[child],
-                        coarse.radius[own],
-                    )
-                    for child in (2 * own, 2 * own + 1)
-                )  # fmt: skip
+                children, above = np.arange(2 * begin, 2 * begin + 2 * own.size), np.repeat(own, 2)
+                arm = level.centre[children] - coarse.centre[above]
+                moved = self._expansions.of_parents(
+                    found[-1][children], arm, level.radius[children], coarse.radius[above]
+                )
+                parents[own] = moved[::2] + moved[1::2]
             found.append(parents)
         return found
 
