@@ -80,7 +80,7 @@ def test_the_estimates_are_near_the_errors(name: str) -> None:
         if degree_of(solution) > 2:
             assert solution.estimated_traction_error is not None
             assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 2.5
-    solution = next(each for each in risen(name, 3e-5) if degree_of(each) == 6)
+    solution = next(each for each in risen(name, 3e-5) if degree_of(each) > 4)
     assert solution.estimated_error is not None
     assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
 
@@ -196,7 +196,7 @@ def test_layers_follow_places_that_move() -> None:
 
 def test_free_elements_gain_by_degrees() -> None:
     """Their tractions are round-off, which does not fall, and say nothing of their error."""
-    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) == 6)
+    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) > 4)
     errors, loaded = solution.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
     assert errors is not None
     free = np.setdiff1d(np.arange(solution.mesh.n_elements), loaded)
