@@ -18,12 +18,12 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.meshing.layers import (
     FACTOR,
-    SHORTEST,
     has_same_pieces,
     is_at_end,
     layered_partition,
     origins,
     refined_partition,
+    shortest_length,
 )
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.coefficient_decay import CoefficientErrors
@@ -88,7 +88,7 @@ class LayeredMeshes:
         if errors is None:
             return
         worst = int(np.argmax(self._share(solution, errors)))
-        if mesh.lengths[worst] < 2.0 / FACTOR * SHORTEST * mesh.lengths.sum():
+        if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
             x, y = mesh.centres[worst]
             raise GeometryError(
                 f"the largest error stands at ({x:.6g}, {y:.6g}), where an element of the length "
