@@ -10,29 +10,34 @@ all images of an element are gathered into its own, with the signs that the comp
 
 from __future__ import annotations
 
+import bisect
 import enum
+import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from threading import Lock
 from typing import TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, Run, consecutive_runs
+from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
-from bemkit.operators.integrals.sweep import PairSweep
+from bemkit.operators.integrals.sweep import FEW, PairSweep
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
 
 Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
 """The xx, xy, yx, yy entries, each (n_test_polynomials, n_trial_polynomials, n_rows, n_trial); None is zero."""
+
+
+_Kind: TypeAlias = tuple[IntArray, tuple[BoundarySpace, ...]]
+"""Elements of one degree, and the spaces as they see them."""
 
 
 class Block:
@@ -50,6 +55,11 @@ class Block:
     def measure(self) -> FloatArray:
         """The products of the lengths, (n_rows, n_trial): the integrals of P_0(xi) P_0(t) themselves."""
         return (4.0 * self.test_half) * self.trial_half
+
+    def columns(self, chosen: slice) -> Block:
+        """Return those of some trial elements, not copied."""
+        trial_half = self.trial_half[0, chosen]
+        return Block(self.integrals.take(chosen), self.test_half[:, 0], trial_half, self.log_scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,46 +183,51 @@ def assemble_block(form: PairForm, rows: IntArray, columns: IntArray) -> FloatAr
 
 
 def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: IntArray) -> int:
-    """Add the pairs of some elements, of any two degrees in turn; return how many there are."""
-    forms = [target.form for target in targets]
+    """Add the pairs of some elements, of any degrees; return how many there are.
+
+    Each two degrees have a sweep of their own, but few straight elements, whose pairs share more if they are in one.
+    """
+    mesh, forms = targets[0].form.test.mesh, [target.form for target in targets]
     spaces = [space for form in forms for space in (form.test, form.trial)]
-    kinds = [list(of_one_degree(spaces, elements)) for elements in (test_elements, trial_elements)]
-    n_pairs = 0
-    for (tests, seen_by_test), (trials, seen_by_trial) in product(*kinds):
-        seen = zip(targets, forms, seen_by_test[::2], seen_by_trial[1::2], strict=True)
-        blocks = [
-            _TargetBlock(target, replace(form, test=test, trial=trial), tests, trials)
-            for target, form, test, trial in seen
+    tests, trials = (list(of_one_degree(spaces, elements)) for elements in (test_elements, trial_elements))
+    n_trial = trial_elements.size * (mesh.whole.n_elements // mesh.n_elements)
+    if n_trial <= FEW and mesh.is_straight.all():
+        return _fill_kinds(targets, tests, trials)
+    return sum(_fill_kinds(targets, [test], [trial]) for test, trial in itertools.product(tests, trials))
+
+
+def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequence[_Kind]) -> int:
+    """Sweep over the pairs of elements of some degrees; return their number."""
+    mesh = targets[0].form.test.mesh
+    blocks = [
+        [
+            _Rows(target, elements, seen[2 * k], [(own, other[2 * k + 1]) for own, other in trials])
+            for k, target in enumerate(targets)
         ]
-        n_pairs += _fill_blocks(blocks, tests, trials)
-    return n_pairs
-
-
-def _fill_blocks(blocks: Sequence[_TargetBlock], test_elements: IntArray, trial_elements: IntArray) -> int:
-    """Sweep over the pairs of some elements; return their number."""
-    forms = [block.form for block in blocks]
-    mesh = forms[0].test.mesh
+        for elements, seen in tests
+    ]
     degrees = Degrees()
-    for form in forms:
+    for form in (form for kind in blocks for rows in kind for form in rows.forms):
         degrees |= form.degrees
-    n_images = mesh.whole.n_elements // mesh.n_elements
-    trial = np.concatenate([image * mesh.n_elements + trial_elements for image in range(n_images)])
-    sweep = PairSweep(mesh.whole, degrees, test_elements, trial)
-    half = 0.5 * mesh.whole.lengths
-    test_half, trial_half = half[test_elements], half[trial]
-    log_scale = float(np.log(mesh.diameter))
+    images = range(0, mesh.whole.n_elements, mesh.n_elements)
+    test = np.concatenate([elements for elements, _ in tests])
+    trial = np.concatenate([image + elements for elements, _ in trials for image in images])
+    sweep = PairSweep(mesh.whole, degrees, test, trial)
+    edges: list[int] = np.cumsum([0, *(elements.size for elements, _ in tests)]).tolist()
+    half, log_scale = 0.5 * mesh.whole.lengths, float(np.log(mesh.diameter))
     lock = Lock()
 
     def fill(rows: slice) -> int:
-        integrals = Block(sweep.chunk(rows), test_half[rows], trial_half, log_scale)
-        for block in blocks:
-            gathered = block.gather(integrals)
+        pairs = Block(sweep.chunk(rows), half[test[rows]], half[trial], log_scale)
+        kind = bisect.bisect_right(edges, rows.start) - 1
+        for block in blocks[kind]:
+            gathered = block.gather(pairs)
             with lock:  # two chunks share the rows of the node between them
-                block.add(rows, gathered)
-        return integrals.test_half.size * integrals.trial_half.size
+                block.add(slice(rows.start - edges[kind], rows.stop - edges[kind]), gathered)
+        return pairs.test_half.size * trial.size
 
-    n_integrals = sweep.test.size * sweep.trial.size * degrees.n_products
-    return sum(for_each_chunk(fill, sweep.row_slices(), n_integrals=n_integrals))
+    n_integrals = test.size * trial.size * degrees.n_products
+    return sum(for_each_chunk(fill, sweep.row_slices(edges), n_integrals=n_integrals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,64 +263,56 @@ class _Target:
         return self.matrix.reshape(2 * self.test_nodes.size, -1)
 
 
-class _TargetBlock:
-    """What elements of one test and one trial degree add to a matrix.
+class _Rows:
+    """What test elements of one degree add to a matrix."""
 
-    Only the trial nodes of these elements have a column in what is gathered.
-    """
-
-    def __init__(self, target: _Target, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> None:
-        self.form = form
+    def __init__(
+        self, target: _Target, elements: IntArray, test: BoundarySpace, trials: Sequence[tuple[IntArray, BoundarySpace]]
+    ) -> None:
+        self.forms = [replace(target.form, test=test, trial=trial) for _, trial in trials]
         self._matrix = target.matrix
-        self._test_dofs = np.searchsorted(target.test_nodes, form.test.element_dofs[test_elements])
-        trial_nodes = np.unique(form.trial.element_dofs[trial_elements])
-        self._n_columns = trial_nodes.size
-        self._columns = _end_and_inner(np.searchsorted(target.trial_nodes, trial_nodes))
-        self._test_coefficients = form.test_coefficients
-        self._terms = form.trial_terms()
-        n = trial_elements.size
-        self._images = [
-            (
-                slice(image * n, (image + 1) * n),
-                signs.tolist(),
-                _Scatter(np.searchsorted(trial_nodes, dofs[trial_elements])),
-            )
-            for image, (_, signs, dofs) in enumerate(element_images(form.trial))
-        ]
+        self._test_dofs = np.searchsorted(target.test_nodes, test.element_dofs[elements])
+        self._test_coefficients = self.forms[0].test_coefficients
+        self._parts, first = [], 0
+        for form, (own, trial) in zip(self.forms, trials, strict=True):
+            images = [
+                (slice(k * own.size, (k + 1) * own.size), signs.tolist(), _Scatter(target.trial_nodes, dofs[own]))
+                for k, (_, signs, dofs) in enumerate(element_images(trial))
+            ]
+            last = first + own.size * len(images)
+            self._parts.append((slice(first, last), form.trial_terms(), images))
+            first = last
 
     def gather(self, block: Block) -> FloatArray:
         """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes, 2), by their own dofs."""
         n_rows, test = block.test_half.shape[0], self._test_coefficients
-        gathered = np.zeros((test.shape[1], n_rows, 2, self._n_columns, 2))
-        for term in self._terms:
-            degrees = slice(test.shape[1]), slice(term.coefficients.shape[1])
-            for index, values in enumerate(term.tensor(block, *degrees)):
-                if values is None:
-                    continue
-                component = index % 2
-                local = _combined(term.coefficients, values)
-                for elements, signs, scatter in self._images:
-                    own = local[..., elements]
-                    scatter.add(gathered[:, :, index // 2, :, component], own if signs[component] == 1.0 else -own)
+        gathered = np.zeros((test.shape[1], n_rows, 2, self._matrix.shape[2], 2))
+        for columns, terms, images in self._parts:
+            part = block.columns(columns)
+            for term in terms:
+                degrees = slice(test.shape[1]), slice(term.coefficients.shape[1])
+                for index, values in enumerate(term.tensor(part, *degrees)):
+                    if values is None:
+                        continue
+                    component = index % 2
+                    local = _combined(term.coefficients, values)
+                    for elements, signs, scatter in images:
+                        own = local[..., elements]
+                        scatter.add(gathered[:, :, index // 2, :, component], own if signs[component] == 1.0 else -own)
         return _combined(test, gathered.reshape(1, test.shape[1], -1)).reshape(-1, *gathered.shape[1:])
 
     def add(self, rows: slice, gathered: FloatArray) -> None:
         """Add the gathered rows to the matrix."""
         for values, dofs in zip(gathered, self._test_dofs[rows].T, strict=True):
             for positions, nodes in consecutive_runs(dofs):
-                for own, columns in self._columns:
-                    added = values[positions, :, own]
-                    if isinstance(nodes, np.ndarray) and isinstance(columns, np.ndarray):
-                        self._matrix[np.ix_(nodes, np.arange(2), columns)] += added
-                    else:
-                        self._matrix[nodes, :, columns] += added
+                self._matrix[nodes] += values[positions]
 
 
 class _Scatter:
-    """Adds values of the local dofs of elements to those of the dofs (n_elements, n_local)."""
+    """Adds values of the local dofs of elements, `element_dofs` (n_elements, n_local), to those of some nodes."""
 
-    def __init__(self, dofs: IntArray) -> None:
-        n_local = dofs.shape[1]
+    def __init__(self, nodes: IntArray, element_dofs: IntArray) -> None:
+        dofs, n_local = np.searchsorted(nodes, element_dofs), element_dofs.shape[1]
         ranges = [range(first, last) for first in (0, 1) for last in (n_local, n_local - 1) if first < last]
         # inner dofs are numbered element by element, all of them in one go
         self._inner = next((each for each in ranges if (np.diff(dofs[:, each].ravel()) == 1).all()), range(0))
@@ -324,18 +331,9 @@ class _Scatter:
                 target[..., dofs] += values[:, k, :, positions]
 
 
-def _end_and_inner(dofs: IntArray) -> list[Run]:
-    """Split ascending dofs into some and the last ones, which follow each other: positions and dofs.
-
-    In a space of several degrees the inner dofs of elements of one degree do, and slices need no index for each entry.
-    """
-    first = int(np.max(np.flatnonzero(np.diff(dofs) != 1), initial=-1)) + 1
-    return [*consecutive_runs(dofs[:first]), (slice(first, None), slice(int(dofs[first]), int(dofs[-1]) + 1))]
-
-
 def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:
     """Return sums (m, n_local, ...) of (m, n_polynomials, ...) values by coefficients (n_local, n_polynomials)."""
-    if np.array_equal(coefficients, np.eye(*coefficients.shape)):
+    if coefficients.shape == (1, 1) and coefficients[0, 0] == 1.0:  # of constants
         return values
     m, n_polynomials, *shape = values.shape
     return np.asarray(np.matmul(coefficients, values.reshape(m, n_polynomials, -1)).reshape(m, -1, *shape))

@@ -21,7 +21,7 @@ DEGREES_PER_LAYER = 1.5
 1.7."""
 MOST_KINDS = 3
 """Different degrees of one mesh."""
-SWEEP, PRODUCT, ENTRY = 2e-2, 6.5e-7, 1.3e-9
+SWEEP, PRODUCT, ENTRY = 5e-3, 3e-7, 2e-9
 """Seconds for a sweep over the pairs of two degrees, for each product of polynomials on a pair of elements, and for the
 third power of the number of nodes (measured)."""
 

@@ -18,12 +18,12 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import element_degrees
 from bemkit.geometry.meshing.layers import (
     FACTOR,
-    SHORTEST,
     has_same_pieces,
     is_at_end,
     layered_partition,
     origins,
     refined_partition,
+    shortest_length,
 )
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.coefficient_decay import CoefficientErrors
@@ -38,8 +38,8 @@ FEWEST_LEVELS = 4
 """Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
 GAIN = 6.0
 """Factor by which a degree and the layers that come with it reduce the error."""
-LARGEST_RISE = 2
-"""Degrees from mesh to mesh: the places where the status changes must keep up."""
+LARGEST_RISE, LAST_RISE = 2, 3
+"""Degrees from mesh to mesh: the places where the status changes must keep up; and where that is the last mesh."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
@@ -88,7 +88,7 @@ class LayeredMeshes:
         if errors is None:
             return
         worst = int(np.argmax(self._share(solution, errors)))
-        if mesh.lengths[worst] < 2.0 / FACTOR * SHORTEST * mesh.lengths.sum():
+        if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
             x, y = mesh.centres[worst]
             raise GeometryError(
                 f"the largest error stands at ({x:.6g}, {y:.6g}), where an element of the length "
@@ -111,13 +111,17 @@ class LayeredMeshes:
         if level.number == 0:
             return Level(level.asked, fresh, 2 if self.accuracy < FINE else 1)
         has_moved = has_same_pieces(partition, fresh)
-        rise = self._rise(solution, ~is_at_end(partition)) if has_moved else 0
-        following = Level(level.asked, fresh, level.number + rise)
+        needed = self._needed_rise(solution, ~is_at_end(partition)) if has_moved else 0
+        is_last = has_moved and needed <= LAST_RISE
+        following = Level(level.asked, fresh, level.number + (needed if is_last else min(needed, LARGEST_RISE)))
         old_degrees = element_degrees(level.scene.discretisation.displacement_space(solution.mesh))
         degree = following.scene.discretisation.displacement_space(solution.mesh).degree
+        goal = SAFETY * self.accuracy
+        if not is_last:
+            goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
         resolution = max(self.accuracy, FLICKER)
-        refined = refined_partition(partition, self._excess(solution, degree - old_degrees), cuts, resolution)
+        refined = refined_partition(partition, self._excess(solution, degree - old_degrees, goal), cuts, resolution)
         degrees: tuple[int, ...] = ()
         if has_moved and level.asked.discretisation.needs_accuracy:
             degrees = self._degrees(solution, partition, refined, old_degrees, degree)
@@ -149,12 +153,12 @@ class LayeredMeshes:
             excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / (allowed * size**2)))
         return excess
 
-    def _rise(self, solution: Solution, inner: BoolArray) -> int:
+    def _needed_rise(self, solution: Solution, inner: BoolArray) -> int:
         """Return how many degrees the errors of the inner elements need, one for those at the ends, none for places."""
         allowed = SAFETY * self.accuracy
         needed = np.log(max(self._element_error(solution, inner), allowed) / allowed) / np.log(GAIN)
         is_inexact = self._element_error(solution, np.ones_like(inner)) > allowed
-        return int(np.clip(np.ceil(needed), int(is_inexact), LARGEST_RISE))
+        return max(int(np.ceil(needed)), int(is_inexact))
 
     def _element_error(self, solution: Solution, chosen: BoolArray) -> float:
         """Return the larger one of the relative errors of some elements, in energy and in contact tractions."""
@@ -165,14 +169,13 @@ class LayeredMeshes:
         tractions = float(errors.traction[contact[chosen[contact]]].sum()) / size**2 if size > 0.0 else 0.0
         return float(np.sqrt(max(energy, tractions)))
 
-    def _excess(self, solution: Solution, rise: IntArray) -> FloatArray:
-        """Return by which factor (n_elements,) the errors at higher degrees would be above what is allowed to each."""
+    def _excess(self, solution: Solution, rise: IntArray, goal: float) -> FloatArray:
+        """Return by which factor (n_elements,) errors at higher degrees would be above their shares of a goal."""
         errors = solution.coefficient_errors
         if errors is None:
             raise InputError(
                 f"{solution.scene.discretisation.method} has no error estimate: take another discretisation"
             )
-        goal = max(SAFETY * self.accuracy, self.error(solution) / GAIN**LARGEST_RISE)
         errors = errors.at_higher_degrees(rise)
         excess = _excess_of(errors.energy, solution.error_unit * goal**2)
         elements, size = solution.contact_elements, solution.contact_traction_size

@@ -11,7 +11,14 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.meshing.layers import FACTOR, SHORTEST, STEEPEST, layered_partition, origins, refined_partition
+from bemkit.geometry.meshing.layers import (
+    FACTOR,
+    STEEPEST,
+    layered_partition,
+    origins,
+    refined_partition,
+    shortest_length,
+)
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.hp import LayeredMeshes, _settled
@@ -80,7 +87,7 @@ def test_the_estimates_are_near_the_errors(name: str) -> None:
         if degree_of(solution) > 2:
             assert solution.estimated_traction_error is not None
             assert 0.4 <= solution.estimated_traction_error / traction_error(solution) <= 2.5
-    solution = next(each for each in risen(name, 3e-5) if degree_of(each) == 6)
+    solution = next(each for each in risen(name, 3e-5) if degree_of(each) > 4)
     assert solution.estimated_error is not None
     assert 0.3 <= solution.estimated_error / true_error(solution, 1) <= 5.0
 
@@ -196,7 +203,7 @@ def test_layers_follow_places_that_move() -> None:
 
 def test_free_elements_gain_by_degrees() -> None:
     """Their tractions are round-off, which does not fall, and say nothing of their error."""
-    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) == 6)
+    solution = next(each for each in risen("paper-1", 3e-5) if degree_of(each) > 4)
     errors, loaded = solution.coefficient_errors, np.concatenate(list(solution.mesh.parts.values()))
     assert errors is not None
     free = np.setdiff1d(np.arange(solution.mesh.n_elements), loaded)
@@ -255,13 +262,16 @@ def test_elements_of_high_degree_are_judged_without_neighbours() -> None:
 
 
 @pytest.mark.slow
-def test_a_pressure_without_bound_is_named() -> None:
+def test_a_pressure_without_bound_takes_short_elements() -> None:
     """Beside a sheared side pressures grow like a logarithm: its tail in L2 is the root of the length of an element."""
     *_, last = risen("clamped-angle", 1e-6)
+    assert last.is_converged, last.message
+    assert last.mesh.lengths.min() < 1e-11
+    *_, last = risen("clamped-angle", 1e-7)
     assert last.status is bk.Status.ACCURACY_NOT_REACHED
     assert "the largest error stands at (1, 0), where an element of the length" in last.message
     assert last.estimated_traction_error is not None
-    assert last.estimated_traction_error <= 2e-5
+    assert last.estimated_traction_error <= 1e-6
 
 
 def test_statuses_that_flicker_where_clearances_are_round_off_do_not_keep_an_accuracy_out_of_reach() -> None:
@@ -279,7 +289,7 @@ def test_layers_end_where_coordinates_do() -> None:
         partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {}, 1.0)
         if len(partition.sides) > 2000:
             break
-    assert partition.mesh.lengths.min() >= 0.9 * SHORTEST * partition.mesh.lengths.sum()
+    assert 0.9 <= partition.mesh.lengths.min() / shortest_length(partition.mesh) <= 1.1 / FACTOR
 
 
 def test_a_mesh_that_cannot_be_made_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

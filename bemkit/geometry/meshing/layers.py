@@ -13,6 +13,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.curves import Curve
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, Piece
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.geometry.vectors import norms
@@ -23,8 +24,8 @@ FIRST_LAYERS = (1, 2)
 """Layers to begin with: at corners and ends of parts, and where the contact status changes."""
 MOST_LAYERS = 3
 """Layers that an end gains at once: the estimate behind them is one of the mesh before."""
-SHORTEST = 1e-10
-"""Least length of an element relative to the whole boundary: coordinates do not hold much shorter ones."""
+SHORTEST = 1e3 * float(np.finfo(float).eps)
+"""Least length of an element relative to the largest coordinate: shorter ones would not be held to three digits."""
 STEEPEST = 7.0
 """Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
 on a short one as a peak of its traction."""
@@ -73,8 +74,8 @@ def refined_partition(
     fresh = layered_partition(old.base, cuts)
     is_end = _singular_ends(old.division).T.tolist()
     excesses = np.split(excess, np.cumsum([len(s) - 1 for s in old.parameters])[:-1])
-    lengths = old.division.piece_lengths
-    shortest = (SHORTEST * lengths.sum() / lengths).tolist()
+    # coordinates along a piece are fractions of its length
+    shortest = np.maximum(shortest_length(old.mesh) / old.division.piece_lengths, SHORTEST).tolist()
     refined = [
         _refined(_fractions(piece, s), own, least, *ends)
         for piece, s, own, least, ends in zip(
@@ -93,6 +94,11 @@ def refined_partition(
         else:
             fractions += [_fractions(fresh.division.pieces[k], fresh.parameters[k]) for k in new]
     return _balanced(old.base, fresh.division, fractions)
+
+
+def shortest_length(mesh: BoundaryMesh) -> float:
+    """Return the least length of elements that coordinates still hold."""
+    return SHORTEST * float(np.abs(mesh.nodes).max())
 
 
 def has_same_pieces(old: Partition, new: Partition) -> bool:

@@ -168,5 +168,5 @@ class PairIntegrals:
         return PairIntegrals(log, self.quotient.reshape(*self.quotient.shape[:2], *shape), double)
 
     def take(self, chosen: IntArray | slice) -> PairIntegrals:
-        """Return some of the listed pairs."""
+        """Return some of the listed pairs, or of the columns."""
         return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])

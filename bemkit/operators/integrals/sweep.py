@@ -16,7 +16,8 @@ are listed and corrected (`near`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -85,18 +86,20 @@ class PairSweep:
         level, is_close = self._classify()
         counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
         self.base = _cheapest_level(counts, degrees.extra_points)
-        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, self._n_points(self.base))
-        self._rows, self._columns = np.nonzero(is_close | (level > self.base))
+        is_listed = is_close | (level > self.base)
+        n_points = 1 if is_listed.all() else self._n_points(self.base)
+        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, n_points)
+        self._rows, self._columns = np.nonzero(is_listed)
         self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
     def _n_points(self, level: int) -> int:
         """Return the number of points of a Gauss level."""
         return GAUSS_LEVELS[level][0] + self.degrees.extra_points
 
-    def row_slices(self) -> Iterator[slice]:
-        """Yield the chunks as slices of the test elements."""
-        for first in range(0, self.test.size, self.rows_per_chunk):
-            yield slice(first, min(first + self.rows_per_chunk, self.test.size))
+    def row_slices(self, edges: Sequence[int] = ()) -> Iterator[slice]:
+        """Yield the chunks as slices of the test elements, cut at some edges, too."""
+        begins = range(0, self.test.size, self.rows_per_chunk)
+        yield from (slice(*ends) for ends in itertools.pairwise(sorted({*begins, *edges, self.test.size})))
 
     def _classify(self) -> tuple[LevelArray, BoolArray]:
         """Find the Gauss level of every pair on its test element, and which pairs are too close for the dense sweep."""
@@ -180,7 +183,7 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
         min(LISTED_SHARE_OF_CURVED * n_trial, LISTED_PAIRS) if is_curved else n_trial if is_listed else LISTED_PAIRS
     )
     n_listed = int(n_test * n_near)
-    n_chunk = n_trial * min(n_test, n_threads * _rows_per_chunk(degrees, n_trial, n_points))
+    n_chunk = n_trial * min(n_test, n_threads * _rows_per_chunk(degrees, n_trial, 1 if is_listed else n_points))
     # while pairs are listed: what is kept of them, and the sums that serve both orders of two elements, four times
     listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
     listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
