@@ -49,7 +49,7 @@ def test_random_assemblies_end_in_the_right_answer_or_a_named_failure() -> None:
     ids=["wedge", "blocks of degree 4", "stiff pairs", "discs let go", "heavy disc", "one node that carries all"],
 )
 def test_assemblies_that_once_failed_do_so_no_more(seed: int, index: int) -> None:
-    """Three stalled on the round-off of a stiffness, two were certified by what heavier bodies carry, one by its hold."""
+    """Three stalled on round-off of a stiffness; two were certified by what heavier bodies carry, one by its hold."""
     assert try_case(seed, index).outcome in (Outcome.SUCCESS, Outcome.WARNED)
 
 
