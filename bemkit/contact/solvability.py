@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
 linear programming (tolerance 1e-7) cannot decide and the drivers can."""
-_PUSHED = 0.01
-"""Share of the forces on a tied body above which what is out of balance cannot be round-off."""
 
 _FARTHEST = 1e7
 """Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
@@ -92,8 +90,10 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     if not motions.shape[0]:
         return None
     unit = largest_components(motions)
-    load, force_scale = problem.body.rigid_load() / unit, _force_scale(problem)
+    load = problem.body.rigid_load() / unit
     motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
+    forces = problem.body.weights[:, None] * problem.sticking_state.traction
+    force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
         return None
     touches = np.isfinite(problem.gap)
@@ -112,22 +112,6 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
                 who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
                 best = UnsolvableLoad(motion, lift, work, who, where)
     return best
-
-
-def is_pushed(problem: ContactProblem) -> bool:
-    """Whether a good part of the load does work on a rigid motion: without contact it would not be balanced."""
-    motions = as_rows(problem.body.rigid_motions())
-    if not motions.shape[0]:
-        return False
-    load = np.abs(problem.body.rigid_load() / largest_components(motions)).max()
-    return bool(load > _PUSHED * _force_scale(problem))
-
-
-def _force_scale(problem: ContactProblem) -> float:
-    """Return the size of the load: the sum of the forces that hold the tied body, and what works on rigid motions."""
-    load = problem.body.rigid_load() / largest_components(as_rows(problem.body.rigid_motions()))
-    forces = problem.body.weights[:, None] * problem.sticking_state.traction
-    return max(float(np.abs(load).max()), float(np.abs(forces).sum()))
 
 
 def find_long_travel(problem: ContactProblem) -> float | None:

@@ -6,7 +6,7 @@ import pytest
 
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
-from bemkit.contact.solvability import find_unsolvable_load, is_pushed
+from bemkit.contact.solvability import find_unsolvable_load
 from tests.handmade import block_problem
 
 
@@ -67,14 +67,6 @@ def test_an_obstacle_that_is_nowhere():
 def test_no_load_is_no_trouble():
     problem = block_problem(Coulomb(0.5), press=0.0, push=0.0)
     assert find_unsolvable_load(problem) is None
-
-
-def test_a_load_that_only_contact_can_hold_is_known_without_another_response():
-    assert not is_pushed(ContactProblem(DenseBody(np.eye(2), np.full(2, -5.0), np.ones(1)), np.zeros(1), Coulomb(0)))
-    for press, is_out_of_balance in ((0.5, True), (-0.5, True), (0.0, False)):
-        assert is_pushed(block_problem(Coulomb(0.5), press=press, push=0.0)) == is_out_of_balance
-    # a load on the free motion that is small beside all forces may be round-off: the response says so
-    assert not is_pushed(block_problem(Coulomb(0.5), press=1e-9, push=0.5, is_held_sideways=True))
 
 
 def memory_of_the_programme(n_contact):
