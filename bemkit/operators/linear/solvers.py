@@ -93,10 +93,10 @@ class Hierarchical:
 
 @dataclass(frozen=True)
 class MatrixFree:
-    """Boundary equations solved by iteration, with products by the fast multipole method: a tenth of the memory.
+    """Boundary equations solved by iteration, with products by the fast multipole method: a fraction of the memory.
 
     For constant collocation on straight elements; elsewhere what `Automatic` takes is taken, and the plan says why.
-    Every response takes about twenty products, whatever the number of elements.
+    Every response takes up to about twenty-five products, whatever the number of elements.
 
     Parameters
     ----------
