@@ -287,12 +287,13 @@ def _distance_to_zero(s: FloatArray, field: FloatArray) -> float | None:
 
 def _fitted_power_law(s: FloatArray, field: FloatArray, distance: float) -> tuple[float, float]:
     """Fit log f = a + power log(s + distance) + b s by Newton's method; return distance and power."""
-    logarithms, power = np.log(field), 1.5
+    length, logarithms, power = float(s[-1]), np.log(field / field[-1]), 1.5
     for _ in range(_MOST_STEPS):
-        known = np.stack([np.ones_like(s), np.log(s + distance), s / s[-1]], axis=1)
+        relative = (s + distance) / length
+        known = np.stack([np.ones_like(s), np.log(relative), s / length], axis=1)
         power = float(np.linalg.lstsq(known, logarithms, rcond=None)[0][1])
-        moved = np.column_stack([known, power / (s + distance)])
-        step = float(np.linalg.lstsq(moved, logarithms, rcond=None)[0][-1])
+        moved = np.column_stack([known, power / relative])
+        step = length * float(np.linalg.lstsq(moved, logarithms, rcond=None)[0][-1])
         distance = max(distance + step, -0.9 * float(s[0]))
         if abs(step) <= 1e-12 * s[0]:
             break
