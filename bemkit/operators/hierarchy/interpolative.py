@@ -3,7 +3,8 @@
 With the pivoted QR factorisation A P = Q [R1 R2] of [GuEisenstat1996], stopped where the next pivot is below the
 tolerance times the first one, A is A[:, skeleton] times [1, R1^-1 R2]. A matrix with many more rows than its rank is
 first multiplied from the left by a few random rows: its columns depend on each other in the same way
-[HalkoMartinssonTropp2011].
+[HalkoMartinssonTropp2011], and LU with partial pivoting of these combinations finds a skeleton as good as that of QR
+in less time [DongMartinsson2023].
 """
 
 from __future__ import annotations
