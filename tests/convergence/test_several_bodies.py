@@ -63,7 +63,8 @@ def test_shrink_fit_of_two_rings(plane: bk.Plane, pressure: float, heat: float |
 def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float, peak: float) -> None:
     """Persson's problem: equal materials, no friction, the pin loaded at its centre.
 
-    Nothing but the hole holds the pin, which may turn. The adaptive meshes leave 0.1 %.
+    Nothing but the hole holds the pin, which may turn. The adaptive meshes leave 0.1 % of the
+    pressure; the ends of contact, told by a power law on quadratic elements, scatter by up to 0.2 % of the angle.
     """
     load, radius, material = 1e-5, 0.02, bk.Material(0.91, 0.3)
     sheet = bk.Body(
@@ -84,7 +85,7 @@ def test_pin_in_a_hole_of_an_infinite_sheet(clearance: float, half_angle: float,
     (contact,) = solution.contacts
     assert contact.force_normal > load  # pressures around an arc
     assert abs(contact.force_y) == pytest.approx(load, rel=1e-9)  # statics; a floating body of condition 1e4
-    assert np.degrees(contact.contact_length / 2.0) == pytest.approx(half_angle, rel=1.5e-3)
+    assert np.degrees(contact.contact_length / 2.0) == pytest.approx(half_angle, rel=2e-3)
     assert contact.peak_pressure == pytest.approx(peak * load, rel=1e-3)
 
 
