@@ -49,7 +49,10 @@ def test_a_file_gives_everything_back(name: str, tmp_path: Path, request: pytest
     copy = bk.read_result(tmp_path / "r.h5")
     assert isinstance(copy, AssemblySolution)
     assert copy.assembly == solution.assembly
-    assert copy.summary() == solution.summary()
+    said, again = solution.summary(), copy.summary()
+    # round-off: copies share the points of the first pair that stands alike, bodies from a file have their own
+    assert again.pop("between_nodes") == pytest.approx(said.pop("between_nodes"), rel=1e-9, abs=1e-9)
+    assert again == said
     assert copy.contacts == solution.contacts
     np.testing.assert_array_equal(copy.contact_directions, solution.contact_directions)
     np.testing.assert_array_equal(copy.friction_bound, solution.friction_bound)
