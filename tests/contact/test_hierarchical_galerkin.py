@@ -129,6 +129,7 @@ def test_several_bodies_are_those_of_dense_equations() -> None:
     np.testing.assert_allclose(compressed.contact.sigma_n, dense.contact.sigma_n, atol=1e-8 * stress)
 
 
+@pytest.mark.slow
 def test_a_corner_between_two_obstacles_is_seen_by_its_stiffness() -> None:
     floor, press = on_floor()
     wall = bk.Part("wall", bk.Contact(bk.HalfPlane((-1.0, 0.0), (1.0, 0.0))), sides=("left",))

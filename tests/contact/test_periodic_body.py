@@ -108,6 +108,7 @@ def test_westergaard() -> None:
     assert error.mean() < 1e-4 * PRESSURE
 
 
+@pytest.mark.slow
 def test_the_number_of_newton_steps_does_not_grow_with_the_elements() -> None:
     solves = [bk.run(scene(n)).linear_solves for n in (2048, 8192, 16384)]
     assert max(solves) <= 5, solves

@@ -140,6 +140,7 @@ def test_a_punch_that_slides() -> None:
     assert force.force_x == pytest.approx(-0.3, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_punch_that_is_bonded() -> None:
     """Tractions under a bonded punch oscillate: t = P (kappa + 1) / (2 pi sqrt(kappa w2)) ((1 + x) / (1 - x))^(i e)."""
     parts = (bk.Part("punch", bk.PrescribedDisplacement(x=0.0, y=-0.1)),)

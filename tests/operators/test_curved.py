@@ -38,6 +38,7 @@ from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from tests.slow import slow_except
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))
 HIGH = Degrees(log=(11, 11), double=(11, 12))
@@ -92,7 +93,7 @@ INTEGRANDS = (  # of the vector d from the arc to the point, and the direction o
 )
 
 
-@pytest.mark.parametrize("n_elements", [4, 64])
+@pytest.mark.parametrize("n_elements", slow_except((4, 64), 64))
 def test_inner_integrals_against_extended_precision(n_elements: int) -> None:
     panels = Panels(discretise(Disk(1.3).outline(), n_elements=n_elements))
     with mpmath.workdps(25):

@@ -16,6 +16,7 @@ from bemkit.pictures import figures, save_pictures
 from bemkit.pictures.catalogue import PICTURES, default_pictures
 from bemkit.results.solution import Solution
 from bemkit.scene.toml import scene_to_toml, with_overrides
+from tests.slow import slow_except
 
 HISTORY = ["friction-loop", "work", "status-over-time"]
 DEFAULT = ["deformation", "displacement", "traction", "status", "von-mises"]
@@ -45,6 +46,7 @@ def test_all_pictures_are_complete(solution: Solution, tmp_path: Path) -> None:
     assert again == paths[:1]
 
 
+@pytest.mark.slow
 def test_any_title_is_drawn_as_it_is(solution: Solution, tmp_path: Path) -> None:
     scene = dataclasses.replace(solution.scene, title="costs $5 and \\frac{ more_ than $")
     names = ["deformation", "zoom", "contacts", "traction", "friction-cone", "stress-xy", "convergence"]
@@ -80,7 +82,7 @@ def test_pictures_that_do_not_exist_are_refused(name: str, scene: str, message: 
         save_pictures([], "figures")
 
 
-@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
+@pytest.mark.parametrize("ending", slow_except((".png", ".svg", ".pdf"), ".svg"))
 def test_one_picture_goes_into_a_file(solution: Solution, ending: str, tmp_path: Path) -> None:
     place = tmp_path / f"t{ending}"
     assert save_pictures(solution, place, ["traction"]) == (place,)

@@ -17,6 +17,7 @@ from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
 from bemkit.report.page import report, save_report
 from bemkit.scene.toml import with_overrides
+from tests.slow import slow_except
 
 SECTIONS = "Summary, Warnings, Pictures, Forces, Certificate, Convergence, Plan, Scene, Run times, Versions".split(", ")
 VOID = {"meta", "img", "br", "hr", "link"}
@@ -164,7 +165,7 @@ QUIET = (
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
-@pytest.mark.parametrize("width", [500, 1200], ids=["narrow", "wide"])
+@pytest.mark.parametrize("width", slow_except((500, 1200), 500), ids=["narrow", "wide"])
 def test_a_browser_shows_it_in_light_and_dark(width: int, tmp_path: Path, text: str) -> None:
     place = tmp_path / "report.html"
     place.write_text(text, encoding="utf-8")

@@ -104,6 +104,7 @@ def test_violations_fall_with_the_elements(degree: int, power: float) -> None:
     assert fine < 0.02
 
 
+@pytest.mark.slow
 def test_violations_fall_with_the_degree() -> None:
     two, four, eight = (mean_worst(degree, (40, 48, 56, 64)) for degree in (2, 4, 8))
     assert 0.8 * two > four > 1.25 * eight

@@ -86,6 +86,7 @@ def test_printable() -> None:
     assert printable("a\nb\x1b[31m\u202eü") == "a b?[31m?ü"
 
 
+@pytest.mark.slow
 def test_a_scene_with_any_title_runs_in_a_poor_encoding(scene: Path) -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     ran = subprocess.run([*PROGRAM, "run", scene, "-o", scene.parent / "r.h5"], capture_output=True, env=environment)

@@ -12,6 +12,7 @@ import bemkit as bk
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
 from bemkit.results.error_indicators import element_errors, largest_but_a_share
 from tests.scenes import angle, disc, paper, true_error, wavy
+from tests.slow import slow_except
 
 PROBLEMS: dict[str, Callable[[], bk.Scene]] = {
     "paper-1": lambda: paper(1),
@@ -25,7 +26,7 @@ ELEMENTS = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
 
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("word", ELEMENTS)
-@pytest.mark.parametrize("exponent", [1.0, 2.0])
+@pytest.mark.parametrize("exponent", slow_except((1.0, 2.0), 2.0))
 def test_effectivity(problem: str, word: str, exponent: float) -> None:
     mesh = bk.MeshOptions(elements=48, grading=bk.Algebraic(exponent))
     scene = dataclasses.replace(PROBLEMS[problem](), discretisation=ELEMENTS[word], mesh=mesh)

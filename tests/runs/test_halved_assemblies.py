@@ -99,6 +99,7 @@ def test_half_of_the_bodies_answer_as_the_whole_ones() -> None:
     assert check.is_good, check
 
 
+@pytest.mark.slow
 def test_similar_halves_answer_alike_where_all_sticks() -> None:
     """Relative displacements are round-off, and differ: those of the bodies are what differences are measured by."""
     (row,) = sweep(blocks(), [replace(find_axes(["size"], ASSEMBLY_AXES)[0], values=(1e-3,))])

@@ -274,6 +274,7 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
     assert last.estimated_traction_error <= 1e-6
 
 
+@pytest.mark.slow
 def test_statuses_that_flicker_where_clearances_are_round_off_do_not_keep_an_accuracy_out_of_reach() -> None:
     last = risen("wavy-obstacle", 2e-9)[-1]
     assert last.is_converged, last.message

@@ -19,6 +19,7 @@ from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import Status
 from bemkit.studies.stability.independent_check import check_solution
 from tests.runs.test_rigid_bodies import driven
+from tests.slow import slow_except
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=40))
 SHEAR = "parts.top.condition.x"
@@ -272,7 +273,7 @@ def test_a_law_that_never_agrees_with_its_slip_is_named() -> None:
     assert "Finished: 1 of 2 steps" in solution.message
 
 
-@pytest.mark.parametrize("accuracy", [2e-2, 5e-3])
+@pytest.mark.parametrize("accuracy", slow_except((2e-2, 5e-3), 2e-2))
 def test_histories_with_an_accuracy(accuracy: float) -> None:
     steps = (LOOP.steps[0], replace(LOOP.steps[1], increments=6))
     options: dict[str, Any] = {"mesh": bk.MeshOptions(accuracy=accuracy), "discretisation": bk.QuadraticGalerkin()}
@@ -287,6 +288,7 @@ def test_histories_with_an_accuracy(accuracy: float) -> None:
         assert one.elastic_energy == pytest.approx(other.elastic_energy, rel=accuracy)  # the square of it, in theory
 
 
+@pytest.mark.slow
 def test_histories_of_bodies_with_an_accuracy() -> None:
     """Two cylinders are pressed more and less: the meshes do for the step that needs most."""
     cylinders = replace(bk.load_scene("two-cylinders"), mesh=bk.MeshOptions(accuracy=0.05))

@@ -28,7 +28,7 @@ def example(number: int, discretisation: str, elements: int) -> bk.Scene:
 
 
 @pytest.mark.parametrize("number", slow_except((1, 2), 1))
-@pytest.mark.parametrize("discretisation", list(DISCRETISATIONS))
+@pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, "constant"))
 def test_the_finest_mesh_costs_two_solves(number: int, discretisation: str) -> None:
     scene = example(number, discretisation, 640)
     levels = run_cascade(scene)

@@ -12,6 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.arrays import FloatArray
 from bemkit.solvers.alm import BoundUpdate
+from tests.slow import slow_except
 
 DRIVERS: dict[str, bk.ContactSolver] = {
     "newton": bk.SemismoothNewton(),
@@ -98,7 +99,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("driver", list(DRIVERS))
+@pytest.mark.parametrize("driver", slow_except(DRIVERS, *list(DRIVERS)[:1]))
 @pytest.mark.parametrize("discretisation", list(DISCRETISATIONS))
 @pytest.mark.parametrize("name", list(CHANGES))
 def test_same_sets_after_the_same_iterations(name: str, discretisation: str, driver: str) -> None:
@@ -145,6 +146,7 @@ def test_frictionless_pressure_does_not_depend_on_poissons_ratio() -> None:
         np.testing.assert_allclose(other.sigma_n[inner], pressures[0].sigma_n[inner], atol=5e-3)
 
 
+@pytest.mark.slow
 def test_sets_do_not_depend_on_rho() -> None:
     reference = plain("linear", "newton").contact
     drivers = [bk.SemismoothNewton(rho=rho) for rho in (1e-4, 1.0, 1e8)]

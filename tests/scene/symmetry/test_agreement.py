@@ -15,6 +15,7 @@ from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.testing import check_double_layer, check_operator, check_space
 from tests.scenes import DISCRETISATIONS, square, squeezed, whole_mesh
+from tests.slow import slow_except
 
 X, Y, BOTH = bk.Symmetry(x=0.0), bk.Symmetry(y=0.0), bk.Symmetry(x=0.0, y=0.0)
 PLATE = bk.PlateWithHole(3.0, 2.0, 0.4, (-1.5, -1.0))
@@ -72,7 +73,7 @@ def folding(space: BoundarySpace, whole: BoundarySpace) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", SPACES)
-@pytest.mark.parametrize("symmetry", [X, Y, BOTH], ids=str)
+@pytest.mark.parametrize("symmetry", slow_except((X, Y, BOTH), X, BOTH), ids=str)
 @pytest.mark.parametrize("shape", [bk.Disk(1.0), PLATE], ids=["disk", "plate"])
 def test_every_operator_is_the_folded_operator_of_the_whole(
     shape: bk.Disk | bk.PlateWithHole, symmetry: bk.Symmetry, kind: str

@@ -137,6 +137,7 @@ def test_an_over_resolved_solution_is_the_reference_if_asked_for() -> None:
     assert "its own errors, at most: energy" in result.output
 
 
+@pytest.mark.slow
 def test_processes_find_errors_and_say_that_times_are_missing(tmp_path: Path) -> None:
     arguments = [*FAST[:-4], "--meshes", "uniform", "--jobs", "2"]
     result = call(*arguments, "--plot", tmp_path)

@@ -87,6 +87,7 @@ def test_assemblies_are_the_same_after_a_scene_file(tmp_path: Path) -> None:
     assert bk.load_scene(str(path)) == random_assembly(7, FIRST).scenes[0]
 
 
+@pytest.mark.slow
 def test_every_kind_is_drawn() -> None:
     assemblies = [scene for index in range(70) for scene in random_assembly(3, index).scenes]
     bodies = [body for each in assemblies for body in each.bodies]

@@ -83,6 +83,7 @@ def test_scenes_are_the_same_after_a_scene_file() -> None:
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes
 
 
+@pytest.mark.slow
 def test_every_kind_is_drawn() -> None:
     cases = [random_case(3, index) for index in range(150)]
     scenes = [scene for case in cases for scene in case.scenes]

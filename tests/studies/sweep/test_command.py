@@ -90,6 +90,7 @@ def test_a_killed_sweep_goes_on_and_ends_with_the_same_table(tmp_path: Path) -> 
     assert equal_results(Sweep.read(path).rows, Sweep.read(whole).rows)
 
 
+@pytest.mark.slow
 def test_processes_give_the_same_table(tmp_path: Path) -> None:
     paths = tmp_path / "one.h5", tmp_path / "two.h5"
     for path, jobs in zip(paths, ("1", "2"), strict=True):
