@@ -1,1 +1,1 @@
-"""Dense and iterative linear algebra: factorisations that name singularity, block conjugate gradients, threads."""
+"""Dense and iterative linear algebra: factorisations that name singularity, GMRES, threads."""
