@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.operators.hierarchy.compiled_functions import OPTIONS
 
-_options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
-
-@numba.njit(**_options)
+@numba.njit(**OPTIONS)
 def gauss_fields(
     single: float,
     double: float,

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, log
+from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, OPTIONS, log
 from bemkit.operators.hierarchy.compiled_tables import (
     BLOCK,
     N_DOUBLE,
@@ -24,7 +24,6 @@ from bemkit.operators.hierarchy.compiled_tables import (
     U,
     correct_double,
     correct_single,
-    options,
     tabulate_double,
     tabulate_single,
 )
@@ -34,7 +33,7 @@ _SLOTS = 4
 _TINY = 1e-300
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _in_blocks(x: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Return the coordinates of points, the last one repeated up to whole blocks."""
     n = BLOCK * ((x.size + BLOCK - 1) // BLOCK)
@@ -45,7 +44,7 @@ def _in_blocks(x: ComplexArray) -> tuple[FloatArray, FloatArray]:
     return x_x, x_y
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _of_traction(
     constants: FloatArray,
     x: FloatArray,
@@ -63,7 +62,7 @@ def _of_traction(
             correct_single(constants, complex(x[i], y[i]), start, end, table, i)
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _of_displacement(
     constants: FloatArray,
     x: FloatArray,
@@ -81,7 +80,7 @@ def _of_displacement(
             correct_double(constants, complex(x[i], y[i]), start, end, table, i)
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def element_fields(
     constants: FloatArray, x: ComplexArray, places: IntArray, start: ComplexArray, end: ComplexArray
 ) -> ComplexArray:
@@ -99,7 +98,7 @@ def element_fields(
     return result
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _slot_of(element: int, wanted: IntArray, held: IntArray) -> int:
     """Return the slot that holds an element, else one that holds none of the wanted ones."""
     for slot in range(_SLOTS):
@@ -111,7 +110,7 @@ def _slot_of(element: int, wanted: IntArray, held: IntArray) -> int:
     return 0
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _add(
     real: FloatArray, imaginary: FloatArray, one: FloatArray, factor: complex, two: FloatArray, other: complex
 ) -> None:
@@ -123,7 +122,7 @@ def _add(
         imaginary[i] += factor_x * one_y[i] + factor_y * one_x[i] + other_x * two_y[i] + other_y * two_x[i]
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _store(on: FloatArray, component: int, result: FloatArray) -> None:
     """Store in an array (n, 2) what a unit along x or y causes, from the factors (4, n) of it and of its conjugate."""
     on_x, on_y, conjugate_x, conjugate_y = on[0], on[1], on[2], on[3]
@@ -135,7 +134,7 @@ def _store(on: FloatArray, component: int, result: FloatArray) -> None:
             result[i, 0], result[i, 1] = conjugate_y[i] - on_y[i], on_x[i] - conjugate_x[i]
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def columns(
     constants: FloatArray,
     x: ComplexArray,
@@ -203,7 +202,7 @@ def columns(
     return result.reshape(wanted.size, 2 * x.size)
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def point_forces(kappa: float, log_length: float, x: ComplexArray, sources: ComplexArray) -> FloatArray:
     """See `proxies.point_forces`; (2 n_sources, 2 n_points), components of points side by side."""
     n = sources.size
@@ -221,7 +220,7 @@ def point_forces(kappa: float, log_length: float, x: ComplexArray, sources: Comp
     return result
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def applied(
     constants: FloatArray,
     x: ComplexArray,

@@ -15,6 +15,8 @@ import numpy as np
 
 MATHEMATICS: Any = {"contract", "nsz", "nnan", "ninf", "arcp"}
 """What the compiler may do to formulas that contain these functions."""
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+"""Of all functions that are compiled on their own."""
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 _ONE_BITS = 0x3FF0000000000000
 _MANTISSA = 0x000FFFFFFFFFFFFF

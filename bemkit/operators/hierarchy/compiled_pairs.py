@@ -6,18 +6,15 @@ The inner loops run over the elements of the second set, without a branch, so th
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, log
-
-_options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, OPTIONS, log
 
 
-@numba.njit(fastmath=MATHEMATICS, **_options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _kernels(x: float, y: float, of_x: float, of_y: float, points: FloatArray, n: int, values: FloatArray) -> None:
     """Fill (5, n) values of the five kernels at one point, with its tangent, and points (4, n) with theirs."""
     to_x, to_y, tangent_x, tangent_y = points[0], points[1], points[2], points[3]
@@ -33,13 +30,13 @@ def _kernels(x: float, y: float, of_x: float, of_y: float, points: FloatArray, n
         fro[c] = (of_x * dy - of_y * dx) * inverse
 
 
-@numba.njit(fastmath=MATHEMATICS, **_options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _add(target: FloatArray, values: FloatArray, factor: float, n: int) -> None:
     for c in range(n):
         target[c] += factor * values[c]
 
 
-@numba.njit(**_options)
+@numba.njit(**OPTIONS)
 def _sum_of_rule(
     i: int, own: IntArray, begin: int, end: int, point: ComplexArray, tangent: ComplexArray, polynomials: FloatArray,
     points: FloatArray, values: FloatArray, inner: FloatArray, sums: FloatArray,
@@ -69,7 +66,7 @@ def _sum_of_rule(
                     channel += 1
 
 
-@numba.njit(**_options)
+@numba.njit(**OPTIONS)
 def integrals(
     rows: IntArray, columns: IntArray, centre: ComplexArray, half: FloatArray, reach: FloatArray, point: ComplexArray,
     tangent: ComplexArray, polynomials: FloatArray, begins: IntArray, near_begins: IntArray, near_columns: IntArray,

@@ -7,21 +7,19 @@ largest term, not by each one, so that constant densities need no series at any 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, atan2, log
+from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, OPTIONS, atan2, log
 
 _TINY = 1e-300
 _FAR_SQUARED = 1e4
 """Square of the distance, by half the length of an element, from which on three terms of a series are exact."""
-_options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@numba.njit(fastmath=MATHEMATICS, **_options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _add(
     constants: FloatArray,
     x: FloatArray,
@@ -88,7 +86,7 @@ def _add(
         imaginary[i] += of_x * tangent_y + of_y * tangent_x
 
 
-@numba.njit(**_options)
+@numba.njit(**OPTIONS)
 def _own(
     constants: FloatArray, x: complex, start: complex, end: complex, traction: complex, displacement: complex,
     slope: complex,
@@ -105,7 +103,7 @@ def _own(
     return caused
 
 
-@numba.njit(**_options)
+@numba.njit(**OPTIONS)
 def nearby(
     constants: FloatArray,
     x: ComplexArray,

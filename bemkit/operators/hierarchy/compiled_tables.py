@@ -8,13 +8,12 @@ for each real number, complex ones two.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, atan2, log
+from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, OPTIONS, atan2, log
 from bemkit.operators.hierarchy.series import FAR, REST, SERIES
 
 _FAR_SQUARED = FAR**2
@@ -25,7 +24,6 @@ T, TC, TS, TSC, N_DOUBLE = 0, 2, 4, 6, 8
 _TINY = 1e-300
 BLOCK = 32
 """Points that are looked at together. Loops over whole blocks leave no single points behind, which take longest."""
-options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @numba.njit(inline="always", error_model="numpy")
@@ -65,7 +63,7 @@ def _arms(
     return of_start, of_end, 0.5 * (plus_x + minus_x), eta, product_x, product_y
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _shape(start: complex, end: complex) -> tuple[float, float, float, float, float, float]:
     """Return the half length of an element, its inverse, the tangent, and the square of that."""
     span_x, span_y = end.real - start.real, end.imag - start.imag
@@ -75,7 +73,7 @@ def _shape(start: complex, end: complex) -> tuple[float, float, float, float, fl
     return half, by_half, x, y, x * x - y * y, 2.0 * x * y
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _is_far(x: FloatArray, y: FloatArray, start: complex, end: complex) -> bool:
     """Whether all of some points are far from an element."""
     centre_x, centre_y = 0.5 * (start.real + end.real), 0.5 * (start.imag + end.imag)
@@ -87,7 +85,7 @@ def _is_far(x: FloatArray, y: FloatArray, start: complex, end: complex) -> bool:
     return nearest > 0.25 * _FAR_SQUARED * (span_x * span_x + span_y * span_y)
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _single_far(
     constants: FloatArray, x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -113,7 +111,7 @@ def _single_far(
         u_y[i] = factor * (turn_x * imaginary + turn_y * real)
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _single_near(
     constants: FloatArray, x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -141,7 +139,7 @@ def _single_near(
         u_y[i] = factor * (turn_x * imaginary + turn_y * real)
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _double_far(
     constants: FloatArray, x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -168,7 +166,7 @@ def _double_far(
         tsc_x[i], tsc_y[i] = across_x * of_x + across_y * of_y, across_y * of_x - across_x * of_y
 
 
-@numba.njit(fastmath=MATHEMATICS, **options)
+@numba.njit(fastmath=MATHEMATICS, **OPTIONS)
 def _double_near(
     constants: FloatArray, x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -205,7 +203,7 @@ def _double_near(
         tsc_x[i], tsc_y[i] = across_x * of_x + across_y * of_y, across_y * of_x - across_x * of_y
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def _run(x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex) -> tuple[int, bool]:
     """Return where a run of blocks ends that are all far from an element, or all not, and which."""
     is_far = _is_far(x[begin : begin + BLOCK], y[begin : begin + BLOCK], start, end)
@@ -215,7 +213,7 @@ def _run(x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex)
     return begin, is_far
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def tabulate_single(
     constants: FloatArray, x: FloatArray, y: FloatArray, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -230,7 +228,7 @@ def tabulate_single(
             _single_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def tabulate_double(
     constants: FloatArray, x: FloatArray, y: FloatArray, start: complex, end: complex, table: FloatArray
 ) -> None:
@@ -245,7 +243,7 @@ def tabulate_double(
             _double_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def correct_single(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
     """Replace the values at a point that is the middle of the element: zeta is zero."""
     single, _, nu, log_length = constants
@@ -255,7 +253,7 @@ def correct_single(constants: FloatArray, x: complex, start: complex, end: compl
     table[UC, i], table[UC + 1, i] = single * half * turn_x, single * half * turn_y
 
 
-@numba.njit(**options)
+@numba.njit(**OPTIONS)
 def correct_double(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
     """Do the same for a displacement: the angle is a principal value."""
     _, double, nu, _ = constants
