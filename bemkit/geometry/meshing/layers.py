@@ -29,7 +29,7 @@ SHORTEST = 1e3 * float(np.finfo(float).eps)
 STEEPEST = 7.0
 """Largest ratio of the lengths of two elements that meet at an end of their pieces. The error of a long one would fall
 on a short one as a peak of its traction."""
-NEXT_MOTION = 0.03
+NEXT_MOTION = 0.1
 """How far places where the contact status changes move from one mesh to the next, relative to the mesh before."""
 LARGEST_TURN = np.pi / 4.0
 """Angle by which a curve may turn on one element."""
