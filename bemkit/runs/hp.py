@@ -38,8 +38,11 @@ FEWEST_LEVELS = 4
 """Meshes in layers before the error may be found to fall no longer: the first ones are coarse on purpose."""
 GAIN = 6.0
 """Factor by which a degree and the layers that come with it reduce the error."""
-LARGEST_RISE = 2
-"""Degrees from mesh to mesh: the places where the status changes must keep up."""
+LARGEST_RISE, LAST_RISE = 2, 3
+"""Degrees from mesh to mesh: the places where the status changes must keep up; and where that is the last mesh."""
+FINE = 5e-3
+"""Accuracy below which the first mesh in layers is of degree 4, otherwise of 3: places where the status changes are
+then told well enough for two digits more at once."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
@@ -106,11 +109,11 @@ class LayeredMeshes:
         cuts = {side: _settled(places) for side, places in zone_cuts(partition, ends).items()}
         fresh = layered_partition(partition.base, cuts)
         if level.number == 0:
-            return Level(level.asked, fresh, 1)
+            return Level(level.asked, fresh, 2 if self.accuracy < FINE else 1)
         has_moved = has_same_pieces(partition, fresh)
         needed = self._needed_rise(solution, ~is_at_end(partition)) if has_moved else 0
-        is_last = has_moved and needed <= LARGEST_RISE
-        following = Level(level.asked, fresh, level.number + min(needed, LARGEST_RISE))
+        is_last = has_moved and needed <= LAST_RISE
+        following = Level(level.asked, fresh, level.number + (needed if is_last else min(needed, LARGEST_RISE)))
         old_degrees = element_degrees(level.scene.discretisation.displacement_space(solution.mesh))
         degree = following.scene.discretisation.displacement_space(solution.mesh).degree
         goal = SAFETY * self.accuracy

@@ -118,7 +118,7 @@ def test_pieces_end_where_the_status_changes() -> None:
 def test_later_meshes_start_near_their_solution() -> None:
     *_, before, last = risen("paper-1", 3e-5)
     own_solves = last.linear_solves - sum(each.linear_solves for each in risen("paper-1", 3e-5)[:-1])
-    assert own_solves <= 7
+    assert own_solves <= 9  # three degrees more; from nothing 22
     assert before.linear_solves <= 7
 
 
@@ -275,9 +275,11 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
 
 
 @pytest.mark.slow
-def test_statuses_that_flicker_where_clearances_are_round_off_do_not_keep_an_accuracy_out_of_reach() -> None:
-    last = risen("wavy-obstacle", 2e-9)[-1]
-    assert last.is_converged, last.message
+def test_statuses_that_flicker_where_clearances_are_round_off_do_not_cost_elements() -> None:
+    assert risen("wavy-obstacle", 2e-9)[-1].is_converged
+    last = risen("wavy-obstacle", 1e-9)[-1]
+    assert traction_error(last) <= 1e-9  # the estimate ends at 1.4e-9
+    assert last.n_elements <= 70
     assert len(last.transitions) > 1  # all within 3e-9 of each other
     assert _settled([place.x for place in last.transitions]) == pytest.approx([0.25000030], abs=1e-7)
     assert _settled([0.3, 0.1 + 1e-9, 0.3 + 4e-9, 0.1]) == pytest.approx([0.1 + 5e-10, 0.3 + 2e-9], abs=1e-15)

@@ -22,7 +22,7 @@ from bemkit.studies.verification.case import Case, Quantity, at_resolution, fiel
 INNER, OUTER = (tuple(f"{name}-{k}" for k in range(1, 5)) for name in ("inner", "outer"))
 
 
-RISING = (1e-2, 1e-4, 1e-6)
+RISING = (1e-2, 5e-5, 1e-6)
 """Accuracies asked of elements of rising degree."""
 
 
