@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from bemkit.errors import InputError as InputError
     from bemkit.errors import NoResultError as NoResultError
     from bemkit.formulas import Expression as Expression
-    from bemkit.geometry.corners import corner_nodes as corner_nodes
     from bemkit.geometry.drawn import ArcTo as ArcTo
     from bemkit.geometry.drawn import LineTo as LineTo
     from bemkit.geometry.drawn import Loop as Loop
@@ -50,6 +49,7 @@ if TYPE_CHECKING:
     from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
     from bemkit.geometry.meshing.discretise import discretise as discretise
+    from bemkit.geometry.neighbours import corner_nodes as corner_nodes
     from bemkit.geometry.placement import Placement as Placement
     from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk

@@ -86,10 +86,11 @@ def result_target(output: str | None, inside: int) -> list[Path]:
 
 
 def reserve(paths: Iterable[Path]) -> None:
-    """Keep files for this process until the command ends; see `bemkit.atomic_files.reserved`."""
+    """Keep files, if any, for this process until the command ends; see `bemkit.atomic_files.reserved`."""
     from bemkit.atomic_files import reserved
 
-    click.get_current_context().with_resource(reserved(paths))
+    if files := list(paths):
+        click.get_current_context().with_resource(reserved(files))
 
 
 def is_watched(quiet: bool) -> bool:

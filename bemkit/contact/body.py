@@ -1,11 +1,13 @@
-"""The elastic body as contact sees it."""
+"""The elastic body as contact sees it: the state of its contact nodes, how they have slipped, how it responds."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.conditions import LinearConditions, separated, stick
 from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 from bemkit.errors import BemkitError, InputError
@@ -66,7 +68,7 @@ class ContactState:
         """Whether all entries are finite numbers."""
         return bool(np.isfinite(self.displacement).all() and np.isfinite(self.traction).all())
 
-    def blended(self, other: "ContactState", fraction: float) -> "ContactState":
+    def blended(self, other: ContactState, fraction: float) -> ContactState:
         """Return the state the given fraction of the way to `other`.
 
         Two responses of one body blend into a response again, because the body is linear.
@@ -83,6 +85,45 @@ class ContactState:
             self.displacement + fraction * (other.displacement - self.displacement),
             self.traction + fraction * (other.traction - self.traction),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class SlipHistory:
+    """Time and slip at the end of an increment, in the units of the user.
+
+    Parameters
+    ----------
+    time, time_step : float [s]
+        Now, and since the increment before.
+    slip : (n_contact,) array [m]
+        Length of the path that each node has slipped while it was closed, this increment included; never falls.
+    last_slip : (n_contact,) array [m]
+        What this increment has added.
+    """
+
+    time: float
+    time_step: float
+    slip: FloatArray
+    last_slip: FloatArray
+
+    @classmethod
+    def at_rest(cls, n_contact: int) -> SlipHistory:
+        """Return what is before any load."""
+        return cls(0.0, 0.0, np.zeros(n_contact), np.zeros(n_contact))
+
+    @property
+    def rate(self) -> FloatArray:
+        """(n_contact,) array [m/s]: the speed of slip in this increment."""
+        return self.last_slip / self.time_step if self.time_step > 0.0 else np.zeros_like(self.last_slip)
+
+    def followed(self, time: float, slip: FloatArray, is_closed: BoolArray) -> SlipHistory:
+        """Return the history after one increment more, in which closed nodes slip by (n_contact,) lengths [m]."""
+        added = np.where(is_closed, np.abs(slip), 0.0)
+        return SlipHistory(time, time - self.time, self.slip + added, added)
+
+    def of(self, nodes: IntArray) -> SlipHistory:
+        """Return that of some of the nodes."""
+        return SlipHistory(self.time, self.time_step, self.slip[nodes], self.last_slip[nodes])
 
 
 class LinearBody(Protocol):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.coefficients import Coefficient, is_zero, numbers_of
 from bemkit.contact.laws import Coulomb, FrictionLaw, LawOfCoefficients
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
 
 

@@ -19,10 +19,10 @@ from typing import ClassVar, Protocol, Self, runtime_checkable
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.coefficients import Coefficient as Coefficient
 from bemkit.contact.coefficients import LawError as LawError
 from bemkit.contact.coefficients import checked_coefficient, evaluated_coefficient, is_zero, numbers_of
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
 
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw, RescaledLaw
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
 
 

@@ -12,7 +12,7 @@ from bemkit.contact.condensation.nodes import ContactNodes, contact_frame, nodes
 from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.geometry.local_values import dof_weights
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, dof_points, element_nodes
 from bemkit.scene.conditions import Contact
 from bemkit.scene.scene import Scene

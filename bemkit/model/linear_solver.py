@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.linear.choice import choose_linear_solver
 from bemkit.operators.linear.solvers import (
     Automatic,
     ChosenLinearSolver,
     Hierarchical,
     LinearSolverChoice,
+    choose_linear_solver,
 )
 from bemkit.operators.steklov_poincare.hierarchical_needs import choose_collocation_solver, choose_galerkin_solver
 from bemkit.operators.steklov_poincare.needs import BodyCase

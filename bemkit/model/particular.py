@@ -35,13 +35,13 @@ def stress_of(force: BodyForce, mesh: BoundaryMesh, material: Material) -> float
     return mesh.diameter * float(np.abs(force.force_at(points)).max())
 
 
-def particular_solution(scene: Scene, mesh: BoundaryMesh, modulus: float, stress: float) -> ParticularSolution | None:
+def particular_solution(scene: Scene, mesh: BoundaryMesh, modulus: float, stress: float) -> ParticularSolution:
     """Return the dimensionless particular solution of the body forces of a scene.
 
     Parameters
     ----------
     scene : Scene
-        With a single load.
+        With a single load and body forces.
     mesh : BoundaryMesh
         In physical units; lengths are measured by its diameter from its centre.
     modulus, stress : float [Pa]
@@ -49,16 +49,13 @@ def particular_solution(scene: Scene, mesh: BoundaryMesh, modulus: float, stress
 
     Returns
     -------
-    ParticularSolution or None
-        None without body forces.
+    ParticularSolution
 
     Raises
     ------
     TemperatureError
         If a temperature is not harmonic, or nothing that is known in closed form stands for it.
     """
-    if not scene.body_forces:
-        return None
     sources = [
         source for force in scene.body_forces for source in _sources(force, scene.material, mesh, modulus, stress)
     ]

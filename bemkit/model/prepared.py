@@ -24,12 +24,12 @@ from bemkit.model.contact_data import ContactData, find_contact
 from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution, stress_of
 from bemkit.operators.half_plane.far_drive import FarDrive
-from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.needs import BodyCase
+from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
+from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
     NodalConditions,
@@ -271,6 +271,12 @@ class Prepared:
         requested, discretisation = self.scene.linear_solver, self.scene.discretisation
         return linear_solver_of(requested, discretisation, case, self.space, physical_memory())
 
+    @property
+    def largest_matrix(self) -> int:
+        """Order of the largest matrix that is factored, roughly."""
+        n_dofs = self.space.n_dofs
+        return n_dofs if self.linear_solver.hierarchical is None else min(LARGEST_BLOCK, n_dofs)
+
     @cached_property
     def is_condensed(self) -> bool:
         """Whether contact sees the stiffness of the body even if its equations are compressed over a tree.
@@ -343,8 +349,9 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
     supports = supports_on(scene, mesh, units, space)
     conditions, nodes = contact_conditions(space, supports, candidates.nodes, drive.driven)
     force = nodal_forces(scene, mesh, space, units)
-    solution = particular_solution(scene, mesh, units.modulus, units.stress)
-    inside = None if solution is None else ForcesInside.of(solution, space)
+    inside = None
+    if scene.body_forces:
+        inside = ForcesInside.of(particular_solution(scene, mesh, units.modulus, units.stress), space)
     return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
 
 

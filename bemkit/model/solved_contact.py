@@ -13,8 +13,7 @@ import math
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.model.contact_model import Model
 from bemkit.scene.unit_names import amount
 from bemkit.solvers.active_sets import NodeStatus

@@ -14,7 +14,7 @@ from bemkit.contact.spline import SplineObstacle
 from bemkit.errors import InputError
 from bemkit.formulas import evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.pictures.shown import Shown
 from bemkit.results.drawing import GREY
 from bemkit.scene.conditions import Contact

@@ -17,7 +17,7 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.assembled.placed import place
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import RigidResult
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Part

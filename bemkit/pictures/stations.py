@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.pictures.shown import ShownBody
 
 

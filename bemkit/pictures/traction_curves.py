@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.obstacle import measure_contact
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.pictures.contact_nodes import node_points
 from bemkit.pictures.shown import Result

@@ -16,11 +16,9 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem, physical_memory
 from bemkit.operators.stopwatch import announce
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.registry import BODY_FORCES
@@ -227,11 +225,6 @@ class Plan(ShownInNotebooks):
     items: tuple[PlanItem, ...]
     warnings: tuple[str, ...] = ()
     is_compressed: bool = False
-
-    @property
-    def largest_matrix(self) -> int:
-        """Order of the largest matrix that is factored, roughly."""
-        return min(LARGEST_BLOCK, self.sizes.n_displacements) if self.is_compressed else self.sizes.n_displacements
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as JSON can hold it."""

@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.grading import Algebraic
 from bemkit.geometry.local_values import from_own_nodes
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
 from bemkit.results.solution import Solution

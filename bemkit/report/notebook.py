@@ -17,7 +17,7 @@ from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, headline_rows, plan_section
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.results.solved_steps import SolvedSteps
+from bemkit.results.solved_problem import SolvedSteps
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 

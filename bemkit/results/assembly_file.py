@@ -19,8 +19,7 @@ import numpy as np
 from bemkit.hdf5 import Reader, rows_of
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.outcome_file import read_fields, read_outcome, write_fields, write_forces, write_outcome
-from bemkit.results.part_forces import ContactForce
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 

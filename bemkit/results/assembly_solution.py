@@ -10,11 +10,10 @@ from typing import Any, cast
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.part_forces import ContactForce
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.mortar.congruent import stand_alike
 from bemkit.contact.mortar.projection import mean_directions
 from bemkit.contact.mortar.segments import common_refinement, facing_points
 from bemkit.contact.mortar.sides import ContactSide
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.placement import Placement
 from bemkit.model.assembled.contacts import carries_multipliers, reach_of
 from bemkit.results.between_nodes import (
@@ -28,7 +28,7 @@ from bemkit.results.between_nodes import (
     violations_at,
 )
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import RigidResult
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.conditions import Contact

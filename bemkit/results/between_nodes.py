@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.condensation.nodes import contact_frame
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle, measure_contact
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.geometry.local_values import from_own_nodes
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody

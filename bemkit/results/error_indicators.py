@@ -17,10 +17,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary, break_nodes
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.operators.rigid_modes import without_motion

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bemkit.contact.body import ContactState
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.errors import InputError
 from bemkit.hdf5 import Reader, rows_of, write_table, write_text
 from bemkit.results.load_history import LoadHistory, LoadStep, StepWork

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.errors import InputError
 from bemkit.results.contact_table import ContactTable
 

@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.certificate import Certificate
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
@@ -192,6 +192,17 @@ class SolvedProblem(ShownInNotebooks):
 
 
 AnySolution = TypeVar("AnySolution", bound="SolvedProblem")
+
+
+class SolvedSteps(ShownInNotebooks, tuple[AnySolution, ...]):
+    """The solutions of load steps in their order, never none."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        """Return one line."""
+        last = self[-1]
+        return f"SolvedSteps({last.title!r}: {len(self)} steps, the last one {last.status_words})"
 
 
 def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Sequence[str]) -> AnySolution:

@@ -22,8 +22,7 @@ from bemkit.errors import InputError
 from bemkit.hdf5 import Reader, rows_of, write_table
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.part_forces import ContactForce
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.tables import CERTIFICATE_ENTRIES

@@ -10,11 +10,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
-from bemkit.runs.history import run_on_mesh, solved_history
+from bemkit.runs.history import ONE_BODY, run_on_mesh
 from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
+from bemkit.runs.steps import solved_history
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -70,7 +71,7 @@ def run_adaptive(
         single = _SceneRefinement(DensityMeshes(accuracy), callback)
         whole = HistoryRefinement(
             single,
-            lambda level, *known: solved_history([level.scene], level.partition.mesh, None, callback, *known),
+            lambda level, *known: solved_history(ONE_BODY, [level.scene], level.partition.mesh, callback, *known),
             done,
             finished,
         )

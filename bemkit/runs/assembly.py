@@ -8,32 +8,27 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.slip_history import SlipHistory
-from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.energies import with_energies_checked
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly_steps
+from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.model.solved_contact import SLIP_TOLERANCE
-from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import assembly_time
-from bemkit.plan import Plan, announce_plan, check_memory
+from bemkit.operators.stopwatch import Stage, StageClock
+from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, bound_at, find_transitions
-from bemkit.results.part_forces import contact_forces, nodal_resultants
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
 from bemkit.results.solution import BoundaryFields
-from bemkit.results.solved_steps import SolvedSteps
+from bemkit.results.solved_problem import SolvedSteps
 from bemkit.results.warnings import find_assembly_warnings
-from bemkit.runs.steps import History, Kind, joined, solve_steps
-from bemkit.runs.timing import Stage, StageClock
+from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
-from bemkit.scene.load_history import load_steps
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
@@ -66,7 +61,7 @@ def run_assembly(
     ValueError
         If the assembly is not well posed; the message names the body or the contact.
     """
-    return joined(*solved_assemblies([assembly], meshes, callback))
+    return joined(*solved_history(SEVERAL_BODIES, [assembly], meshes, callback))
 
 
 def run_assembly_history(
@@ -100,41 +95,23 @@ def run_assembly_history(
     UnsolvableSceneError
         If no contact tractions can balance the first load.
     """
-    return SolvedSteps(solved_assemblies(assemblies, meshes, callback)[1])
-
-
-def solved_assemblies(
-    assemblies: Sequence[Assembly],
-    meshes: Mapping[str, BoundaryMesh] | None = None,
-    callback: Callable[[StepRecord], None] | None = None,
-    done: AssemblySolution | None = None,
-    finished: Callable[[AssemblySolution], None] | None = None,
-) -> tuple[History[AssemblySolution], tuple[AssemblySolution, ...]]:
-    """Solve assemblies as `run_assembly_history`; see `History` for what is done and who hears of finished steps."""
-    scenes = [step for each in assemblies for step in load_steps(each)]
-    if not scenes:
+    if not assemblies:
         raise InputError("assemblies is empty: give at least one assembly")
-    history: History[AssemblySolution] = History.of(assemblies[-1], scenes, done, finished)
-    clock = StageClock.start()
-    steps = prepare_assembly_steps(scenes, meshes)
-    if not steps[0].n_contact:
+    return SolvedSteps(solved_history(SEVERAL_BODIES, assemblies, meshes, callback)[1])
+
+
+def _prepared(
+    steps: Sequence[Assembly], meshes: Mapping[str, BoundaryMesh] | None
+) -> tuple[tuple[PreparedAssembly, ...], Plan]:
+    """Return load steps ready to solve, and their plan."""
+    prepared = prepare_assembly_steps(steps, meshes)
+    if not prepared[0].n_contact:
         raise InputError("no two bodies are in contact: list contacts, or solve each body as a scene of its own")
-    plan = plan_assembly(steps)
-    check_memory(plan)
-    announce_plan(plan)
-    clock = clock.closed(Stage.MESH)
-    with blas_threads_for(max(body.space.n_dofs for body in steps[0].bodies)):
-        with assembly_time() as assembly:
-            model = build_assembled_model(steps[0])
-        clock = clock.closed_build(assembly)
-        return history, solve_steps(SEVERAL_BODIES, model, steps, plan, history, clock=clock, callback=callback)
+    return prepared, plan_assembly(prepared)
 
 
-def explained(model: AssembledModel, result: ContactSolution) -> str:
-    """Say why nothing can balance the load."""
-    load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-    remedy = "hold what moves by a support, raise the friction, or change the loads"
-    return result.message if load is None else f"{load.description}: {remedy}"
+def _explained(model: AssembledModel, load: UnsolvableLoad) -> str:
+    return f"{load.description}: hold what moves by a support, raise the friction, or change the loads"
 
 
 def assembly_solution(
@@ -222,4 +199,6 @@ def _contact_table(model: AssembledModel, state: ContactState, node_status: IntA
     )
 
 
-SEVERAL_BODIES: Kind[AssembledModel, AssemblySolution] = Kind(with_energies_checked, assembly_solution, explained)
+SEVERAL_BODIES: Kind[AssembledModel, AssemblySolution] = Kind(
+    _prepared, build_assembled_model, with_energies_checked, assembly_solution, _explained
+)

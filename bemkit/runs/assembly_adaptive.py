@@ -14,11 +14,12 @@ from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partitio
 from bemkit.geometry.vectors import norms
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import resolved_transitions
-from bemkit.runs.assembly import run_assembly, solved_assemblies
+from bemkit.runs.assembly import SEVERAL_BODIES, run_assembly
 from bemkit.runs.density import SAFETY, error_rate, is_enough, needed_elements, next_size
 from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.mesh_sequence import ZoneEnd, zone_cuts
 from bemkit.runs.refinement import refined, required_accuracy
+from bemkit.runs.steps import solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.solvers.base import StepRecord
 
@@ -58,7 +59,7 @@ def run_assembly_adaptive(
     if assembly.n_steps > 1:
         whole = HistoryRefinement(
             refinement,
-            lambda level, *known: solved_assemblies([level.assembly], level.meshes, callback, *known),
+            lambda level, *known: solved_history(SEVERAL_BODIES, [level.assembly], level.meshes, callback, *known),
             done,
             finished,
         )

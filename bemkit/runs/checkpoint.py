@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import overload
+from typing import Any, overload
 
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import check_result_target, read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive
-from bemkit.runs.assembly import solved_assemblies
+from bemkit.runs.assembly import SEVERAL_BODIES
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
-from bemkit.runs.history import solved_history
-from bemkit.runs.steps import joined
+from bemkit.runs.history import ONE_BODY
+from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
@@ -68,18 +68,14 @@ def run_to_file(
     def write(solution: Solution | AssemblySolution) -> None:
         write_result(target, solution)
 
+    is_assembly = isinstance(scene, Assembly)
     solution: Solution | AssemblySolution
-    if isinstance(scene, Assembly):
-        begun = done if isinstance(done, AssemblySolution) else None
-        if scene.mesh.accuracy is None:
-            solution = joined(*solved_assemblies([scene], None, callback, begun, write))
-        else:
-            solution = run_assembly_adaptive(scene, callback=callback, done=begun, finished=write)[-1]
+    if scene.mesh.accuracy is None:
+        kind: Kind[Any, Any] = SEVERAL_BODIES if is_assembly else ONE_BODY
+        asked: list[Any] = [scene]
+        solution = joined(*solved_history(kind, asked, None, callback, done, write))
     else:
-        begun_one = done if isinstance(done, Solution) else None
-        if scene.mesh.accuracy is None:
-            solution = joined(*solved_history([scene], None, None, callback, begun_one, write))
-        else:
-            solution = run_adaptive(scene, callback=callback, done=begun_one, finished=write)[-1]
+        adaptive: Callable[..., Any] = run_assembly_adaptive if is_assembly else run_adaptive
+        solution = adaptive(scene, callback=callback, done=done, finished=write)[-1]
     write_result(target, solution)
     return solution

@@ -11,7 +11,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.model import build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 
@@ -46,7 +46,7 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
     loaded, constant = prepare_assembly_steps([assembly, with_scaled_loads(assembly, 0.0)], meshes)
     if not loaded.n_contact:
         raise InputError("no two bodies are in contact: list contacts")
-    with blas_threads_for(max(body.space.n_dofs for body in loaded.bodies)):
+    with blas_threads_for(loaded.largest_matrix):
         model = build_assembled_model(loaded)
         at_rest = model.under(constant)
         growing = model.body.rigid_load() - at_rest.body.rigid_load()

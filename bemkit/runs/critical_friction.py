@@ -19,8 +19,8 @@ from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.history import UnsolvableSceneError
 from bemkit.runs.run import LoadHistoryError, run
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.active_sets import NodeStatus

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.body import ContactState
-from bemkit.contact.slip_history import SlipHistory
-from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
@@ -20,18 +19,14 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_held_friction
-from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.operators.stopwatch import assembly_time
-from bemkit.plan import Plan, announce_plan, check_elements, check_memory, plan_steps
+from bemkit.operators.stopwatch import Stage, StageClock
+from bemkit.plan import Plan, check_elements, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions
 from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.results.solved_steps import SolvedSteps
+from bemkit.results.solved_problem import SolvedSteps
 from bemkit.results.warnings import find_warnings
-from bemkit.runs.steps import History, Kind, joined, solve_steps
-from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
-from bemkit.runs.timing import Stage, StageClock
+from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.runs.warm_start import state_on
-from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
@@ -67,45 +62,9 @@ def run_history(
     UnsolvableSceneError, ValueError
         As for `run`, also if the scenes differ by more than numbers.
     """
-    return SolvedSteps(solved_history(scenes, mesh, start, callback)[1])
-
-
-def solved_history(
-    scenes: Sequence[Scene],
-    mesh: BoundaryMesh | None = None,
-    start: Solution | None = None,
-    callback: Callable[[StepRecord], None] | None = None,
-    done: Solution | None = None,
-    finished: Callable[[Solution], None] | None = None,
-) -> tuple[History[Solution], tuple[Solution, ...]]:
-    """Solve scenes as `run_history`; see `History` for what is done and who hears of finished steps."""
-    steps = [step for scene in scenes for step in load_steps(scene)]
-    if not steps:
+    if not scenes:
         raise InputError("scenes is empty: give at least one scene")
-    history: History[Solution] = History.of(scenes[-1], steps, done, finished)
-    prepared, plan, clock = prepared_and_planned(steps, mesh)
-    with blas_threads_for(plan.largest_matrix):
-        if start is not None and not steps[0].contact_parts:
-            raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
-        model, clock = built(prepared[0], clock)
-        guess = None if start is None else state_on(model, start)
-        solved = solve_steps(ONE_BODY, model, prepared, plan, history, clock=clock, guess=guess, callback=callback)
-        return history, solved
-
-
-def prepared_and_planned(
-    steps: Sequence[Scene], mesh: BoundaryMesh | None
-) -> tuple[tuple[Prepared, ...], Plan, StageClock]:
-    """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
-    clock = StageClock.start()
-    if mesh is None:
-        check_elements(steps[0])
-        mesh = steps[0].build_mesh()
-    prepared = prepare_steps(steps, mesh)
-    plan = plan_steps(prepared)
-    check_memory(plan)
-    announce_plan(plan)
-    return prepared, plan, clock.closed(Stage.MESH)
+    return SolvedSteps(solved_history(ONE_BODY, scenes, mesh, callback, guess=_guess(scenes[0], start))[1])
 
 
 def run_on_mesh(
@@ -115,20 +74,29 @@ def run_on_mesh(
     callback: Callable[[StepRecord], None] | None = None,
 ) -> Solution:
     """Solve a scene on one mesh; of a load history return the last step with the solves, records and times of all."""
-    return joined(*solved_history([scene], mesh, start, callback))
+    return joined(*solved_history(ONE_BODY, [scene], mesh, callback, guess=_guess(scene, start)))
 
 
-def built(prepared: Prepared, clock: StageClock) -> tuple[Model, StageClock]:
-    """Assemble and condense the body of a scene."""
-    with assembly_time() as assembly:
-        model = build_model(prepared)
-    return model, clock.closed_build(assembly)
+def _guess(scene: Scene, start: Solution | None) -> Callable[[Model], ContactState] | None:
+    """Return what takes a solution to the contact nodes of a model, where one is given."""
+    if start is None:
+        return None
+    if not scene.contact_parts:
+        raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+    return lambda model: state_on(model, start)
 
 
-def explained(model: Model, result: ContactSolution) -> str:
-    """Say why nothing can balance the load."""
-    load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
-    return result.message if load is None else describe(model.prepared, load)
+def _prepared(steps: Sequence[Scene], mesh: BoundaryMesh | None) -> tuple[tuple[Prepared, ...], Plan]:
+    """Return load steps ready to solve, and their plan."""
+    if mesh is None:
+        check_elements(steps[0])
+        mesh = steps[0].build_mesh()
+    prepared = prepare_steps(steps, mesh)
+    return prepared, plan_steps(prepared)
+
+
+def _explained(model: Model, load: UnsolvableLoad) -> str:
+    return describe(model.prepared, load)
 
 
 def solution_of(
@@ -196,4 +164,4 @@ def _contact_table(
     )
 
 
-ONE_BODY: Kind[Model, Solution] = Kind(with_energy_checked, solution_of, explained)
+ONE_BODY: Kind[Model, Solution] = Kind(_prepared, build_model, with_energy_checked, solution_of, _explained)

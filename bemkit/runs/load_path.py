@@ -9,9 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.body import ContactState
+from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.model.prepared import Units
 from bemkit.model.untouched_body import certified
 from bemkit.results.load_history import StepWork

@@ -10,8 +10,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.order import along_boundary
 from bemkit.geometry.meshing.partition import Partition
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.results.contact_table import resolved_transitions
 from bemkit.results.solution import Solution
 from bemkit.scene.scene import Scene

@@ -13,12 +13,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.stopwatch import Stage
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
-from bemkit.runs.history import UnsolvableSceneError as UnsolvableSceneError
-from bemkit.runs.history import built, prepared_and_planned, run_on_mesh, solution_of
-from bemkit.runs.timing import Stage
+from bemkit.runs.history import ONE_BODY, run_on_mesh, solution_of
+from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
@@ -163,9 +163,9 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
-    (prepared,), plan, clock = prepared_and_planned(load_steps(scene), mesh)
-    with blas_threads_for(plan.largest_matrix):
-        model, clock = built(prepared, clock)
+    (prepared,), plan, clock = ONE_BODY.planned(load_steps(scene), mesh)
+    with blas_threads_for(prepared.largest_matrix):
+        model, clock = ONE_BODY.built(prepared, clock)
         load = find_unsolvable_load(model.problem)
         if load is not None:
             raise UnsolvableSceneError(describe(model.prepared, load))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from threading import Lock
 from typing import Protocol
@@ -11,21 +10,19 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.contact.body import ContactState
-from bemkit.errors import BemkitError, InputError
+from bemkit.errors import BemkitError
 from bemkit.model.assembled.model import build_assembled_model
-from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly
+from bemkit.model.assembled.prepared import PreparedAssembly
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import Prepared, find_units
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.plan import check_memory
-from bemkit.plan.assembly_plan import plan_assembly
+from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.runs.assembly import SEVERAL_BODIES, assembly_solution
-from bemkit.runs.history import ONE_BODY, prepared_and_planned
+from bemkit.runs.history import ONE_BODY
 from bemkit.runs.run import run
 from bemkit.runs.steps import History, joined, solve_steps, solved_once
-from bemkit.runs.timing import Stage, StageClock
 from bemkit.runs.warm_start import state_on
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
@@ -125,10 +122,10 @@ class _OneBody:
     """One elastic body under several scenes."""
 
     def __init__(self, base: Scene, *, has_one_load: bool) -> None:
-        steps, self._plan, _ = prepared_and_planned(load_steps(base), None)
+        steps, self._plan, _ = ONE_BODY.planned(load_steps(base), None)
         self._has_one_load = has_one_load and len(steps) == 1
         self._last: Solution | None = None
-        with blas_threads_for(self._plan.sizes.n_displacements):
+        with blas_threads_for(steps[0].largest_matrix):
             self._model = build_model(steps[0])
 
     @property
@@ -139,7 +136,7 @@ class _OneBody:
         if not isinstance(scene, Scene):
             return run(scene)
         clock, start = StageClock.start(), None if is_cold else self._last
-        with blas_threads_for(self._plan.sizes.n_displacements):
+        with blas_threads_for(self._model.prepared.largest_matrix):
             model, steps = self._under(scene)
             clock = clock.closed(Stage.CONDENSE)
             history: History[Solution] = History.of(scene, [step.scene for step in steps])
@@ -172,13 +169,9 @@ class _SeveralBodies:
     """The bodies of an assembly under several loads, gaps and laws."""
 
     def __init__(self, base: Assembly) -> None:
-        prepared = prepare_assembly(load_steps(base)[0])
-        if not prepared.n_contact:
-            raise InputError("no two bodies are in contact")
-        self._plan = plan_assembly([prepared])
-        check_memory(self._plan)
+        (prepared,), self._plan, _ = SEVERAL_BODIES.planned(load_steps(base)[:1], None)
         self._last: ContactState | None = None
-        with self._threads(prepared):
+        with blas_threads_for(prepared.largest_matrix):
             self._model = build_assembled_model(prepared)
 
     @property
@@ -194,7 +187,7 @@ class _SeveralBodies:
         prepared = base.under(scene.with_contacts(base.assembly.contacts) if scene.touching else scene)
         if not _has_same_rows(prepared, base):  # an obstacle that has turned, say
             return run(scene)
-        with self._threads(base):
+        with blas_threads_for(base.largest_matrix):
             model = self._model.under(prepared)
             clock, start = clock.closed(Stage.CONDENSE), None if is_cold else self._last
             reached = solved_once(SEVERAL_BODIES, model, start)
@@ -202,9 +195,6 @@ class _SeveralBodies:
         if solution.is_converged:
             self._last = reached.state
         return solution
-
-    def _threads(self, prepared: PreparedAssembly) -> AbstractContextManager[None]:
-        return blas_threads_for(max(body.space.n_dofs for body in prepared.bodies))
 
 
 def _has_same_rows(prepared: PreparedAssembly, other: PreparedAssembly) -> bool:

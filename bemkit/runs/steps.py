@@ -1,4 +1,4 @@
-"""The one loop over the steps of a load history, of one body or of several."""
+"""Load histories of one body or of several: what is asked, the one loop over their steps, and what comes out."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
-from bemkit.contact.body import ContactState
+from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.slip_history import SlipHistory
+from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
 from bemkit.errors import InputError
-from bemkit.plan import Plan
+from bemkit.operators.linear.threads import blas_threads_for
+from bemkit.operators.stopwatch import Stage, StageClock, assembly_time
+from bemkit.plan import Plan, announce_plan, check_memory
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import LoadHistory, LoadStep
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
-from bemkit.runs.timing import Stage, StageClock
 from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import AnyScene, load_steps
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolution, Status, solve
 
@@ -31,21 +33,46 @@ class UnsolvableSceneError(InputError):
 
 @dataclass(frozen=True)
 class Kind(Generic[AnyModel, AnySolution]):
-    """What the loop over load steps asks of one body, or of several.
+    """How one body is solved, or several.
 
     Parameters
     ----------
+    prepared : callable
+        Load steps and a mesh, or meshes by the names of bodies -> what the steps say there, and their plan.
+    model : callable
+        What the first step says -> the model; operators are assembled and the bodies condensed.
     checked : callable
         Model and outcome -> the outcome, with another status if the energy of a body is negative.
     solution : callable
         Model, outcome, plan, clock and slip -> the fields.
     explained : callable
-        Model and outcome -> why nothing can balance the load.
+        Model and a load that nothing can balance -> why not, and the remedy.
     """
 
+    prepared: Callable[[Sequence[Any], Any], tuple[Sequence[Any], Plan]]
+    model: Callable[[Any], AnyModel]
     checked: Callable[[AnyModel, ContactSolution], ContactSolution]
     solution: Callable[[AnyModel, ContactSolution, Plan, StageClock, SlipHistory], AnySolution]
-    explained: Callable[[AnyModel, ContactSolution], str]
+    explained: Callable[[AnyModel, UnsolvableLoad], str]
+
+    def planned(self, steps: Sequence[Any], meshes: Any) -> tuple[Sequence[Any], Plan, StageClock]:
+        """Return load steps ready to solve, their plan, and the clock of their run; refuse what does not fit."""
+        clock = StageClock.start()
+        prepared, plan = self.prepared(steps, meshes)
+        check_memory(plan)
+        announce_plan(plan)
+        return prepared, plan, clock.closed(Stage.MESH)
+
+    def built(self, prepared: Any, clock: StageClock) -> tuple[AnyModel, StageClock]:
+        """Assemble and condense the bodies."""
+        with assembly_time() as assembly:
+            model = self.model(prepared)
+        return model, clock.closed_build(assembly)
+
+    def why_not(self, model: AnyModel, result: ContactSolution) -> str:
+        """Say why a load cannot be balanced, or what the driver says of another failure."""
+        load = find_unsolvable_load(model.problem) if result.status is Status.UNSOLVABLE_LOAD else None
+        return result.message if load is None else self.explained(model, load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +120,45 @@ class History(Generic[AnySolution]):
                 before, time = times[number - 1], times[number]
                 raise InputError(f"step {number + 1}: time is {time:g} after {before:g}: give times that increase")
         return cls(asked, times, has_times or len(times) > 1, done, finished)
+
+
+def solved_history(
+    kind: Kind[AnyModel, AnySolution],
+    asked: Sequence[AnyScene],
+    meshes: Any = None,
+    callback: Callback = None,
+    done: AnySolution | None = None,
+    finished: Callable[[AnySolution], None] | None = None,
+    guess: Callable[[AnyModel], ContactState] | None = None,
+) -> tuple[History[AnySolution], tuple[AnySolution, ...]]:
+    """Solve scenes that follow each other in time, of one body or of several, on one mesh of each body.
+
+    Parameters
+    ----------
+    kind : Kind
+    asked : sequence of Scene or of Assembly
+        One with several steps or load factors stands for as many.
+    meshes : BoundaryMesh, or mapping of str to BoundaryMesh, optional
+        As `bemkit.run` and `bemkit.run_assembly_history` take them.
+    callback : callable, optional
+        Receives a record of every step of the solver.
+    done, finished : optional
+        See `History`.
+    guess : callable, optional
+        Model -> where to start the first step.
+
+    Returns
+    -------
+    History, tuple of solutions
+        See `solve_steps`.
+    """
+    steps = [step for each in asked for step in load_steps(each)]
+    history: History[AnySolution] = History.of(asked[-1], steps, done, finished)
+    prepared, plan, clock = kind.planned(steps, meshes)
+    with blas_threads_for(prepared[0].largest_matrix):
+        model, clock = kind.built(prepared[0], clock)
+        start = None if guess is None else guess(model)
+        return history, solve_steps(kind, model, prepared, plan, history, clock=clock, guess=start, callback=callback)
 
 
 def solve_steps(
@@ -145,14 +211,14 @@ def solve_steps(
         clock = clock.closed(Stage.CONDENSE)
         reached = reach(_path(model, before, end, history.times[number]), guess, callback)
         if before is None and not reached.result.history:
-            raise UnsolvableSceneError(kind.explained(model, reached.result))
+            raise UnsolvableSceneError(kind.why_not(model, reached.result))
         model = replace(model, problem=reached.problem)
         result = kind.checked(model, reached.result)
         clock = clock.closed(Stage.SOLVE)
         if before is not None and not result.is_converged:
             words = result.message
             if result.status is Status.UNSOLVABLE_LOAD:
-                words = f"{result.status.value} {kind.explained(model, result)}."
+                words = f"{result.status.value} {kind.why_not(model, result)}."
             solutions.append(_not_reached(solutions[-1] if solutions else whole, replace(result, message=words), clock))
             break
         solution = kind.solution(model, result, plan, clock, reached.end.motion)
@@ -184,7 +250,7 @@ def solved_once(kind: Kind[AnyModel, AnySolution], model: AnyModel, start: Conta
     """Solve a model under a single load; UnsolvableSceneError if nothing can balance it."""
     result = solve(model.problem, model.solver, start=start, throw=False)
     if not result.history:
-        raise UnsolvableSceneError(kind.explained(model, result))
+        raise UnsolvableSceneError(kind.why_not(model, result))
     return kind.checked(model, result)
 
 

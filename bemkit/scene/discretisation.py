@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
 from bemkit.operators.linear.solvers import (
     ChosenLinearSolver,

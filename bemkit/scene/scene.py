@@ -127,9 +127,10 @@ class Scene(ShownInNotebooks):
                 "1e-6, or a fixed degree"
             )
         outline = self.shape.outline()
-        check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
-        drawn = drawn_shape(self.shape)
-        check_length_of_file("" if drawn is None else drawn.unit, self.units)
+        if outline.surface is not None or self.far is not None:
+            check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+        if self.units is not None and (drawn := drawn_shape(self.shape)):
+            check_length_of_file(drawn.unit, self.units)
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "

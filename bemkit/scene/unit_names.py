@@ -72,9 +72,9 @@ def with_unit(label: str, quantity: str, units: UnitNames | None) -> str:
     return f"{label} [{unit}]" if unit else label
 
 
-def check_length_of_file(stated: str, units: UnitNames | None) -> None:
+def check_length_of_file(stated: str, units: UnitNames) -> None:
     """Raise if the file of a shape states another unit of length than a scene; empty is no statement."""
-    if units is None or stated not in _METRES or units.length not in _METRES or stated == units.length:
+    if stated not in _METRES or units.length not in _METRES or stated == units.length:
         return
     factor = _METRES[stated] / _METRES[units.length]
     raise InputError(

@@ -3,8 +3,8 @@
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.testing.failure import CheckFailed, demand, evaluated
 
 

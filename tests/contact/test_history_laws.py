@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from bemkit.arrays import FloatArray
+from bemkit.contact.body import SlipHistory
 from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
 from bemkit.contact.laws import Coulomb, FrictionLaw, RescaledLaw
 from bemkit.contact.piecewise_law import PiecewiseLaw
-from bemkit.contact.slip_history import SlipHistory
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.testing import CheckFailed, check_law

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from bemkit.contact.joined.member import diagonal_blocks
 from bemkit.contact.rigid_motions import null_space
-from bemkit.operators.linear.blocks import diagonal_blocks
 
 
 def chain(n, held):

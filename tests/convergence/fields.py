@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh
-from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes

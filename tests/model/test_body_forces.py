@@ -17,7 +17,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.material import Plane
-from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.steps import UnsolvableSceneError
 
 MATERIAL = bk.Material(1.0, 0.3)
 FLOOR = bk.Part("floor", bk.Contact(bk.HalfPlane()), sides=("bottom",))

@@ -14,7 +14,7 @@ import pytest
 
 from bemkit.atomic_files import OutputFileError
 from bemkit.geometry import BoundaryMesh, Disk, Rectangle, discretise
-from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.hdf5 import seal
 from bemkit.operators import cache

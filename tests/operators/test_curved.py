@@ -28,7 +28,7 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element

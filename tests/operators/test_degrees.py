@@ -11,8 +11,8 @@ import pytest
 
 import bemkit as bk
 from bemkit.arrays import ComplexArray, FloatArray
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction

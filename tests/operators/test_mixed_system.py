@@ -9,7 +9,7 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.geometry import BoundaryMesh, Disk, PlateWithHole, Rectangle, Ring, discretise
-from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.collocation.reciprocity import Reciprocity
 from bemkit.operators.counts import Entries

@@ -20,7 +20,7 @@ from bemkit.geometry import (
     Uniform,
     discretise,
 )
-from bemkit.geometry.corners import corner_nodes
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace, dof_points
 from bemkit.operators.linear.solvers import Automatic
 from bemkit.operators.material import Material, Plane

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.pictures import draw_deformation
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies, outline_of
 from bemkit.pictures.shown import Shown, shown
-from bemkit.results.rigid_result import RigidResult
+from bemkit.results.part_forces import RigidResult
 
 FRAME = np.array([[-3.0, 3.0], [-2.0, 2.0]])
 ROUND = tuple((float(np.cos(angle)), float(np.sin(angle))) for angle in np.linspace(0.0, 2.0 * np.pi, 64)[:-1])

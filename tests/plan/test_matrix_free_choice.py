@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import bemkit as bk
-from bemkit.operators.linear.choice import choose_linear_solver
+from bemkit.operators.linear.solvers import choose_linear_solver
 from tests.contact.test_hierarchical_body import loose_block
 from tests.plan.test_hierarchical_choice import chosen, scene_of
 from tests.scenes import Perforated, squeezed

@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.model.assembled.contacts import OverlapError
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
-from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.steps import UnsolvableSceneError
 
 STEEL = bk.Material(1.0, 0.3)
 SHEAR = 0.2

@@ -12,8 +12,8 @@ import pytest
 import bemkit as bk
 from bemkit.cli.main import main
 from bemkit.runs.critical_friction import NoSlidingStateError
-from bemkit.runs.history import UnsolvableSceneError
 from bemkit.runs.run import LoadHistoryError, run_probe
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.scene import NoContactError
 
 LEG = bk.load_scene("wedged-leg")

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.model.assembled.model import build_assembled_model
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.runs import load_path
-from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps, with_scaled_loads
 from bemkit.solvers.base import Status
 from tests.runs.masonry import FRICTION, wall

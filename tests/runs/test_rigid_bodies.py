@@ -17,7 +17,7 @@ from bemkit.pictures import draw_deformation
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_json
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
-from bemkit.runs.history import UnsolvableSceneError
+from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.solvers.base import solve
 
 STEEL = bk.Material(1.0, 0.3)

@@ -8,7 +8,7 @@ import numpy as np
 
 import bemkit as bk
 from bemkit.arrays import FloatArray
-from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import BoundarySpace, LinearSpace, QuadraticSpace
 from bemkit.operators.boundary import hypersingular, single_layer
 

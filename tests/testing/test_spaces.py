@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from bemkit.geometry import Arc, Disk, ParametricCurve, PlateWithHole, Polygon, Segment, curves, discretise, spaces
-from bemkit.geometry.corners import corner_nodes
 from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import ConstantSpace, ElementwiseSpace, LagrangeSpace, LinearSpace, QuadraticSpace
 from bemkit.testing import CheckFailed, check_curve, check_space
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,6 @@ from scipy import sparse
 
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
-from bemkit.operators.linear.blocks import diagonal_blocks
 
 _MOTIONS_ARE_FREE = 1e-6
 """Share of its largest entry that a stiffness may leave of rigid motions: quadrature leaves less, a support more."""
@@ -176,3 +175,8 @@ def deformation(shapes: Sequence[Shape], forces: FloatArray) -> FloatArray:
         else:
             displacement[shape.rows] = shape.flexibility @ on_copies
     return displacement
+
+
+def diagonal_blocks(blocks: Iterable[FloatArray | sparse.csr_array]) -> sparse.csr_array:
+    """Return a sparse array with blocks (m, n) of any shapes along its diagonal, zero elsewhere."""
+    return sparse.csr_array(sparse.block_diag([sparse.coo_array(block) for block in blocks], format="csr"))

@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import norms, turned_right
 

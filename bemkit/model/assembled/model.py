@@ -11,7 +11,7 @@ from scipy import sparse
 from bemkit.arrays import FloatArray, IntArray, blended
 from bemkit.contact.body import ContactState
 from bemkit.contact.joined.joined_bodies import JoinedBodies
-from bemkit.contact.joined.member import Member
+from bemkit.contact.joined.member import Member, diagonal_blocks
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody, groups
@@ -20,7 +20,6 @@ from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_moti
 from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.prepared import Units
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.blocks import diagonal_blocks
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare

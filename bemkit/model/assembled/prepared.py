@@ -24,10 +24,9 @@ from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
-from bemkit.operators.linear.memory import physical_memory
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.needs import BodyCase
+from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
@@ -71,6 +70,11 @@ class PreparedAssembly:
     def n_contact(self) -> int:
         """Number of contact nodes."""
         return sum(rows.n_contact for rows in self.rows)
+
+    @property
+    def largest_matrix(self) -> int:
+        """Order of the largest matrix that is factored, roughly."""
+        return max(body.space.n_dofs for body in self.bodies)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of `ContactRows` for all contact nodes."""
@@ -304,9 +308,11 @@ def _insides(
         key = (id(body.own_mesh), forces)
         if key not in found:
             own = body.units(units.modulus, units.stress * units.length)
-            scene = replace(body.scene, body_forces=forces)
-            solution = particular_solution(scene, body.own_mesh, own.modulus, own.stress)
-            found[key] = None if solution is None else ForcesInside.of(solution, body.own_space)
+            found[key] = None
+            if forces:
+                scene = replace(body.scene, body_forces=forces)
+                solution = particular_solution(scene, body.own_mesh, own.modulus, own.stress)
+                found[key] = ForcesInside.of(solution, body.own_space)
         insides.append(found[key])
     return tuple(insides)
 

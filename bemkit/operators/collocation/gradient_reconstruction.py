@@ -18,8 +18,8 @@ from functools import cached_property
 import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, IntArray, Run, consecutive_runs
-from bemkit.geometry.corners import corner_nodes
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import corner_nodes
 from bemkit.operators.integrals.panels import Panels
 
 CORNER_ANGLE = 0.3

@@ -103,7 +103,7 @@ class GalerkinElasticity:
         if isinstance(linear_solver, Automatic | Hierarchical | MatrixFree):
             raise InputError(
                 f"linear_solver is {linear_solver}: a map does not choose; give DenseCholesky(), or what "
-                "bemkit.operators.linear.choice.choose_linear_solver returns for it"
+                "bemkit.operators.linear.solvers.choose_linear_solver returns for it"
             )
         self.linear_solver: LinearSolver = linear_solver
 

@@ -6,6 +6,7 @@ collocation, and the evaluations of integrals, were fitted once to runs of the s
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -275,3 +276,11 @@ def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[fl
     far, near = ((1.0 - share) * one + share * other for one, other in zip(straight, curved, strict=True))
     n_sources = mesh.whole.n_elements
     return mesh.n_elements * (n_sources * far + near)
+
+
+def physical_memory() -> float:
+    """Return the memory of this computer [bytes], infinite on systems that do not tell."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return float("inf")

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part

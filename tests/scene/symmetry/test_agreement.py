@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.corners import break_nodes
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.reflection import antisymmetric_dofs, reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.contact_model import build_model

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.corners import break_nodes
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.meshing.order import along_boundary
+from bemkit.geometry.neighbours import along_boundary, break_nodes
 from bemkit.geometry.spaces import BoundarySpace
 
 PLATE = bk.PlateWithHole(2.0, 3.0, 0.3, (5.0, -1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,8 @@ from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.random_assemblies.layouts import random_layout
+from bemkit.studies.stability.random_assemblies import blocks, corners, round_bodies
+from bemkit.studies.stability.random_assemblies.layout import Layout
 from bemkit.studies.stability.random_assemblies.members import Members
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.random_scenes.draw import Draw
@@ -130,3 +132,21 @@ def _loaded(body: Body, factor: float) -> Body:
         return part
 
     return replace(body, parts=tuple(changed(part) for part in body.parts))
+
+
+def random_layout(draw: Draw, members: Members) -> Layout:
+    """Draw an arrangement."""
+    kinds: dict[Callable[[Draw, Members], Layout], float] = {
+        blocks.stack: 4.0,
+        round_bodies.discs: 2.0,
+        round_bodies.pin: 2.0,
+        corners.wedge: 1.5,
+        blocks.wall: 2.0,
+        blocks.crossing: 1.5,
+        round_bodies.rings: 1.5,
+        corners.notch: 2.0,
+        corners.split: 1.5,
+        round_bodies.tunnel: 1.0,
+        blocks.arch: 0.7,
+    }
+    return draw.one_by_weight(kinds)(draw, members)

@@ -1,4 +1,4 @@
-"""Nodes of a mesh where functions on the boundary may jump."""
+"""What lies beside what along a boundary: elements in their order, corners between them, ends of parts."""
 
 from __future__ import annotations
 
@@ -6,9 +6,39 @@ from functools import lru_cache
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, read_only
+from bemkit.arrays import BoolArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import angles_between
+
+
+def along_boundary(mesh: BoundaryMesh, elements: IntArray) -> IntArray:
+    """Sort elements along the boundary, each connected run from its start to its end.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    elements : (m,) array
+        Element numbers without repetition.
+
+    Returns
+    -------
+    (m,) array
+        Runs follow one another by the number of their first element; a whole loop starts with its smallest number.
+    """
+    chosen = np.zeros(mesh.n_elements, bool)
+    chosen[elements] = True
+    incoming, outgoing = mesh.node_elements.T
+    previous, following = incoming[mesh.elements[:, 0]], outgoing[mesh.elements[:, 1]]
+    is_first = previous == np.arange(mesh.n_elements)  # on a symmetry line
+    starts = np.flatnonzero(chosen & (is_first | ~chosen[previous])).tolist()
+    ordered: list[int] = []
+    while starts or chosen.any():
+        element = starts.pop(0) if starts else int(np.flatnonzero(chosen)[0])
+        while chosen[element]:
+            chosen[element] = False
+            ordered.append(element)
+            element = int(following[element])
+    return np.array(ordered, dtype=np.intp)
 
 
 @lru_cache(maxsize=4)
