@@ -21,8 +21,8 @@ from bemkit.scene.scene import Scene
 from bemkit.studies.engine import REFUSED, Attempt, Task, attempt, compute
 from bemkit.studies.stability.axes import Axis, Baseline
 from bemkit.studies.stability.case import Case, Similarity
-from bemkit.studies.stability.independent_check import check_assembly, check_solution
-from bemkit.studies.stability.independent_check.verdict import Entries
+from bemkit.studies.stability.independent_check import check_step
+from bemkit.studies.stability.independent_check.verdict import Violations
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 
@@ -123,13 +123,9 @@ def _twin(scene: Scene | Assembly) -> tuple[Similarity | AssemblySimilarity, Sce
     return TWIN, TWIN.apply(scene)
 
 
-def _checked(solution: AnySolution) -> Entries:
-    if not isinstance(solution, AssemblySolution):
-        return check_solution(solution)
-    steps = () if solution.loading is None else solution.loading.steps
-    # slip counts from the last increment, which is not there to be seen if a step was gone in several
-    is_known = len(steps) > 1 and steps[-1].n_increments == 1
-    return check_assembly(solution, solution.at_step(len(steps) - 1) if is_known else None)
+def _checked(solution: AnySolution) -> Violations:
+    n_steps = 0 if solution.loading is None else len(solution.loading.steps)
+    return check_step(solution, solution.at_step(n_steps - 1) if n_steps > 1 else None)
 
 
 def _attempt(scene: Scene | Assembly, case: Case) -> Attempt[Any]:
@@ -223,7 +219,7 @@ def _judge(
     reference: AnySolution | None,
     first: Attempt[Any],
     second: Attempt[Any],
-    check: Entries | None,
+    check: Violations | None,
     drift: float,
     twin: float,
 ) -> tuple[Verdict, str]:

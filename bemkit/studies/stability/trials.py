@@ -22,8 +22,8 @@ from bemkit.runs.assembly import run_assembly_history
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.studies.engine import Task
-from bemkit.studies.stability.independent_check import check_assembly, check_solution
-from bemkit.studies.stability.independent_check.verdict import Entries
+from bemkit.studies.stability.independent_check import check_step
+from bemkit.studies.stability.independent_check.verdict import Violations
 from bemkit.studies.stability.random_assemblies import RandomAssembly, random_assembly
 from bemkit.studies.stability.random_scenes import RandomCase, random_case
 
@@ -117,7 +117,7 @@ def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outco
     for before, step in pairwise((None, *solutions)):
         if step is None or not step.is_converged:
             continue
-        check = _check(step, before)
+        check = check_step(step, before)
         if not check.is_good:
             return Outcome.WRONG, check.faults[0], describe(check)
         if fault := energy_fault(step):
@@ -166,15 +166,7 @@ def _work_of_motion(step: Solution | AssemblySolution) -> float:
     )
 
 
-def _check(step: Solution | AssemblySolution, before: Solution | AssemblySolution | None) -> Entries:
-    if step.loading is not None and step.loading.steps[-1].n_increments > 1:
-        before = None  # slip counts from the last increment, which is not there to be seen
-    if isinstance(step, AssemblySolution):
-        return check_assembly(step, before if isinstance(before, AssemblySolution) else None)
-    return check_solution(step, before if isinstance(before, Solution) else None)
-
-
-def describe(check: Entries) -> str:
+def describe(check: Violations) -> str:
     """Return the entries of the check that are too large, with their values."""
     entries = [f"{name} {check.exact[name]:.1e}" for name in check.faults]
     doubts = [f"{name} {getattr(check, name):.1e}" for name in ("reciprocity", "hidden_overlap")]

@@ -10,6 +10,7 @@ elastic body.
 
 from bemkit.studies.stability.independent_check.assembly_check import AssemblyCheck as AssemblyCheck
 from bemkit.studies.stability.independent_check.assembly_check import check_assembly as check_assembly
+from bemkit.studies.stability.independent_check.assembly_check import check_step as check_step
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT as CONTACT_LIMIT
 from bemkit.studies.stability.independent_check.check import IndependentCheck as IndependentCheck
 from bemkit.studies.stability.independent_check.check import check_solution as check_solution

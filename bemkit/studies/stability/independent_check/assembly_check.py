@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-
-import numpy as np
+from dataclasses import dataclass
 
 from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.studies.stability.independent_check.boundary import largest
-from bemkit.studies.stability.independent_check.check import slip_opposition, status_mismatch
+from bemkit.results.solution import Solution
+from bemkit.studies.stability.independent_check.check import check_solution, contact_violations, is_finite
 from bemkit.studies.stability.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
 from bemkit.studies.stability.independent_check.joints import Joints
 from bemkit.studies.stability.independent_check.resultants import (
@@ -17,57 +15,33 @@ from bemkit.studies.stability.independent_check.resultants import (
     reaction_mismatch,
     rigid_mismatch,
 )
-from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Entries
+from bemkit.studies.stability.independent_check.verdict import COARSE_LIMIT, COARSE_SHARE, Violations
 
 
 @dataclass(frozen=True, kw_only=True)
-class AssemblyCheck(Entries):
+class AssemblyCheck(Violations):
     """Violations found in the fields of an assembly, dimensionless; zero is perfect.
+
+    Of reciprocity, with the moments, coarseness and the like the worst of all bodies is told; hidden overlap is how
+    deep points between nodes are in the partner, over the displacement that strains the body.
 
     Parameters
     ----------
-    numbers : float
-        Infinite if a field holds a number that is not finite, zero otherwise.
     gaps : float
         Gaps of the table against distances measured again, of obstacles and of flat sides.
     means : float
         Mean relative displacements of flat sides against those of the table; its clearances against gaps.
-    supports : float
-        Held displacements and loads against what is given.
-    penetration, tension, complementarity, cone_excess, slip_opposition, status : float
-        See `IndependentCheck`.
     reactions : float
         Forces that the elements of a side feel, against what the table says, with the other sign on the partner's.
-    equilibrium : float
-        Resultant of loads, contacts and forces inside on each body, along free translations.
-    negative_energy, energy : float
-        Elastic energy of a body below zero; of all against half the work of loads and of contacts.
-    elasticity : float
-        Of half-planes, see `IndependentCheck`.
     rigid : float
         Motions and loads of rigid bodies against what is given, and the balance of each.
     between_nodes : float
         How much deeper points of one side are in the other one than the solution says of them.
-    reciprocity, coarseness, hidden_overlap
-        See `Entries`: the worst of the bodies, the moments on them among them; how deep points between nodes are in
-        the partner, over the displacement that strains the body.
     """
 
-    numbers: float
     gaps: float
     means: float
-    supports: float
-    penetration: float
-    tension: float
-    complementarity: float
-    cone_excess: float
-    slip_opposition: float
-    status: float
     reactions: float
-    equilibrium: float
-    negative_energy: float
-    energy: float
-    elasticity: float
     rigid: float
     between_nodes: float
 
@@ -85,25 +59,17 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
     Slip counts from the end of the load step before. Without that, friction against slip is not checked at the end of a
     load history.
     """
-    if not _is_finite(solution):
-        unknown = dict.fromkeys((entry.name for entry in fields(AssemblyCheck)), float("nan"))
-        return AssemblyCheck(**{**unknown, "numbers": float("inf")})
+    if not is_finite(solution):
+        return AssemblyCheck.not_finite()
     joints = Joints.of(solution)
-    measured = joints.measured(before)
     bodies = joints.bodies.values()
     deepest, unsaid = hidden_overlaps(joints)
-    has_history = before is None and solution.loading is not None and len(solution.loading.steps) > 1
     return AssemblyCheck(
         numbers=0.0,
         gaps=gap_mismatch(joints),
         means=mean_mismatch(joints),
         supports=max(body.supports() for body in bodies),
-        penetration=largest(-measured.clearance),
-        tension=largest(-measured.pressure),
-        complementarity=largest(np.minimum(measured.held, np.abs(measured.clearance))),
-        cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
-        slip_opposition=0.0 if has_history else slip_opposition(measured),
-        status=0.0 if has_history else status_mismatch(solution.contact.status, measured),
+        **contact_violations(joints.measured(before), solution, knows_slip=before is not None),
         reactions=reaction_mismatch(joints),
         equilibrium=largest_imbalance(joints),
         negative_energy=max(body.negative_energy() for body in bodies),
@@ -117,13 +83,13 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
     )
 
 
-def _is_finite(solution: AssemblySolution) -> bool:
-    columns = solution.contact.columns()
-    distances = [columns.pop(name) for name in ("gap", "clearance")]
-    of_bodies = (
-        field
-        for body in solution.bodies.values()
-        for field in (body.boundary.displacement, body.boundary.traction_dofs, np.array(body.energy))
-    )
-    is_finite = all(bool(np.isfinite(field).all()) for field in (*columns.values(), *of_bodies))
-    return is_finite and not any(np.isnan(field).any() for field in distances)
+def check_step(step: Solution | AssemblySolution, before: Solution | AssemblySolution | None) -> Violations:
+    """Check a solution of one body or of several, of a load history with the step before it.
+
+    Slip counts from the last increment, which is not there to be seen if the step was gone in several.
+    """
+    if step.loading is not None and step.loading.steps[-1].n_increments > 1:
+        before = None
+    if isinstance(step, AssemblySolution):
+        return check_assembly(step, before if isinstance(before, AssemblySolution) else None)
+    return check_solution(step, before if isinstance(before, Solution) else None)

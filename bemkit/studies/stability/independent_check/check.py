@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
+from bemkit.results.solved_problem import SolvedProblem
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.studies.stability.independent_check.balance import (
     energy_mismatch,
@@ -22,7 +23,7 @@ from bemkit.studies.stability.independent_check.balance import (
 from bemkit.studies.stability.independent_check.boundary import CONTACT_LIMIT, beyond, largest, scales_of
 from bemkit.studies.stability.independent_check.half_plane import Surface
 from bemkit.studies.stability.independent_check.nodes import Fields, hidden_overlap
-from bemkit.studies.stability.independent_check.verdict import Entries
+from bemkit.studies.stability.independent_check.verdict import Violations
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,55 +171,56 @@ def status_mismatch(status: IntArray, measured: Measured) -> float:
     return max(largest(measured.held[is_open]), largest(np.abs(measured.clearance)[~is_open]), largest(friction))
 
 
+def contact_violations(measured: Measured, solution: SolvedProblem, *, knows_slip: bool) -> dict[str, float]:
+    """Return the violations of the conditions of contact; see `Violations`.
+
+    At the end of a load history slip that counts from the step before is not known without that step: `knows_slip`.
+    """
+    n_steps = 0 if solution.loading is None else len(solution.loading.steps)
+    knows_slip = knows_slip or n_steps <= 1
+    return {
+        "penetration": largest(-measured.clearance),
+        "tension": largest(-measured.pressure),
+        "complementarity": largest(np.minimum(measured.held, np.abs(measured.clearance))),
+        "cone_excess": largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
+        "slip_opposition": slip_opposition(measured) if knows_slip else 0.0,
+        "status": status_mismatch(solution.contact.status, measured) if knows_slip else 0.0,
+    }
+
+
+def is_finite(solution: SolvedProblem) -> bool:
+    """Tell whether all fields are numbers; distances to obstacles out of reach may be infinite."""
+    columns = solution.contact.columns()
+    distances = [columns.pop(name) for name in ("gap", "clearance")]
+    of_bodies = (
+        field for body in solution.solved_bodies for field in (*vars(body.boundary).values(), np.array(body.energy))
+    )
+    known = all(bool(np.isfinite(field).all()) for field in (*columns.values(), *of_bodies))
+    return known and not any(np.isnan(field).any() for field in distances)
+
+
 @dataclass(frozen=True, kw_only=True)
-class IndependentCheck(Entries):
+class IndependentCheck(Violations):
     """Violations found in the fields of a solution, dimensionless; zero is perfect.
+
+    Those of equilibrium are the work of loads and contact tractions on the rigid motions that no support holds; of a
+    half-plane, of tractions and loads far away on the motions that these drive. Reciprocity is that with point forces
+    and centres of dilatation outside of the body and with uniform stresses; half-planes, whose displacements are exact,
+    have none.
 
     Parameters
     ----------
-    numbers : float
-        Infinite if a field holds a number that is not finite, zero otherwise.
     obstacle : float
         Gap of the table against the distance measured again, beyond the round-off of the coordinates.
     table : float
         Displacements of the table against those of the boundary at the same points; reported forces against sums.
     tractions : float
         Tractions of elements against loads and against the contact tractions of the table.
-    supports : float
-        Held displacements against what is prescribed.
-    penetration, tension, complementarity : float
-        Of normal contact: the smaller of pressure and clearance where both exist.
-    cone_excess, slip_opposition : float
-        Of friction: traction beyond the bound; the smaller of slip and missing opposition.
-    status : float
-        What the status of a node claims against its traction, clearance and slip.
-    equilibrium : float
-        Work of loads and contact tractions on the rigid motions that no support holds; of a half-plane, of tractions
-        and loads far away on the motions that these drive.
-    negative_energy, energy : float
-        Elastic energy below zero; against half the work of the external forces.
-    elasticity : float
-        Of half-planes alone: displacements against Flamant's solution for the tractions and the motion far away.
-    reciprocity, coarseness, hidden_overlap
-        See `Entries`; point forces and centres of dilatation outside of the body and uniform stresses are the states.
-        Nothing of half-planes, whose displacements are exact.
     """
 
-    numbers: float
     obstacle: float
     table: float
     tractions: float
-    supports: float
-    penetration: float
-    tension: float
-    complementarity: float
-    cone_excess: float
-    slip_opposition: float
-    status: float
-    equilibrium: float
-    negative_energy: float
-    energy: float
-    elasticity: float
 
 
 def check_solution(solution: Solution, before: Solution | None = None) -> IndependentCheck:
@@ -227,24 +229,16 @@ def check_solution(solution: Solution, before: Solution | None = None) -> Indepe
     Slip counts from the end of the load step before. Without that, friction against slip is not checked at the end of a
     load history.
     """
-    if not _is_finite(solution):
-        unknown = dict.fromkeys((entry.name for entry in fields(IndependentCheck)), float("nan"))
-        return IndependentCheck(**{**unknown, "numbers": float("inf")})
+    if not is_finite(solution):
+        return IndependentCheck.not_finite()
     parts = Fields.of(solution, before)
-    measured = measured_contact(parts)
-    has_history = before is None and solution.loading is not None and len(solution.loading.steps) > 1
     return IndependentCheck(
         numbers=0.0,
         obstacle=obstacle_mismatch(parts),
         table=max(table_mismatch(parts), resultant_mismatch(solution)),
         tractions=max(traction_mismatch(parts), load_mismatch(parts)),
         supports=support_mismatch(parts),
-        penetration=largest(-measured.clearance),
-        tension=largest(-measured.pressure),
-        complementarity=largest(np.minimum(measured.held, np.abs(measured.clearance))),
-        cone_excess=largest((np.abs(measured.shear) - measured.bound)[measured.obeys_friction]),
-        slip_opposition=0.0 if has_history else slip_opposition(measured),
-        status=0.0 if has_history else status_mismatch(solution.contact.status, measured),
+        **contact_violations(measured_contact(parts), solution, knows_slip=before is not None),
         **_balances(parts),
         coarseness=float(parts.boundary.lengths.max()) / solution.mesh.diameter,
         hidden_overlap=hidden_overlap(parts),
@@ -269,12 +263,3 @@ def _balances(parts: Fields) -> dict[str, float]:
         "elasticity": surface.elasticity_mismatch(),
         "reciprocity": 0.0,
     }
-
-
-def _is_finite(solution: Solution) -> bool:
-    """Tell whether all fields are numbers; distances to obstacles out of reach may be infinite."""
-    columns = solution.contact.columns()
-    distances = [columns.pop(name) for name in ("gap", "clearance")]
-    fields = (*columns.values(), solution.boundary.displacement, solution.boundary.traction)
-    is_finite = all(bool(np.isfinite(field).all()) for field in fields) and np.isfinite(solution.energy)
-    return bool(is_finite and not any(np.isnan(field).any() for field in distances))

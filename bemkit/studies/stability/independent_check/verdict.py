@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import ClassVar
+from dataclasses import asdict, dataclass, fields
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,19 +13,35 @@ COARSE_LIMIT = 0.1
 """Largest share of work out of balance in the reciprocal theorem: the discretisation error of a coarse mesh, far below
 that of fields which do not belong to the body at all."""
 COARSE_SHARE = 2.0
-"""The same for each unit of `Entries.coarseness`: collocation with 35, 70 and 140 elements on a block between
+"""The same for each unit of `Violations.coarseness`: collocation with 35, 70 and 140 elements on a block between
 two obstacles misses it by 1.5, 1.4 and 1.25 times that, its energy by 34, 15 and 7 %."""
 OVERLAP_LIMIT = 1e-5
 """Share of the largest displacement by which a support may push a node into an obstacle without a word: ten times what
 the warning takes for round-off."""
 
 
-@dataclass(frozen=True)
-class Entries:
-    """Violations found in the fields of a solution, dimensionless; zero is perfect.
+@dataclass(frozen=True, kw_only=True)
+class Violations:
+    """Violations found in the fields of any solution, dimensionless; zero is perfect.
 
     Parameters
     ----------
+    numbers : float
+        Infinite if a field holds a number that is not finite, zero otherwise.
+    supports : float
+        Held displacements against what is prescribed.
+    penetration, tension, complementarity : float
+        Of normal contact: the smaller of pressure and clearance where both exist.
+    cone_excess, slip_opposition : float
+        Of friction: traction beyond the bound; the smaller of slip and missing opposition.
+    status : float
+        What the status of a node claims against its traction, clearance and slip.
+    equilibrium : float
+        Of all forces on a body along motions that no support holds.
+    negative_energy, energy : float
+        Elastic energy below zero; against half the work of the external forces.
+    elasticity : float
+        Of half-planes alone: displacements against Flamant's solution for the tractions and the motion far away.
     reciprocity : float
         Betti's theorem, up to the discretisation error.
     coarseness : float
@@ -37,9 +53,26 @@ class Entries:
     inexact: ClassVar[tuple[str, ...]] = ("reciprocity", "coarseness", "hidden_overlap")
     """Entries that need not vanish."""
 
+    numbers: float
+    supports: float
+    penetration: float
+    tension: float
+    complementarity: float
+    cone_excess: float
+    slip_opposition: float
+    status: float
+    equilibrium: float
+    negative_energy: float
+    energy: float
+    elasticity: float
     reciprocity: float
     coarseness: float
     hidden_overlap: float
+
+    @classmethod
+    def not_finite(cls) -> Self:
+        """Return what is said of fields that are no numbers."""
+        return cls(**{**dict.fromkeys((entry.name for entry in fields(cls)), np.nan), "numbers": np.inf})
 
     @property
     def exact(self) -> dict[str, float]:
