@@ -3,10 +3,10 @@
 from bemkit.pictures.animation import save_animation as save_animation
 from bemkit.pictures.boundary_traction import draw_boundary_traction as draw_boundary_traction
 from bemkit.pictures.catalogue import figures as figures
-from bemkit.pictures.contact_clearance import draw_contact_clearance as draw_contact_clearance
-from bemkit.pictures.contact_displacement import draw_contact_displacement as draw_contact_displacement
+from bemkit.pictures.contact_curves import draw_contact_clearance as draw_contact_clearance
+from bemkit.pictures.contact_curves import draw_contact_displacement as draw_contact_displacement
+from bemkit.pictures.contact_curves import draw_contact_traction as draw_contact_traction
 from bemkit.pictures.contact_map import draw_contact_map as draw_contact_map
-from bemkit.pictures.contact_traction import draw_contact_traction as draw_contact_traction
 from bemkit.pictures.convergence import draw_convergence as draw_convergence
 from bemkit.pictures.deformation import draw_deformation as draw_deformation
 from bemkit.pictures.deformation import draw_scene as draw_scene

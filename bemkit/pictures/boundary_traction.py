@@ -31,7 +31,7 @@ def draw_boundary_traction(solution: Solution, axes: Axes | None = None, *, unit
     ----------
     solution : Solution
     axes, units : optional
-        As for `bemkit.pictures.contact_displacement.draw_contact_displacement`.
+        As for `bemkit.pictures.contact_curves.draw_contact_displacement`.
     """
     units = units or solution.units
     order = np.concatenate(solution.mesh.loops)

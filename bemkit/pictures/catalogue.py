@@ -11,10 +11,8 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.operators.stopwatch import announce
 from bemkit.pictures.boundary_traction import draw_boundary_traction
-from bemkit.pictures.contact_clearance import draw_contact_clearance
-from bemkit.pictures.contact_displacement import draw_contact_displacement
+from bemkit.pictures.contact_curves import draw_contact_clearance, draw_contact_displacement, draw_contact_traction
 from bemkit.pictures.contact_map import draw_contact_map
-from bemkit.pictures.contact_traction import draw_contact_traction
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.friction_cone import draw_friction_cone

@@ -35,7 +35,7 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     solution : Solution or AssemblySolution
         Of a load history.
     axes, units : optional
-        As for `bemkit.pictures.contact_displacement.draw_contact_displacement`.
+        As for `bemkit.pictures.contact_curves.draw_contact_displacement`.
 
     Raises
     ------

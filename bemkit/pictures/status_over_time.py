@@ -29,7 +29,7 @@ def draw_status_over_time(
     part : str
         Name of a contact part, or of a contact of several bodies.
     axes, units : optional
-        As for `bemkit.pictures.contact_displacement.draw_contact_displacement`.
+        As for `bemkit.pictures.contact_curves.draw_contact_displacement`.
 
     Raises
     ------

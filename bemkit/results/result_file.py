@@ -71,22 +71,17 @@ def write_result(path: str | Path, solution: Solution | AssemblySolution) -> Non
     SceneError
         If the scene holds a Python function, which a file cannot hold.
     """
-    if isinstance(solution, AssemblySolution):
-        text = scene_to_toml(solution.assembly)
-        with FORMAT.created(path) as file:
+    text = scene_to_toml(solution.assembly if isinstance(solution, AssemblySolution) else solution.scene)
+    with FORMAT.created(path) as file:
+        if isinstance(solution, AssemblySolution):
             write_text(file, "assembly", text)
             write_assembly(file, solution)
-            if solution.loading is not None:
-                write_history(file, solution.loading)
-            annotate(file, solution.units)
-        return
-    text = scene_to_toml(solution.scene)
-    with FORMAT.created(path) as file:
-        write_text(file, "scene", text)
-        write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
-        write_forces(file, "parts", solution.part_forces)
-        write_forces(file, "contacts", solution.contacts)
-        write_fields(file, solution.mesh, solution.boundary)
+        else:
+            write_text(file, "scene", text)
+            write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
+            write_forces(file, "parts", solution.part_forces)
+            write_forces(file, "contacts", solution.contacts)
+            write_fields(file, solution.mesh, solution.boundary)
         if solution.loading is not None:
             write_history(file, solution.loading)
         annotate(file, solution.units)

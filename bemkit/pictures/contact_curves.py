@@ -1,0 +1,102 @@
+"""Displacements, tractions and clearance along a contact, each a panel above the status."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bemkit.pictures.contact_axes import (
+    FIRST,
+    LIMIT,
+    SECOND,
+    contact_axes,
+    cut_peaks,
+    displacement_scale,
+    near,
+    traction_scale,
+)
+from bemkit.pictures.shown import Result
+from bemkit.pictures.traction_curves import traction_curve
+from bemkit.results.drawing import BLUE, VERMILION, ignore_round_off, label_values
+from bemkit.scene.unit_names import UnitNames, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_contact_displacement(
+    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
+) -> Axes:
+    """Draw normal and tangential displacement and the gap along one contact part, above its status.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+    part : str
+        Name of a contact part, or of a contact of several bodies.
+    axes : Axes, optional
+        Of matplotlib; those of a new figure by default.
+    units : UnitNames, optional
+        Those of the scene by default.
+
+    Returns
+    -------
+    Axes
+        The panel; the strip of the status is its child.
+    """
+    axes, units = contact_axes(axes, solution, part, units, "Displacements on the contact boundary")
+    contact, chosen = solution.contact, solution.contact.rows(part)
+    s, gap = contact.s[chosen], contact.gap[chosen]
+    axes.plot(s, contact.u_n[chosen], label="normal $u_n$", marker="o", markersize=2.0, **FIRST)
+    axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **SECOND)
+    if np.any(np.isfinite(gap) & (gap != 0.0)):
+        axes.plot(s, near(gap, solution, chosen), label="gap $g$", **LIMIT)
+    label_values(axes, with_unit("displacement", "length", units), displacement_scale(solution))
+    return axes
+
+
+def draw_contact_traction(
+    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
+) -> Axes:
+    """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`.
+
+    Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
+    where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold. Peaks
+    that would flatten all else are cut, and the picture says so.
+    """
+    axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
+    contact, chosen = solution.contact, solution.contact.rows(part)
+    s, curve = contact.s[chosen], traction_curve(solution, part)
+    axes.plot(curve.s, curve.normal, label=r"normal $\sigma_n$", **FIRST)
+    axes.plot(curve.s, curve.tangential, label=r"tangential $\sigma_t$", **SECOND)
+    axes.plot(s, contact.sigma_n[chosen], linestyle="", marker="o", markersize=2.5, color=BLUE)
+    axes.plot(s, contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
+    if solution.friction_bound is not None:
+        axes.plot(s, solution.friction_bound[chosen], label="friction bound", **LIMIT)
+        axes.plot(s, -solution.friction_bound[chosen], **LIMIT)
+    label_values(axes, with_unit("traction", "stress", units), traction_scale(solution))
+    cut_peaks(axes, curve.s, (curve.normal, curve.tangential), units)
+    return axes
+
+
+def draw_contact_clearance(
+    solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
+) -> Axes:
+    """Draw contact pressure and clearance along one contact part; see `draw_contact_displacement`."""
+    axes, units = contact_axes(axes, solution, part, units, "Contact pressure and clearance")
+    contact, chosen = solution.contact, solution.contact.rows(part)
+    curve = traction_curve(solution, part)
+    pressure = axes.plot(curve.s, -curve.normal, label=r"pressure $-\sigma_n$ (left)", **FIRST)
+    axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
+    axes.set_ylabel(with_unit("pressure", "stress", units))
+    right = axes.twinx()
+    clearance = near(contact.clearance[chosen], solution, chosen)
+    opening = right.plot(contact.s[chosen], clearance, label="clearance $g - u_n$ (right)", **SECOND)
+    right.set_ylabel(with_unit("clearance", "length", units))
+    for each, scale in ((axes, traction_scale(solution)), (right, displacement_scale(solution))):
+        ignore_round_off(each, scale)
+        bottom, top = each.get_ylim()
+        each.set_ylim(bottom, top + 0.15 * (top - bottom))  # room for the legend
+    axes.legend(handles=[*pressure, *opening], frameon=False, loc="upper center", ncols=2)
+    return axes
