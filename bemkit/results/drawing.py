@@ -60,15 +60,13 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
     axes.ticklabel_format(axis=axis, scilimits=(-2, 3), useMathText=True, useOffset=False)
 
 
-def legend_below(axes: Axes, n_columns: int = 3) -> None:
+def legend_below(axes: Axes) -> None:
     """Put the legend below the axes, clear of the label of the abscissa."""
     from matplotlib.transforms import ScaledTranslation
 
     scale = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
     below = axes.transAxes + ScaledTranslation(0.0, -0.5, scale)
-    axes.legend(
-        loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below, ncols=n_columns, frameon=False, fontsize=9
-    )
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=below, ncols=3, frameon=False, fontsize=9)
 
 
 def show_grid(axes: Axes) -> None:

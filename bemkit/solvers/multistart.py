@@ -17,8 +17,6 @@ def probe(
     *,
     n_starts: int = 8,
     starts: Sequence[ContactState] = (),
-    seed: int = 0,
-    tolerance: float = 1e-9,
 ) -> tuple[ContactSolution, ...]:
     """Solve from several starts and return the distinct certified solutions.
 
@@ -29,13 +27,10 @@ def probe(
     problem : ContactProblem
     solver : ContactSolver
     n_starts : int
-        Starts made here: all nodes sticking, open, slipping forward, slipping backward, then random choices.
+        Starts made here: all nodes sticking, open, slipping forward, slipping backward, then random choices,
+        always the same.
     starts : sequence of ContactState
         Further starts, tried first.
-    seed : int
-        Of the random choices.
-    tolerance : float
-        Bound on the certificate of every solution.
 
     Returns
     -------
@@ -49,13 +44,13 @@ def probe(
     """
     if n_starts < 0:
         raise InputError(f"n_starts = {n_starts}; give zero or a positive number")
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     uniform = [1, 0, 2, 3]
     choices = [np.full(problem.n_contact, status) for status in uniform[:n_starts]]
     choices += [random.integers(0, 4, problem.n_contact) for _ in range(n_starts - len(choices))]
     found: list[ContactSolution] = []
     for start in [*starts, *(start_with(problem, choice) for choice in choices)]:
-        solution = solve(problem, solver, start=start, tolerance=tolerance, throw=False)
+        solution = solve(problem, solver, start=start, throw=False)
         if solution.is_converged and not any(_is_same(problem, solution.state, other.state) for other in found):
             found.append(solution)
     return tuple(found)

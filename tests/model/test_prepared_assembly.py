@@ -9,20 +9,20 @@ import numpy as np
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.model.assembled.contact_tractions import ContactSpread
-from bemkit.model.assembled.prepared import prepare_assembly, prepare_assembly_steps
+from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.scene.load_history import load_steps
 from tests.runs.masonry import wall
 
 
 def test_contacts_of_equal_laws_have_one_and_laws_of_the_place_each_their_own() -> None:
     assembly = wall(2, 2, push=True)
-    prepared = prepare_assembly(replace(assembly, load_factors=(1.0,)))
+    prepared = prepare_assembly_steps([replace(assembly, load_factors=(1.0,))])[0]
     assert isinstance(prepared.law, Coulomb)
     pairs = prepared.assembly.contacts
     other, placed = Coulomb(0.1), Coulomb(lambda x, y: 0.2 + 0.0 * x)
     laws = [placed, other, placed, *(Coulomb(0.1) for _ in pairs[3:])]
     listed = tuple(replace(pair, law=law) for pair, law in zip(pairs, laws, strict=True))
-    mixed = prepare_assembly(replace(assembly, touching=None, contacts=listed))
+    mixed = prepare_assembly_steps([replace(assembly, touching=None, contacts=listed)])[0]
     law = mixed.law
     assert isinstance(law, PiecewiseLaw)
     assert [each.is_uniform for each in law.laws if isinstance(each, LawOfCoefficients)] == [False, True, False, True]

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.cli.console import print_summary
 from bemkit.model.assembled.contacts import OverlapError
 from bemkit.model.assembled.model import build_assembled_model
-from bemkit.model.assembled.prepared import prepare_assembly
+from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.pictures import draw_deformation
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_json
@@ -171,7 +171,7 @@ def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
     assert solution.rigid["disc"].force_y == pytest.approx(-weight, rel=1e-10)
     weightless = solved(replace(stack, rigid=(replace(disc, force_y=0.0),)))
     assert weightless.certificate.force_imbalance < 1e-12  # though nothing remains of the forces on the disc
-    model = build_assembled_model(prepare_assembly(stack))
+    model = build_assembled_model(prepare_assembly_steps([stack])[0])
     dense, sparse = (
         solve(replace(model.problem, body=replace(model.body, is_dense=is_dense)), stack.solver).state.traction
         for is_dense in (True, False)
@@ -226,7 +226,7 @@ def test_a_given_motion_is_felt_like_that_of_a_support() -> None:
 def test_a_turning_disc_drags_each_node_by_its_radius() -> None:
     """Whatever the gap: what a node may touch is a point of the disc, at the end of the gap."""
     disc = bk.RigidBody(name="punch", obstacle=bk.Circle((1.0, 1.6), 0.5), centre=(1.0, 1.6), turn=0.01)
-    (rows,) = prepare_assembly(replace(PRESSED, rigid=(disc,), law=SOME)).rows
+    (rows,) = prepare_assembly_steps([replace(PRESSED, rigid=(disc,), law=SOME)])[0].rows
     assert np.ptp(rows.gap) > 0.1
     assert isinstance(rows.on_other, np.ndarray)
     dragged = np.einsum("nkc,ncm,m->nk", rows.frame, rows.on_other, disc.motion)
@@ -380,7 +380,7 @@ def test_forces_and_motions_set_the_units(scale: float) -> None:
 def test_the_unit_of_stress_is_that_of_the_largest_force_or_motion(
     changes: dict[str, float | None], expected: float
 ) -> None:
-    units = prepare_assembly(driven(**changes)).units
+    units = prepare_assembly_steps([driven(**changes)])[0].units
     assert units.length == pytest.approx(np.sqrt(5.0), rel=1e-12)
     assert units.stress == pytest.approx(expected, rel=1e-12)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -266,8 +265,3 @@ def _from_lower_left(loop: list[Stroke]) -> list[Stroke]:
     low = np.round((starts.sum(axis=1) - starts.sum(axis=1).min()) / size, 9)
     first = int(np.lexsort((starts[:, 1], low))[0])
     return [*loop[first:], *loop[:first]]
-
-
-def polyline(points: Sequence[Point], group: str = "") -> list[Stroke]:
-    """Return the straight strokes between points in order."""
-    return [Stroke(a, LineTo(b, group=group)) for a, b in pairwise(points) if a != b]

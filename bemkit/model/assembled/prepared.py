@@ -186,25 +186,12 @@ def prepare_assembly_steps(
 ) -> tuple[PreparedAssembly, ...]:
     """Work out what assemblies that follow each other in time say, in the units of the largest load.
 
-    All take the contacts that are found in the first one; see `prepare_assembly`.
-    """
-    bodies = place(assemblies[0], meshes)
-    contacts = listed_contacts(assemblies[0], bodies)
-    steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
-    for step in steps[1:]:
-        _check_rigid(steps[0], step)
-    units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
-    first = _prepared(steps[0], _under(steps[0], bodies), units)
-    return (first, *(first.under(step) for step in steps[1:]))
-
-
-def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> PreparedAssembly:
-    """Work out what an assembly says.
+    All take the contacts that are found in the first one.
 
     Parameters
     ----------
-    assembly : Assembly
-        With a single load.
+    assemblies : sequence of Assembly
+        Each with a single load.
     meshes : mapping of str to BoundaryMesh, optional
         Meshes of bodies by name, in the coordinates of their shapes.
 
@@ -217,7 +204,14 @@ def prepare_assembly(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | No
     ConflictingSupportsError
         If supports contradict each other at a node.
     """
-    return prepare_assembly_steps([assembly], meshes)[0]
+    bodies = place(assemblies[0], meshes)
+    contacts = listed_contacts(assemblies[0], bodies)
+    steps = [each.with_contacts(contacts) if each.touching else each for each in assemblies]
+    for step in steps[1:]:
+        _check_rigid(steps[0], step)
+    units = max((find_common_units(step, _under(step, bodies)) for step in steps), key=lambda units: units.stress)
+    first = _prepared(steps[0], _under(steps[0], bodies), units)
+    return (first, *(first.under(step) for step in steps[1:]))
 
 
 def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units:

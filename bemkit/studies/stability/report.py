@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 
 from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
@@ -38,9 +37,9 @@ _SERIES = (
 _FLOOR = 1e-18
 
 
-def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord], console: Console | None = None) -> None:
+def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord]) -> None:
     """Print the table of one axis, and the reasons of records that are not right."""
-    console = stdout_console(console)
+    console = stdout_console()
     heads = ("value", "verdict", "solves", "cert.", "check", "Betti", "cond.", "drift", "twin", "s")
     table = plain_table(right=heads)
     table.columns[1].justify = "left"
@@ -57,24 +56,24 @@ def print_axis(axis: Axis[Any], records: Sequence[StabilityRecord], console: Con
     console.print()
 
 
-def print_left_out(reasons: Mapping[str, str], console: Console | None = None) -> None:
+def print_left_out(reasons: Mapping[str, str]) -> None:
     """Print which axes say nothing of a scene, and why."""
-    console = stdout_console(console)
+    console = stdout_console()
     for name, reason in reasons.items():
         console.print(Text(f"{name}: left out: {reason}", style="dim"))
 
 
-def print_verdicts(records: Sequence[StabilityRecord], console: Console | None = None) -> None:
+def print_verdicts(records: Sequence[StabilityRecord]) -> None:
     """Print how many records got which verdict."""
-    console = stdout_console(console)
+    console = stdout_console()
     counts = Counter(record.verdict for record in records)
     words = [f"{counts[verdict.value]} {verdict.value}" for verdict in Verdict if counts[verdict.value]]
     console.print(Text(f"{len(records)} rows: {', '.join(words)}", style="bold"))
 
 
-def print_trials(trials: Sequence[Trial], console: Console | None = None) -> None:
+def print_trials(trials: Sequence[Trial]) -> None:
     """Print how many scenes came to which end and why, and what to call for each that failed."""
-    console = stdout_console(console)
+    console = stdout_console()
     table = plain_table(("outcome", "scenes", "why"), gap=2)
     table.columns[1].justify = "right"
     for outcome, (plural, style) in _OUTCOMES.items():

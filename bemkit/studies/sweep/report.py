@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 
 from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
@@ -39,10 +38,10 @@ _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _LINES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 
 
-def print_sweep(sweep: Sweep, console: Console | None = None) -> None:
+def print_sweep(sweep: Sweep) -> None:
     """Print the solved rows as a table, and below it the failed ones, each with its reason."""
     # into a file or a pipe there is room
-    console = stdout_console(console, width=None if sys.stdout.isatty() else 200)
+    console = stdout_console(width=None if sys.stdout.isatty() else 200)
     names = [*_SHOWN, *(_WIDE if console.width >= WIDE else ())]
     console.print(Text(sweep.scene.title, style="bold"))
     table = plain_table(right=[*_short_keys(sweep.keys), *(SHORT.get(name, name) for name in names)], gap=2)
