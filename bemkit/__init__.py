@@ -168,7 +168,7 @@ _HOME = {
         *("Disk", "ExteriorOf", "HalfPlaneBody", "PeriodicHalfPlaneBody", "PlateWithHole", "Polygon", "Rectangle"),
         *("Ring", "Sector"),
     ),
-    "geometry.corners": ("corner_nodes",),
+    "geometry.neighbours": ("corner_nodes",),
     "geometry.spaces": ("ConstantSpace", "LagrangeSpace", "LinearSpace", "QuadraticSpace"),
     "geometry.symmetry": ("Symmetry",),
     "operators.boundary": ("adjoint_double_layer", "assemble", "double_layer", "hypersingular", "mass", "single_layer"),
