@@ -14,13 +14,11 @@ from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
-from bemkit.plan.plan import Plan, Sizes
+from bemkit.plan.plan import CONTACT_STEPS, Plan, Sizes, friction_item, further_meshes, last_items, seconds_of
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 
 _BYTES = 8
-_CONTACT_STEPS = 8
-_SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP, _LEAST_SECONDS = 2e-8, 1e-10, 0.1
 _FILL = 6.0
 """Numbers in the factors of a sparse contact system for each one in the matrix: of walls of 100 to 1000 blocks."""
 
@@ -51,8 +49,7 @@ def plan_assembly(steps: Sequence[PreparedAssembly]) -> Plan:
     coupled = sum(len(condition.is_retained[condition.is_retained]) ** 2 for condition in first.conditions)
     contact = _BYTES * (6 * n_unknowns**2 if is_dense else _FILL * coupled)
     flops = float(sum(each.flops for each in needs))
-    flops += _CONTACT_STEPS * len(steps) * (2.0 / 3.0 * n_unknowns**3 if is_dense else 40.0 * _FILL * coupled)
-    evaluations = sum(each.evaluations for each in needs)
+    flops += CONTACT_STEPS * len(steps) * (2.0 / 3.0 * n_unknowns**3 if is_dense else 40.0 * _FILL * coupled)
     kept = sum(each.kept for each in needs)
     largest = max(range(len(first.bodies)), key=lambda number: first.bodies[number].space.n_dofs)
     return Plan(
@@ -61,7 +58,7 @@ def plan_assembly(steps: Sequence[PreparedAssembly]) -> Plan:
         sizes=sizes,
         work=sum((each.work for each in needs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
         memory=int(kept + max(contact, *(each.memory - each.kept for each in needs))),
-        seconds=_LEAST_SECONDS + _SECONDS_PER_EVALUATION * evaluations + _SECONDS_PER_FLOP * flops,
+        seconds=seconds_of(sum(each.evaluations for each in needs), flops),
         items=tuple(_items(first, sizes, len(steps), is_dense=is_dense)),
         warnings=tuple(dict.fromkeys(warning for each in needs for warning in each.warnings)),
     )
@@ -112,11 +109,7 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
         yield PlanItem(f"body {_names(bodies)}", True, _body_line(bodies[0]))
     if len(shapes) > _MOST_NAMED:
         yield PlanItem(f"{len(shapes) - _MOST_NAMED} bodies more", True, "of the same kinds")
-    accuracy = assembly.mesh.accuracy
-    further = "the numbers of elements are given"
-    if accuracy is not None:
-        further = f"until the estimated error is below {accuracy:g}; this plan is for the first meshes"
-    yield PlanItem("further meshes", accuracy is not None, further)
+    yield further_meshes(assembly.mesh.accuracy, "the numbers of elements are given", "first meshes")
     n_pairs = len(assembly.elastic_contacts)
     n_fixed = sum(rows.other < 0 for rows in prepared.rows)
     yield PlanItem("contacts between bodies", n_pairs > 0, f"{n_pairs}, coupled by mortar integrals")
@@ -124,8 +117,7 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     n_rigid = len(assembly.rigid)
     moving = f"{n_rigid} in {len(assembly.contacts) - n_pairs} contacts, {_n_driven(assembly)} motions driven by loads"
     yield PlanItem("rigid bodies", n_rigid > 0, moving if n_rigid else "there are none")
-    names = ", ".join(dict.fromkeys(type(rows.law).__name__ for rows in prepared.rows if not rows.law.is_frictionless))
-    yield PlanItem("friction", bool(names), f"law {names}" if names else "the law allows no tangential traction")
+    yield friction_item(rows.law for rows in prepared.rows)
     form = "one dense matrix of relative displacements"
     if not is_dense:
         form = f"a sparse system, factored in every step by {sparse_solver_name()}"
@@ -134,12 +126,7 @@ def _items(prepared: PreparedAssembly, sizes: Sizes, n_steps: int, *, is_dense: 
     if sizes.n_free_motions:
         modes = f"{sizes.n_free_motions} of {sizes.n_motions} rigid motions are held by contact alone"
     yield PlanItem("rigid motions as unknowns", sizes.n_free_motions > 0, modes)
-    history = f"{n_steps} load steps; slip counts from the end of the step before"
-    yield PlanItem("load history", n_steps > 1, history if n_steps > 1 else "the whole load comes in one step")
-    yield PlanItem("fields on the boundary", True, "part of every result")
-    yield PlanItem("fields inside the bodies", False, "not asked for; see interior_fields")
-    yield PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for")
-    yield PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for")
+    yield from last_items(n_steps, "fields inside the bodies")
 
 
 def _n_driven(assembly: Assembly) -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bemkit.contact.condensation.nodes import find_tangents
+from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
@@ -25,7 +26,7 @@ from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
 
 _BYTES = 8
-_CONTACT_STEPS = 8
+CONTACT_STEPS = 8
 """Steps of Newton's method for a contact problem; they hardly depend on its size."""
 _FLOPS_PER_NUMBER = 30.0
 """A number that is only moved through memory takes as long as so many flops of a factorisation."""
@@ -108,34 +109,48 @@ def plan_items(
     Besides the sizes that is what the discretisation says of its map, the number of load steps, and a symmetry that the
     scene has but does not use.
     """
-    history = "the whole load comes in one step"
-    if n_steps > 1:
-        history = f"{n_steps} load steps; slip counts from the end of the step before"
     return (
         *_mesh_items(scene, sizes, proposal),
         *of_body,
         _body_force_item(scene),
         *_contact_items(scene, sizes, n_steps),
-        PlanItem("load history", n_steps > 1, history),
-        PlanItem("fields on the boundary", True, "part of every result"),
-        PlanItem("displacement inside the body", False, "not asked for; see interior_fields"),
-        PlanItem("stress inside the body", False, "not asked for; see interior_fields"),
-        PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for"),
-        PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for"),
+        *last_items(n_steps, "displacement inside the body", "stress inside the body"),
     )
+
+
+def further_meshes(accuracy: float | None, given: str, first: str) -> PlanItem:
+    """Say whether meshes follow the solution, in words for what is given otherwise and for what is planned first."""
+    reason = given
+    if accuracy is not None:
+        reason = f"until the estimated error is below {accuracy:g}; this plan is for the {first}"
+    return PlanItem("further meshes", accuracy is not None, reason)
+
+
+def friction_item(laws: Iterable[FrictionLaw], kind: str = "") -> PlanItem:
+    """Say which laws there are."""
+    names = ", ".join(dict.fromkeys(type(law).__name__ for law in laws if not law.is_frictionless))
+    return PlanItem("friction", bool(names), f"law {names}{kind}" if names else "the law allows no tangential traction")
+
+
+def last_items(n_steps: int, *inside: str) -> Iterator[PlanItem]:
+    """Yield what follows the contact system; fields inside by the names they have."""
+    history = f"{n_steps} load steps; slip counts from the end of the step before"
+    yield PlanItem("load history", n_steps > 1, history if n_steps > 1 else "the whole load comes in one step")
+    yield PlanItem("fields on the boundary", True, "part of every result")
+    for name in inside:
+        yield PlanItem(name, False, "not asked for; see interior_fields")
+    yield PlanItem("result file (h5py)", False, "no part of the solve; loaded and written after it where asked for")
+    yield PlanItem("figures (matplotlib)", False, "no part of the solve; loaded and drawn after it where asked for")
 
 
 def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
     """Yield what elements, symmetry and spaces need."""
-    n, n_curved, accuracy = sizes.n_elements, sizes.n_curved, scene.mesh.accuracy
+    n, n_curved = sizes.n_elements, sizes.n_curved
     if drawn := drawn_shape(scene.shape):
         read = "; ".join(drawn.notes) or "taken as it is"
         yield PlanItem("drawn outline", True, f"{_count(len(drawn.outline().sides), 'side')}; {read}")
     yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
-    further = "the number of elements is given"
-    if accuracy is not None:
-        further = f"until the estimated error is below {accuracy:g}; this plan is for the first mesh"
-    yield PlanItem("further meshes", accuracy is not None, further)
+    yield further_meshes(scene.mesh.accuracy, "the number of elements is given", "first mesh")
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
     yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
     if not sizes.n_motions and scene.symmetry is None:
@@ -173,11 +188,7 @@ def _contact_items(scene: Scene, sizes: Sizes, n_steps: int) -> Iterator[PlanIte
         return
     yield PlanItem("contact system", True, f"{n} nodes may touch; every contact step solves for {c} unknowns")
     yield PlanItem("second elastic body", False, "the obstacles are rigid")
-    names = ", ".join(dict.fromkeys(type(law).__name__ for law in scene.laws.values() if not law.is_frictionless))
-    kind = "static" if n_steps == 1 else "incremental"
-    yield PlanItem(
-        "friction", bool(names), f"law {names}, {kind}" if names else "the law allows no tangential traction"
-    )
+    yield friction_item(scene.laws.values(), ", static" if n_steps == 1 else ", incremental")
     tangential = f"{c - n} of {_count(n, 'contact node')}" if c > n else "frictionless"
     yield PlanItem("tangential unknowns", c > n, tangential)
     modes = "the supports hold all rigid motions"
@@ -284,13 +295,17 @@ def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
     return max(needs.memory, needs.kept + int(_BYTES * (r * r + r * c + 4.2 * rows)))
 
 
+def seconds_of(evaluations: float, flops: float) -> float:
+    """Return the run time [s] of a common computer for closed-form integrals and flops."""
+    return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * evaluations + _SECONDS_PER_FLOP * flops
+
+
 def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
     c, u = sizes.n_contact_unknowns, sizes.n_displacements
     if needs.is_matrix_free:
         c = u = 0
     of_step = 2.0 / 3.0 * c**3 + _FLOPS_PER_NUMBER * (60.0 * c * c + u * u) if c else 0.0
-    flops = needs.flops + _CONTACT_STEPS * n_steps * of_step
-    return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * needs.evaluations + _SECONDS_PER_FLOP * flops
+    return seconds_of(needs.evaluations, needs.flops + CONTACT_STEPS * n_steps * of_step)
 
 
 def announce_plan(plan: Plan) -> None:

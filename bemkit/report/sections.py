@@ -13,7 +13,7 @@ from bemkit.report.html import Element, element, facts, number, table
 from bemkit.results.tables import history_columns
 from bemkit.scene.serialisation import UnstructureError
 from bemkit.scene.toml import SceneError, scene_to_toml
-from bemkit.scene.unit_names import UnitNames, unit_of
+from bemkit.scene.unit_names import amount
 from bemkit.version import __version__
 
 _MOST_ROWS = 200
@@ -36,7 +36,7 @@ def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
         if name in summary:
             yield _words(name), str(summary[name])
     for name, quantity in _QUANTITIES.items():
-        yield _words(name), _amount(summary[name], quantity, result.units)
+        yield _words(name), amount(summary[name], quantity, result.units, digits=6)
     for name in ("estimated_error", "estimated_traction_error", "estimated_local_traction_error"):
         if summary.get(name) is not None:
             yield _words(name), number(summary[name], 2)
@@ -123,10 +123,6 @@ def _words(name: str) -> str:
     return {"n_bodies": "bodies", "n_elements": "elements", "n_contact": "contact nodes"}.get(
         name, name.replace("_", " ")
     )
-
-
-def _amount(value: float, quantity: str, units: UnitNames | None) -> str:
-    return f"{value:.6g} {unit_of(quantity, units)}".rstrip()
 
 
 def _plain(value: Any) -> Any:
