@@ -10,7 +10,6 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.prepared import parts_on
 from bemkit.scene.conditions import Free, Pressure, Traction
 from bemkit.scene.scene import Scene
 
@@ -38,7 +37,7 @@ def insert_loads(
     xi, weights = gauss_legendre(space.degree + 1 + _MORE_POINTS)
     projection = projector(space, xi, weights)
     is_free = np.ones(mesh.n_elements, bool)
-    for part, elements, _ in parts_on(scene, mesh):
+    for part, elements in scene.parts_on(mesh):
         is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
         if isinstance(part.condition, Traction | Pressure):
             points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)

@@ -25,7 +25,8 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.boundary_tractions import insert_loads, projector
 from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
 from bemkit.model.free_motion import check_held
-from bemkit.model.prepared import Prepared, Units, parts_on
+from bemkit.model.prepared import Prepared
+from bemkit.model.units import Units
 from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
@@ -217,7 +218,7 @@ class Model:
         tractions = np.concatenate([np.einsum("nk,nkc->nc", state.traction, self.nodes.frame), at_rest])
         xi, weights = gauss_legendre(space.degree + 1)
         projection = space.basis(xi) @ projector(self.elastic.traction_space, xi, weights).T
-        for part, elements, _ in parts_on(self.scene, self.mesh):
+        for part, elements in self.scene.parts_on(self.mesh):
             if isinstance(part.condition, Contact):
                 at_nodes = tractions[self._rows_of(part.name, elements)]
                 at_nodes = from_own_nodes(space, at_nodes, elements)

@@ -9,7 +9,8 @@ from bemkit.contact.condensation.nodes import bound_tangents
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.prepared import Prepared, Units
+from bemkit.model.prepared import Prepared
+from bemkit.model.units import Units
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.scene.unit_names import amount

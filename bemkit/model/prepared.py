@@ -13,22 +13,30 @@ from itertools import zip_longest
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray
 from bemkit.contact.condensation.nodes import contact_conditions, free_motions
-from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
-from bemkit.geometry.vectors import LARGEST, SMALLEST
 from bemkit.model.contact_data import ContactData, find_contact
-from bemkit.model.linear_solver import linear_solver_of
-from bemkit.model.particular import particular_solution, stress_of
+from bemkit.model.particular import particular_solution
+from bemkit.model.units import Units, check_position, find_units
 from bemkit.operators.half_plane.far_drive import FarDrive
-from bemkit.operators.linear.solvers import ChosenLinearSolver
+from bemkit.operators.linear.solvers import (
+    Automatic,
+    ChosenLinearSolver,
+    Hierarchical,
+    LinearSolverChoice,
+    choose_linear_solver,
+)
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import TractionField
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.hierarchical_needs import LARGEST_BLOCK
+from bemkit.operators.steklov_poincare.hierarchical_needs import (
+    LARGEST_BLOCK,
+    choose_collocation_solver,
+    choose_galerkin_solver,
+)
 from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
 from bemkit.operators.steklov_poincare.nodal_conditions import (
     GivenData,
@@ -37,124 +45,19 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     free_modes,
     integrate_traction,
 )
-from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
+from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import Scene
 from bemkit.scene.symmetry import check_symmetry
 
 _LEAST_TURN = 1e-9
 """Difference of a rigid motion between nodes, by its size, that is no round-off."""
-_FARTHEST = 1e7
-"""Distance from the origin in diameters up to which coordinates hold nine digits of the shape."""
-
-
-class OutOfRangeError(InputError):
-    """Stiffness, loads and lengths from which numbers too large or too small for floating point would follow."""
-
-
-class TooFarError(InputError):
-    """A body whose coordinates are so large that they no longer hold its shape."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """The physical size of one dimensionless unit.
-
-    Parameters
-    ----------
-    centre : (2,) array [m]
-        Where the dimensionless origin sits.
-    length : float [m]
-        Diameter of the body.
-    modulus : float [Pa]
-        E' of the material.
-    stress : float [Pa]
-        The largest load, or the stress that the largest prescribed displacement or interference suggests.
-    """
-
-    centre: FloatArray
-    length: float
-    modulus: float
-    stress: float
-
-    @property
-    def displacement(self) -> float:
-        """Unit of displacements and gaps [m]."""
-        return self.stress / self.modulus * self.length
-
-    def check_range(self) -> None:
-        """Refuse units whose squares and products, such as energies, overflow or vanish."""
-        _check_scale("stiffness", self.modulus)
-        _check_scale("stress", self.stress)
-        strain = self.stress / self.modulus
-        _check_scale("strain", strain)
-        _check_scale("displacement", strain * self.length)
-        _check_scale("root of the energy", float(np.sqrt(self.stress) * np.sqrt(strain)) * self.length)
-
-    def to_physical(self, points: FloatArray) -> FloatArray:
-        """Return dimensionless points [-] in metres."""
-        return self.centre + self.length * points
-
-
-def _check_scale(name: str, scale: float) -> None:
-    if not SMALLEST <= scale <= LARGEST:
-        raise OutOfRangeError(
-            f"the {name} is about {scale:.1e}, and its square is no number any more: choose units in which stiffness, "
-            f"stresses, strains, displacements and the roots of energies lie between {SMALLEST:g} and {LARGEST:g}"
-        )
-
-
-def parts_on(scene: Scene, mesh: BoundaryMesh) -> list[tuple[Part, IntArray, FloatArray]]:
-    """List the parts with their elements and the outward normals of these, but for parts beyond a symmetry line."""
-    parts = [part for part in scene.parts if mesh.part(part.name).size]
-    return [(part, mesh.part(part.name), mesh.normals[mesh.part(part.name)]) for part in parts]
-
-
-def find_units(scene: Scene, mesh: BoundaryMesh) -> Units:
-    """Choose the units by the largest load, body force, prescribed displacement or interference.
-
-    Raises
-    ------
-    OutOfRangeError
-        If results in these units could overflow or vanish.
-    """
-    modulus, length = scene.material.plane_modulus, mesh.diameter
-    load, motion, gap = largest_sizes(scene, mesh, length)
-    stress = max(load, motion / length * modulus) or gap / length * modulus or modulus
-    units = Units(mesh.centre, length, modulus, stress)
-    units.check_range()
-    return units
-
-
-def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[float, float, float]:
-    """Return the largest traction [Pa], the largest given displacement or interference, and the largest gap [m].
-
-    The length [m] tells which overlaps and gaps are the round-off of coordinates.
-    """
-    loads, motions, gaps = [0.0], [0.0], [0.0]
-    loads += [stress_of(force, mesh, scene.material) for force in scene.body_forces]
-    if scene.far is not None:
-        of_turn = np.array([1.0, 1.0, length])
-        loads.append(float(np.abs(scene.far.load / of_turn).max()) / length)
-        motions.append(float(np.abs(scene.far.motion * of_turn).max()))
-    places = np.array([-1.0, 0.0, 1.0])
-    for part, elements, normals in parts_on(scene, mesh):
-        points, normals = mesh.points(elements, places).reshape(-1, 2), np.repeat(normals, places.size, axis=0)
-        if isinstance(part.condition, Traction | Pressure):
-            loads.append(float(np.abs(part.condition.at(points, normals)).max()))
-        elif isinstance(part.condition, PrescribedDisplacement):
-            motions.append(float(np.abs(part.condition.at(points)).max()))
-        elif isinstance(part.condition, Contact):
-            gap, _ = measure_contact(part.condition.obstacle, points, normals)
-            gap = np.where(np.abs(gap) > 1e-18 * length, gap, 0.0)
-            motions.append(float(np.maximum(-gap, 0.0).max()))
-            gaps.append(float(np.abs(gap[np.isfinite(gap)]).max(initial=0.0)))
-    return max(loads), max(motions), max(gaps)
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
     """Return the supports of the parts that hold the body, their displacements in the units given."""
     result = []
-    for part, elements, _ in parts_on(scene, mesh):
+    for part, elements in scene.parts_on(mesh):
         condition = part.condition
         axes = np.broadcast_to(np.eye(2), (elements.size, 2, 2))
         if isinstance(condition, Roller):
@@ -181,7 +84,7 @@ def _dimensionless_motion(condition: PrescribedDisplacement, units: Units) -> Ca
 def nodal_forces(scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, units: Units) -> FloatArray:
     """Return the (n_nodes, 2) dimensionless forces of all loads on the nodes of a space on the unit mesh."""
     force = np.zeros((space.n_dofs // 2, 2))
-    for part, elements, _ in parts_on(scene, mesh):
+    for part, elements in scene.parts_on(mesh):
         if isinstance(part.condition, Traction | Pressure):
             force += integrate_traction(space, elements, dimensionless_load(part.condition, units))
     return force
@@ -269,7 +172,7 @@ class Prepared:
         """The linear solver that the map follows, and why it is taken."""
         case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed)
         requested, discretisation = self.scene.linear_solver, self.scene.discretisation
-        return linear_solver_of(requested, discretisation, case, self.space, physical_memory())
+        return linear_solver_of(requested, discretisation, case, self.space)
 
     @property
     def largest_matrix(self) -> int:
@@ -355,17 +258,6 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
     return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
 
 
-def check_position(mesh: BoundaryMesh, owner: str = "the body") -> None:
-    """Refuse a body so far from the origin that its coordinates hold too few digits of its shape; `owner` names it."""
-    distance = float(np.abs(mesh.nodes).max()) / mesh.diameter
-    if distance > _FARTHEST:
-        x, y = mesh.centre.tolist()
-        raise TooFarError(
-            f"{owner} lies {distance:.1e} times its size from the origin, where numbers hold fewer than nine digits "
-            f"of its shape: subtract about ({x:.6g}, {y:.6g}) from all coordinates of body and obstacles"
-        )
-
-
 def check_same_body(scene: Scene, other: Scene) -> None:
     """Refuse another scene whose matrices would be others on the same mesh.
 
@@ -395,3 +287,27 @@ def _layout(part: Part) -> tuple[object, ...]:
     condition = part.condition
     components = condition.is_prescribed if isinstance(condition, PrescribedDisplacement) else ()
     return part.name, part.sides, part.where, type(condition), components
+
+
+def linear_solver_of(
+    requested: LinearSolverChoice, discretisation: Discretisation, case: BodyCase, space: BoundarySpace
+) -> ChosenLinearSolver:
+    """Choose the linear solver of a map.
+
+    Parameters
+    ----------
+    requested : LinearSolver, Hierarchical or Automatic
+    discretisation : Discretisation
+    case : BodyCase
+        Its linear solver counts for nothing.
+    space : BoundarySpace
+        Of the displacements.
+    """
+    memory, hindrance = physical_memory(), discretisation.why_dense(case.mesh)
+    if not discretisation.is_symmetric:
+        return choose_collocation_solver(requested, case, memory, hindrance)
+    dense = choose_linear_solver(requested)
+    if not isinstance(requested, Automatic | Hierarchical):
+        return dense
+    n_tractions = discretisation.traction_space(case.mesh).n_dofs
+    return choose_galerkin_solver(requested, case, dense, n_tractions, space.degree, memory, hindrance)

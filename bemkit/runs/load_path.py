@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
-from bemkit.model.prepared import Units
+from bemkit.model.units import Units
 from bemkit.model.untouched_body import certified
 from bemkit.results.load_history import StepWork
 from bemkit.solvers.active_sets import NodeStatus

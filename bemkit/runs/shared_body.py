@@ -14,7 +14,8 @@ from bemkit.errors import BemkitError
 from bemkit.model.assembled.model import build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.prepared import Prepared, find_units
+from bemkit.model.prepared import Prepared
+from bemkit.model.units import find_units
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.results.assembly_solution import AssemblySolution

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
@@ -169,6 +169,10 @@ class Scene(ShownInNotebooks):
     def contact_parts(self) -> tuple[Part, ...]:
         """The parts that may touch an obstacle."""
         return tuple(part for part in self.parts if isinstance(part.condition, Contact))
+
+    def parts_on(self, mesh: BoundaryMesh) -> list[tuple[Part, IntArray]]:
+        """Return the parts with their elements on a mesh, but for parts beyond a symmetry line."""
+        return [(part, elements) for part in self.parts if (elements := mesh.part(part.name)).size]
 
     @property
     def laws(self) -> dict[str, FrictionLaw]:

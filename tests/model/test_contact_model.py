@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.model.prepared import find_units
+from bemkit.model.units import find_units
 
 
 def scene(

@@ -11,7 +11,7 @@ import bemkit as bk
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.vectors import check_magnitude
 from bemkit.model.contact_model import Model
-from bemkit.model.prepared import OutOfRangeError
+from bemkit.model.units import OutOfRangeError
 
 ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 

@@ -18,7 +18,7 @@ from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
 from bemkit.model.boundary_tractions import insert_loads
-from bemkit.model.prepared import Units
+from bemkit.model.units import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion

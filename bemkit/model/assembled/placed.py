@@ -13,7 +13,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.prepared import Units, check_position
+from bemkit.model.units import Units, check_position
 from bemkit.operators.material import Material
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body

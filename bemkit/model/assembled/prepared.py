@@ -21,12 +21,12 @@ from bemkit.model.assembled.contact_tractions import ContactSpread
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
 from bemkit.model.assembled.obstacles import obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
-from bemkit.model.linear_solver import linear_solver_of
 from bemkit.model.particular import particular_solution
-from bemkit.model.prepared import Units, largest_sizes, nodal_forces, supports_on
+from bemkit.model.prepared import linear_solver_of, nodal_forces, supports_on
+from bemkit.model.units import Units, largest_sizes
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
-from bemkit.operators.steklov_poincare.needs import BodyCase, physical_memory
+from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
@@ -335,4 +335,4 @@ def linear_solver(prepared: PreparedAssembly, number: int) -> ChosenLinearSolver
     requested, discretisation = prepared.assembly.linear_solver, body.scene.discretisation
     material = body.material.scaled(prepared.units.modulus)
     case = BodyCase(body.own_mesh, material, conditions, (prepared.map_data(number),), is_condensed=True)
-    return linear_solver_of(requested, discretisation, case, body.space, physical_memory())
+    return linear_solver_of(requested, discretisation, case, body.space)

@@ -8,7 +8,7 @@ from scipy import sparse
 from bemkit.arrays import FloatArray
 from bemkit.contact.joined.member import Member
 from bemkit.model.assembled.prepared import PreparedAssembly
-from bemkit.model.prepared import Units
+from bemkit.model.units import Units
 from bemkit.scene.rigid_body import RigidBody
 
 

@@ -7,7 +7,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
-from bemkit.model.prepared import TooFarError
+from bemkit.model.units import TooFarError
 from bemkit.runs.run import run
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
