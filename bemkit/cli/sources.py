@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from bemkit.errors import InputError, concerning
 from bemkit.pictures.shown import Result
 from bemkit.results.result_file import read_result
-from bemkit.runs.assembly import run_assembly_history
-from bemkit.runs.history import run_history
-from bemkit.runs.run import run
-from bemkit.scene.assembly import Assembly
+from bemkit.runs.run import run, run_steps
 from bemkit.scene.toml import load_scene
 from bemkit.solvers.base import StepRecord
 
@@ -34,8 +32,6 @@ def solved_steps(source: str, callback: Callable[[StepRecord], None] | None) -> 
         if solution.loading is None:
             raise InputError(f"{source}: the result has no load steps: give a scene with [[steps]] or load_factors")
         return [solution.at_step(1 + k) for k in range(len(solution.loading.steps))]
-    scene = load_scene(source)
+    scene: Any = load_scene(source)
     with concerning(source):
-        if isinstance(scene, Assembly):
-            return run_assembly_history([scene], callback=callback)
-        return run_history([scene], callback=callback)
+        return run_steps([scene], callback)

@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
-from bemkit.contact.solvability import MEETS, contact_forces, friction_envelopes, outermost
+from bemkit.contact.rigid_motions import RigidMotions
+from bemkit.contact.solvability import contact_forces, friction_envelopes, met, outermost, unit_motions
 
 _WITHOUT_BOUND = 1e6
 """Multiple of all other forces from which on a growing load counts as one that contact holds however large it is."""
@@ -35,11 +35,9 @@ def largest_factor(problem: ContactProblem, growing: FloatArray) -> float | None
     law that is an upper bound, because a sliding contact does not dilate: states of the incremental law may fail to
     exist below it, none exists above.
     """
-    motions = as_rows(problem.body.rigid_motions())
+    motions, unit = unit_motions(problem.body)
     if not motions.shape[0]:
         return np.inf
-    unit = largest_components(motions)
-    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
     constant, growing = problem.body.rigid_load() / unit, growing / unit
     size = float(np.abs(growing).max())
     if size == 0.0:
@@ -76,12 +74,10 @@ def _largest(
                 return factor
             takes_part = touches
             continue
-        motion = np.asarray(velocities @ motions).reshape(-1, 2)
-        meets = motion[:, 0] + slope * np.abs(motion[:, 1]) > MEETS * np.abs(motion).max()
-        meets |= (resistance > 0.0) & (motion[:, 1] != 0.0)
-        if not np.any(meets & touches & ~takes_part):
+        meets = touches & met(motions, velocities, resistance, slope)
+        if not np.any(meets & ~takes_part):
             return factor
-        takes_part = takes_part | (meets & touches)
+        takes_part = takes_part | meets
 
 
 def _by_programme(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import LinearBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 
@@ -27,7 +28,7 @@ _MANY_MOTIONS = 60
 a condition for each."""
 
 
-MEETS = 1e-7
+_MEETS = 1e-7
 """Speed into an obstacle, relative to the largest of a motion, from which on a node meets it: what linear programming
 leaves."""
 
@@ -86,12 +87,10 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
     test never condemns a load that can be held; what it misses the driver's status still reports.
     """
-    motions = as_rows(problem.body.rigid_motions())
+    motions, unit = unit_motions(problem.body)
     if not motions.shape[0]:
         return None
-    unit = largest_components(motions)
     load = problem.body.rigid_load() / unit
-    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
     forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
@@ -175,12 +174,26 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
     takes_part = outermost(motions, touches) if not isinstance(motions, np.ndarray) else touches
     while True:
         coefficients = _escape_from(motions, load, resistance, np.where(takes_part, slope, np.nan))
-        motion = np.asarray(coefficients @ motions).reshape(-1, 2)
-        meets = motion[:, 0] + np.where(touches, slope, 0.0) * np.abs(motion[:, 1]) > MEETS * np.abs(motion).max()
-        meets |= (resistance > 0.0) & (motion[:, 1] != 0.0)
-        if not np.any(meets & touches & ~takes_part):
+        meets = touches & met(motions, coefficients, resistance, np.where(touches, slope, 0.0))
+        if not np.any(meets & ~takes_part):
             return coefficients
-        takes_part |= meets & touches
+        takes_part |= meets
+
+
+def unit_motions(body: LinearBody) -> tuple[RigidMotions, FloatArray]:
+    """Return the rigid motions of a body, one a row, scaled to a largest component of one, and by what (n_motions,)."""
+    motions = as_rows(body.rigid_motions())
+    if not motions.shape[0]:
+        return motions, np.zeros(0)
+    unit = largest_components(motions)
+    return motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr(), unit
+
+
+def met(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
+    """Return (n_contact,) bool: nodes that a motion presses into the obstacle, or that resist it without pressure."""
+    motion = np.asarray(velocities @ motions).reshape(-1, 2)
+    is_pressed = motion[:, 0] + slope * np.abs(motion[:, 1]) > _MEETS * np.abs(motion).max()
+    return np.asarray(is_pressed | ((resistance > 0.0) & (motion[:, 1] != 0.0)))
 
 
 def outermost(motions: csr_array, touches: BoolArray) -> BoolArray:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
@@ -17,7 +17,7 @@ from bemkit.operators.stopwatch import Stage
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
-from bemkit.runs.history import ONE_BODY, run_on_mesh, solution_of
+from bemkit.runs.history import ONE_BODY, run_history, run_on_mesh, solution_of
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
@@ -131,6 +131,19 @@ def _run_assembly(
     from bemkit.runs.assembly import run_assembly
 
     return run_assembly(assembly, callback=callback)
+
+
+def run_steps(
+    scenes: Sequence[Scene] | Sequence[Assembly], callback: Callable[[StepRecord], None] | None = None
+) -> Sequence[Solution] | Sequence[AssemblySolution]:
+    """Solve scenes, or assemblies, that follow each other in time; see `run_history` and `run_assembly_history`."""
+    solve: Callable[..., Any] = run_history
+    if isinstance(scenes[0], Assembly):
+        from bemkit.runs.assembly import run_assembly_history
+
+        solve = run_assembly_history
+    steps: Sequence[Solution] | Sequence[AssemblySolution] = solve(scenes, callback=callback)
+    return steps
 
 
 def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = None) -> tuple[Solution, ...]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -18,13 +18,13 @@ from bemkit.errors import BemkitError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.outputs import write_text
 from bemkit.results.solution import Solution
-from bemkit.runs.assembly import run_assembly_history
-from bemkit.runs.history import run_history
-from bemkit.runs.run import run
+from bemkit.runs.run import run, run_steps
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.scene import Scene
 from bemkit.studies.engine import Task
 from bemkit.studies.stability.independent_check import check_step
 from bemkit.studies.stability.independent_check.verdict import Violations
-from bemkit.studies.stability.random_assemblies import RandomAssembly, random_assembly
+from bemkit.studies.stability.random_assemblies import random_assembly
 from bemkit.studies.stability.random_scenes import RandomCase, random_case
 
 EVERY = 4
@@ -83,7 +83,7 @@ class Trial:
         return self.outcome in (Outcome.WRONG, Outcome.TRACEBACK)
 
 
-def drawn_case(seed: int, index: int) -> RandomCase | RandomAssembly:
+def drawn_case(seed: int, index: int) -> RandomCase[Scene] | RandomCase[Assembly]:
     """Draw what a trial solves; see `random_case` and `random_assembly`."""
     return random_assembly(seed, index) if index % EVERY == EVERY - 1 else random_case(seed, index)
 
@@ -101,14 +101,12 @@ def try_case(seed: int, index: int) -> Trial:
             return Trial(seed, index, Outcome.TRACEBACK, type(error).__name__, traceback.format_exc())
 
 
-def solved_steps(case: RandomCase | RandomAssembly) -> tuple[Solution, ...] | tuple[AssemblySolution, ...]:
+def solved_steps(
+    case: RandomCase[Scene] | RandomCase[Assembly],
+) -> Sequence[Solution] | Sequence[AssemblySolution]:
     """Solve the scenes of a case; one solution for each load step."""
-    if isinstance(case, RandomAssembly):
-        is_single = len(case.scenes) == 1 and case.scenes[0].n_steps == 1
-        return (run(case.scenes[0]),) if is_single else run_assembly_history(case.scenes)
-    if len(case.scenes) == 1 and case.scenes[0].n_steps == 1:
-        return (run(case.scenes[0]),)
-    return run_history(case.scenes)
+    scenes: Any = case.scenes
+    return [run(scenes[0])] if len(scenes) == 1 and scenes[0].n_steps == 1 else run_steps(scenes)
 
 
 def judge(steps: Iterable[Solution] | Iterable[AssemblySolution]) -> tuple[Outcome, str, str]:

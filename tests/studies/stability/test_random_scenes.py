@@ -43,7 +43,7 @@ def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
     assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 10  # a generator of scenes without answers tests nothing
 
 
-def half_planes_among(seed: int, count: int) -> list[RandomCase]:
+def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
     """Return the half-planes among single bodies; what was drawn and is no scene is not among them."""
     cases = []
     for index in range(count):

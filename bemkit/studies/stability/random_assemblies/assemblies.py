@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part, Pressure, Traction
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fixed_point import FixedPoint
@@ -21,32 +20,17 @@ from bemkit.studies.stability.random_assemblies import blocks, corners, round_bo
 from bemkit.studies.stability.random_assemblies.layout import Layout
 from bemkit.studies.stability.random_assemblies.members import Members
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
-from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.draw import Draw, RandomCase
 from bemkit.studies.stability.random_scenes.histories import shear_of, sheared_steps
 
 _STREAM, _HISTORIES = 2, 4
 """Keep the draws of assemblies and of their load histories apart from those of scenes with the same numbers."""
 
 
-@dataclass(frozen=True)
-class RandomAssembly:
-    """Assemblies that follow each other in time, mostly a single one, and the numbers from which they were drawn."""
-
-    seed: int
-    index: int
-    scenes: tuple[Assembly, ...]
-
-    def files(self) -> dict[str, str]:
-        """Return scene files (TOML) by name, one for each assembly."""
-        name = f"random-assembly-{self.seed}-{self.index}"
-        names = [name] if len(self.scenes) == 1 else [f"{name}-step-{k}" for k in range(1, len(self.scenes) + 1)]
-        return {f"{each}.toml": scene_to_toml(scene) for each, scene in zip(names, self.scenes, strict=True)}
-
-
 _LINEAR_SOLVERS: tuple[LinearSolverChoice, ...] = (Automatic(), Automatic(), DenseCholesky(), Automatic())
 
 
-def random_assembly(seed: int, index: int) -> RandomAssembly:
+def random_assembly(seed: int, index: int) -> RandomCase[Assembly]:
     """Draw assembly number `index` of a seed; the same numbers always give the same assembly.
 
     Raises
@@ -75,7 +59,7 @@ def random_assembly(seed: int, index: int) -> RandomAssembly:
         assembly = replace(assembly, bodies=bodies, mesh=mesh)
     elsewhere = _similarity(draw).apply(assembly)
     sheared = _sheared(Draw(np.random.PCG64([seed, index, _HISTORIES])), elsewhere)
-    return RandomAssembly(seed, index, _history(draw, elsewhere) if sheared is None else (sheared,))
+    return RandomCase(seed, index, _history(draw, elsewhere) if sheared is None else (sheared,))
 
 
 def _similarity(draw: Draw) -> AssemblySimilarity:

@@ -1,13 +1,17 @@
-"""Draws from a random generator as plain Python values, which scene files can hold."""
+"""Draws from a random generator as plain Python values, which scene files can hold, and what is drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import AnyScene
+from bemkit.scene.toml import scene_to_toml
 
 T = TypeVar("T")
 
@@ -48,3 +52,19 @@ class Draw(np.random.Generator):
         angles = {quarter: 0.5, quarter * float(self.integers(4)): 0.25, self.between(-np.pi, np.pi): 0.25}
         angle = self.one_by_weight(angles)
         return np.array([np.cos(angle), np.sin(angle)]).round(15)
+
+
+@dataclass(frozen=True)
+class RandomCase(Generic[AnyScene]):
+    """Scenes or assemblies that follow each other in time, mostly a single one, and the numbers they were drawn by."""
+
+    seed: int
+    index: int
+    scenes: tuple[AnyScene, ...]
+
+    def files(self) -> dict[str, str]:
+        """Return scene files (TOML) by name, one for each scene."""
+        kind = "random-assembly" if isinstance(self.scenes[0], Assembly) else "random"
+        name = f"{kind}-{self.seed}-{self.index}"
+        names = [name] if len(self.scenes) == 1 else [f"{name}-step-{k}" for k in range(1, len(self.scenes) + 1)]
+        return {f"{each}.toml": scene_to_toml(scene) for each, scene in zip(names, self.scenes, strict=True)}

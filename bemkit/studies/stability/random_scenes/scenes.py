@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,13 +26,12 @@ from bemkit.scene.discretisation import (
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
-from bemkit.scene.toml import scene_to_toml
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_scenes.bodies import Body, random_body
-from bemkit.studies.stability.random_scenes.draw import Draw
+from bemkit.studies.stability.random_scenes.draw import Draw, RandomCase
 from bemkit.studies.stability.random_scenes.half_planes import random_half_plane
 from bemkit.studies.stability.random_scenes.histories import pressed_and_sheared
 from bemkit.studies.stability.random_scenes.inside import random_body_forces
@@ -44,22 +43,7 @@ HALF_PLANES = 0.12
 _NEARLY_INCOMPRESSIBLE = (0.45, 0.49, 0.4995, 0.499995, 0.49999995, 0.5, 0.5)
 
 
-@dataclass(frozen=True)
-class RandomCase:
-    """Scenes that follow each other in time, mostly a single one, and the numbers from which they were drawn."""
-
-    seed: int
-    index: int
-    scenes: tuple[Scene, ...]
-
-    def files(self) -> dict[str, str]:
-        """Return scene files (TOML) by name, one for each scene."""
-        name = f"random-{self.seed}-{self.index}"
-        names = [name] if len(self.scenes) == 1 else [f"{name}-step-{k}" for k in range(1, len(self.scenes) + 1)]
-        return {f"{each}.toml": scene_to_toml(scene) for each, scene in zip(names, self.scenes, strict=True)}
-
-
-def random_case(seed: int, index: int) -> RandomCase:
+def random_case(seed: int, index: int) -> RandomCase[Scene]:
     """Draw scene number `index` of a seed; the same numbers always give the same scene.
 
     Raises
