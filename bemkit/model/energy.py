@@ -7,6 +7,7 @@ are much longer than a body is thick it may push back the wrong way, and still s
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.solvers.base import ContactSolution, Status
+
+if TYPE_CHECKING:
+    from bemkit.model.assembled.model import AssembledModel  # single bodies are solved without it
 
 _ROUND_OFF = 1e-10
 """Share of the largest stiffness, or of the work of all forces, that round-off may make of zero. The softest bending of
@@ -46,11 +50,31 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         doubt = _negative_work(displacement, force, space, sensitivity)
     else:
         is_symmetric = model.scene.discretisation.is_symmetric
-        doubt = doubt_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
-    return named_negative(result, doubt) if doubt else result
+        doubt = _doubt_of(model.body.condensed, model.elastic, space, is_symmetric, (displacement, force))
+    return _named_negative(result, doubt) if doubt else result
 
 
-def doubt_of(
+def with_energies_checked(model: AssembledModel, result: ContactSolution) -> ContactSolution:
+    """Return the outcome of a solve, named NEGATIVE_ENERGY and by the body if the energy of one is negative or can be.
+
+    See `with_energy_checked`.
+    """
+    if not result.state.is_finite or result.status is Status.NOT_FINITE:
+        return result
+    unknowns = model.body.member_displacements(result.state)[: len(model.condensed)]  # rigid bodies come last
+    bodies = zip(model.prepared.bodies, model.elastic, model.condensed, model.prepared.insides, unknowns, strict=True)
+    for body, elastic, condensed, inside, own in bodies:
+        displacement, force = condensed.recover(own)
+        if inside is not None:
+            displacement, force = displacement - inside.displacement, force - inside.force
+        is_symmetric = body.scene.discretisation.is_symmetric
+        doubt = _doubt_of(condensed, elastic, body.own_space, is_symmetric, (displacement, force))
+        if doubt:
+            return _named_negative(result, f"body {body.name!r}: {doubt}")
+    return result
+
+
+def _doubt_of(
     condensed: CondensedMap,
     elastic: SteklovPoincare,
     space: BoundarySpace,
@@ -146,7 +170,7 @@ def is_indefinite(stiffness: FloatArray, sensitivity: FloatArray | None = None) 
     return False
 
 
-def named_negative(result: ContactSolution, reason: str) -> ContactSolution:
+def _named_negative(result: ContactSolution, reason: str) -> ContactSolution:
     """Return an outcome with the status NEGATIVE_ENERGY and a reason."""
     status = Status.NEGATIVE_ENERGY
     return replace(result, status=status, message=f"{status.value} [{reason}]")
