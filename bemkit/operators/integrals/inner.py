@@ -68,6 +68,8 @@ def inner_on_element(panels: Panels, degrees: Degrees, elements: IntArray, xi: f
     integrals, log_product = kernels.near_integrals(xi + end, xi - end, degrees.highest_integral)
     principal = integrals.real.astype(complex)
     straight = Inner.straight(degrees, principal, log_product, np.zeros(elements.size))
+    if panels.curved is None or bool(panels.is_straight[elements].all()):
+        return straight
     return _sum(straight, bending(degrees, panels.polynomials(elements), np.full(elements.size, xi + 0j)))
 
 

@@ -231,6 +231,8 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
 
 def _mirrors(space: BoundarySpace) -> list[Support]:
     """Return the supports that stand for symmetry lines: no displacement across them."""
+    if space.mesh.symmetry is None:
+        return []
     held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
     elements = np.flatnonzero(held.any(axis=(1, 2)))
     if not elements.size:
