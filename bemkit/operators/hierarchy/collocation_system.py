@@ -47,7 +47,7 @@ def collocation_system(
     Notes
     -----
     The equations, the balances of the tractions and the reciprocities are those of
-    `bemkit.operators.steklov_poincare.mixed_system.MixedSystem`.
+    `bemkit.operators.steklov_poincare.collocation.MixedSystem`.
     """
     n, holes = mesh.n_elements, _holes(mesh)
     at_holes = [[source.centre.real, source.centre.imag] for source in (HoleSource.of(mesh, each) for each in holes)]

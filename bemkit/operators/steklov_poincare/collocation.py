@@ -1,13 +1,22 @@
-"""The direct collocation map of the paper."""
+"""The direct collocation map of the paper, and its equations with one unknown a dof: traction or displacement."""
 
 from __future__ import annotations
 
-from bemkit.arrays import FloatArray
+from dataclasses import dataclass
+
+import numpy as np
+
+from bemkit.arrays import ComplexArray, FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace
+from bemkit.operators.collocation.assembly import sweep_rows, write_columns
+from bemkit.operators.collocation.collocation_points import Coefficients
+from bemkit.operators.collocation.reciprocity import Reciprocity
+from bemkit.operators.counts import Entries, OperationCounts
+from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.rigid_modes import traction_free_modes
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotate_columns
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
@@ -52,3 +61,221 @@ class CollocationElasticity:
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
         """Return the (n_elements, 1, 2) tractions: forces over lengths."""
         return force[:, None] / self.mesh.lengths[:, None, None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Given data, and the unknowns (n_dofs,) under them with the retained displacements at rest."""
+
+    data: GivenData
+    at_rest: FloatArray
+
+
+class MixedSystem:
+    """(1/2 + T) u = U t solved for every unknown but the retained displacements.
+
+    Parameters
+    ----------
+    mesh : BoundaryMesh
+    material : Material
+    conditions : NodalConditions
+        Of the elements.
+    name : str
+        What is singular if the equations are.
+    force : (n_elements, 2) array [N/m]
+        In x and y: the first load, under which `condensed` is given.
+    slopes : bool
+        Whether the double layer takes the slopes of displacements; see
+        `bemkit.operators.collocation.gradient_reconstruction`.
+
+    Raises
+    ------
+    SingularMatrixError
+        If the supports, and the retained directions held fast, leave the body free.
+
+    Notes
+    -----
+    The unknown of a dof is its displacement where the force is known, else its traction; the columns of the matrix are
+    those of the double layer there, else those of the single layer with the other sign. Columns that are multiplied by
+    zero are neither computed nor stored: those of tractions on free directions without a load, and of displacements in
+    directions that are held at rest. Columns of given data are multiplied by them at once and not stored either; loads
+    that are no multiple of the one before take another sweep over the pairs.
+
+    The equations along x come first, then those along y, then the resultants of the tractions and the reciprocities;
+    for each of these there is one more unknown, an error of the displacement equations.
+    """
+
+    def __init__(
+        self,
+        mesh: BoundaryMesh,
+        material: Material,
+        conditions: NodalConditions,
+        name: str,
+        force: FloatArray,
+        *,
+        slopes: bool = True,
+    ) -> None:
+        self._mesh, self._material, self._conditions, self._slopes = mesh, material, conditions, slopes
+        self._weights, self._force = np.repeat(mesh.lengths, 2), force
+        self._free, self._fixed, self._retained = (
+            np.flatnonzero(x) for x in (conditions.is_free, conditions.is_fixed, conditions.is_retained)
+        )
+        motions = traction_free_modes(mesh, mesh.centres)
+        reciprocity = Reciprocity.of(mesh, material, takes_slopes=slopes)
+        self._find_balances(motions, reciprocity)
+
+        # the displacement equations with the columns of their errors, and the balances below them
+        errors = np.column_stack([motions, reciprocity.fields])
+        n_rows, order = self._weights.size, self._weights.size + errors.shape[1]
+        matrix, right = np.zeros((order, order)), np.zeros((order, self._retained.size), order="F")
+        data = GivenData.of(conditions, force, conditions.displacement)
+        n_elements = mesh.n_elements
+        equations = matrix[:n_rows, :n_rows].reshape(2, n_elements, n_rows)
+        known, work = self._sweep(data, equations, right[:n_rows].reshape(2, n_elements, self._retained.size))
+        matrix[:n_rows, n_rows:] = np.concatenate([errors[0::2], errors[1::2]])
+        matrix[n_rows:, :n_rows] = np.where(conditions.is_free.ravel(), self._on_displacement, -self._on_traction)
+        right[n_rows:] = self._on_displacement[:, self._retained]
+
+        self._factor = DenseLU(matrix, name)
+        self._response = -self._factor.solve(right)[:n_rows]
+        work += OperationCounts(
+            single_layer=Entries.full(n_rows, n_rows - self._free.size),
+            double_layer=Entries.full(n_rows, self._free.size + self._retained.size),
+            factorisations=(self._factor.factorisation,),
+            right_hand_sides=self._retained.size + 1,
+        )
+        self._work, self._base = work, _Solved(data, self._solution(data, known))
+
+    def condensed(self) -> CondensedMap:
+        """Return the condensed map under the first load."""
+        return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
+
+    def _find_balances(self, motions: FloatArray, reciprocity: Reciprocity) -> None:
+        """Find on_traction @ t == on_displacement @ u for resultants and reciprocities, (n_balances, n_dofs) each.
+
+        Resultants are of the size of the displacements that they cause: equations of one size are all solved to
+        round-off; larger ones would gather that of their pivots.
+        """
+        material, frame = self._material, self._conditions.frame
+        compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
+        resultants = motions.T * (compliance * self._weights)
+        on_traction = np.concatenate([resultants, reciprocity.on_traction])
+        on_displacement = np.concatenate([np.zeros(resultants.shape), reciprocity.on_displacement])
+        self._on_traction, self._on_displacement = (rotate_columns(x, frame) for x in (on_traction, on_displacement))
+
+    def _sweep(
+        self, data: GivenData, matrix: FloatArray | None = None, right: FloatArray | None = None
+    ) -> tuple[FloatArray, OperationCounts]:
+        """Return what data contribute to the equations (n_rows,), and fill the columns of what is not given.
+
+        The matrix (2, n_elements, n_dofs) takes the columns of unknowns, `right` (2, n_elements, n_retained) those of
+        the retained displacements.
+        """
+        n, n_rows, frame = self._mesh.n_elements, self._weights.size, self._conditions.frame
+        loaded, moved = (np.flatnonzero(x) for x in (data.force, data.displacement))
+        traction, displacement = data.force.ravel()[loaded] / self._weights[loaded], data.displacement.ravel()[moved]
+        unknown = np.zeros(0, np.intp) if matrix is None else np.flatnonzero(~self._conditions.is_free)
+        # elements with tractions, and the numbers of their dofs among those of all of them
+        loaded_elements = np.unique(np.concatenate([unknown, loaded]) // 2)
+        number = np.zeros(n_rows, np.intp)
+        number[_dofs(loaded_elements)] = np.arange(2 * loaded_elements.size)
+        retained_runs = consecutive_runs(self._retained)
+        # the columns of consecutive unknowns are consecutive among those of the single layer, too
+        unknown_runs = [
+            (dofs, number[dofs])
+            if isinstance(dofs, np.ndarray) or dofs.step
+            else (dofs, slice(number[dofs.start], number[dofs.stop - 1] + 1))
+            for _, dofs in consecutive_runs(unknown)
+        ]
+        known = np.zeros((2, n))
+
+        def store(rows: slice, block: Coefficients) -> None:
+            n_chunk = rows.stop - rows.start
+            single = np.empty((2, n_chunk, 2 * loaded_elements.size))
+            on, on_conjugate = block.on_traction[:, loaded_elements], block.on_conjugate_traction[:, loaded_elements]
+            _write(on, on_conjugate, frame[loaded_elements], single)
+            known[:, rows] += _product(single[:, :, number[loaded]], traction)
+            if not needs_double:
+                return
+            block.on_displacement[np.arange(n_chunk), np.arange(rows.start, rows.stop)] += 0.5
+            double = np.empty((2, n_chunk, n_rows)) if matrix is None else matrix[:, rows]
+            _write(block.on_displacement, block.on_conjugate_displacement, frame, double)
+            known[:, rows] -= _product(double[:, :, moved], displacement)
+            if right is not None:
+                for positions, dofs in retained_runs:
+                    right[:, rows, positions] = double[:, :, dofs]
+                for dofs, in_single in unknown_runs:
+                    double[:, :, dofs] = -single[:, :, in_single]
+
+        needs_double, needs_single = matrix is not None or moved.size > 0, np.zeros(n, bool)
+        needs_single[loaded_elements] = True
+        n_pairs = sweep_rows(
+            self._mesh,
+            self._material,
+            store,
+            needs_single=needs_single,
+            needs_double=needs_double,
+            takes_slopes=self._slopes,
+        )
+        of_loads, of_motions = Entries(n_rows * loaded.size), Entries(n_rows * moved.size)
+        return known.ravel(), OperationCounts(element_pairs=n_pairs, single_layer=of_loads, double_layer=of_motions)
+
+    def _solution(self, data: GivenData, known: FloatArray) -> FloatArray:
+        """Return the unknowns (n_dofs,), the retained displacements at rest."""
+        traction, displacement = data.force.ravel() / self._weights, data.displacement.ravel()
+        balances = self._on_traction @ traction - self._on_displacement @ displacement
+        return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
+
+    def _condensed(
+        self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
+    ) -> CondensedMap:
+        """Return the condensed map under data that are a multiple of others, for which the equations are solved."""
+        at_rest = factor * base.at_rest
+        conditions, weights, response = self._conditions, self._weights, self._response
+        traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / weights
+        is_free, given = conditions.is_free.ravel(), data.displacement.ravel()
+
+        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+            unknowns = at_rest + response @ retained_displacement
+            local = np.where(is_free, unknowns, given)
+            local[self._retained] = retained_displacement
+            local_force = weights * np.where(is_free, traction, unknowns)
+            displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(-1, 2))
+            return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(-1, 2))
+
+        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
+            return response[directions], at_rest[directions]
+
+        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
+            other = GivenData.of(conditions, force, displacement)
+            factor = other.factor_of(base.data)
+            if factor is not None:  # the usual case of load factors
+                return self._condensed(force, other, base, factor, OperationCounts())
+            known, work = self._sweep(other)
+            solved = _Solved(other, self._solution(other, known))
+            return self._condensed(force, other, solved, 1.0, work + OperationCounts(right_hand_sides=1))
+
+        own = weights[self._retained]
+        load = own * (traction[self._retained] - at_rest[self._retained])
+        return CondensedMap(own[:, None] * response[self._retained], load, recover, under, follow, work=work)
+
+
+def _dofs(elements: IntArray) -> IntArray:
+    return (2 * elements[:, None] + np.arange(2)).ravel()
+
+
+def _write(on: FloatArray | ComplexArray, on_conjugate: ComplexArray, frame: FloatArray, columns: FloatArray) -> None:
+    """Write v -> on v + on_conjugate conj(v) into columns (2, n_rows, n_dofs), v in the frames of the elements."""
+    x, y = columns.reshape(2, len(on), -1, 2)
+    write_columns(on, on_conjugate, x, y)
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    for component in (x, y) if turned.size else ():
+        along_x, along_y = component[:, turned, 0], component[:, turned, 1]
+        for k in range(2):
+            component[:, turned, k] = along_x * frame[turned, k, 0] + along_y * frame[turned, k, 1]
+
+
+def _product(columns: FloatArray, values: FloatArray) -> FloatArray:
+    """Return columns (2, n_rows, n) times values, without BLAS, whose threads would wait for those of the sweep."""
+    product: FloatArray = np.einsum("crn,n->cr", columns, values)
+    return product

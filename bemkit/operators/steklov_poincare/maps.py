@@ -18,9 +18,8 @@ from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.assembly import Tag
 from bemkit.operators.linear.solvers import DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity, MixedSystem
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
-from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, TractionField, integrate_traction
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor, S
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare.mixed_system import MixedSystem
+from bemkit.operators.steklov_poincare.collocation import MixedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
 MATERIAL = Material(2.0, 0.3)
