@@ -19,7 +19,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
-from bemkit.scene.unit_names import unit_of
+from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.base import StepRecord
 
 _MANY_TRANSITIONS, _MANY_CONTACTS = 12, 8
@@ -31,8 +31,7 @@ def print_summary(solution: Solution | AssemblySolution, console: Console | None
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0), title_justify="left")
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
-    rows = _assembly_rows(solution) if isinstance(solution, AssemblySolution) else _summary_rows(solution)
-    for name, value in rows:
+    for name, value in _summary_rows(solution):
         table.add_row(name, Text(value) if isinstance(value, str) else value)
     console.print(Text(solution.title, style="bold"))
     console.print(table)
@@ -146,9 +145,33 @@ def format_seconds(seconds: float) -> str:
     return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
-def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
-    mesh, contact = solution.mesh, solution.contact
+def _summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, Text | str]]:
     yield "status", _status(solution)
+    if isinstance(solution, AssemblySolution):
+        solver, of_tractions = solution.assembly.solver, ""
+        yield from _bodies_rows(solution)
+    else:
+        solver, of_tractions = solution.scene.solver, _traction_errors(solution)
+        yield from _body_rows(solution)
+    if has_contact := solution.contact.n_contact > 0:
+        yield "contact nodes", _node_counts(solution)
+        yield from _contacts_rows(solution) if isinstance(solution, AssemblySolution) else _force_rows(solution)
+    else:
+        yield "contact", "none"
+    yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
+    yield from _history_rows(solution)
+    if solution.estimated_error is not None:
+        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
+    if has_contact:
+        yield "transitions", "\n".join(_transition_lines(solution))
+        word = SOLVERS.word_of(solver)
+        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({word})"
+    yield from _violation_rows(solution)
+    yield "time", _time(solution)
+
+
+def _body_rows(solution: Solution) -> Iterator[tuple[str, str]]:
+    mesh = solution.mesh
     discretisation = DISCRETISATIONS.word_of(solution.scene.discretisation)
     if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
@@ -158,45 +181,37 @@ def _summary_rows(solution: Solution) -> Iterator[tuple[str, Text | str]]:
     if mesh.symmetry is not None:
         values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
         yield "symmetry", f"about {mesh.symmetry}: {values}"
-    if contact.n_contact:
-        yield "contact nodes", _node_counts(solution)
-        force = unit_of("force", solution.units)
-        yield "normal force", f"{_amount(solution.force_normal, force)}  pressing, per unit thickness"
-        yield "friction force", f"{_amount(solution.force_tangential, force)}  on the body, along the boundary"
-    else:
-        yield "contact", "none"
-    yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
-    yield from _history_rows(solution)
-    if solution.estimated_error is not None:
-        tractions = solution.estimated_traction_error
-        of_tractions = "" if tractions is None else f", {tractions:.1e} of contact tractions"
-        if (local := solution.estimated_local_traction_error) is not None:
-            of_tractions += f", {local:.1e} of single ones"
-        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm{of_tractions}"
-    if contact.n_contact:
-        yield "transitions", "\n".join(_transition_lines(solution))
-        solver = SOLVERS.word_of(solution.scene.solver)
-        yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
-    yield from _violation_rows(solution)
-    yield "time", _time(solution)
 
 
-def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str]]:
-    yield "status", _status(solution)
+def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
+    units = solution.units
+    yield "normal force", f"{_amount(solution.force_normal, 'force', units)}  pressing, per unit thickness"
+    yield "friction force", f"{_amount(solution.force_tangential, 'force', units)}  on the body, along the boundary"
+
+
+def _traction_errors(solution: Solution) -> str:
+    tractions, local = solution.estimated_traction_error, solution.estimated_local_traction_error
+    words = "" if tractions is None else f", {tractions:.1e} of contact tractions"
+    return words if local is None else f"{words}, {local:.1e} of single ones"
+
+
+def _bodies_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
     yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
     for elastic in solution.assembly.bodies:
         if (drawn := drawn_shape(elastic.shape)) and drawn.notes:
             yield f"outline of {elastic.name}", "\n".join(drawn.notes)
-    yield "contact nodes", _node_counts(solution)
-    units = {quantity: unit_of(quantity, solution.units) for quantity in ("length", "stress", "force")}
+
+
+def _contacts_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
+    units = solution.units
     for contact in solution.contacts[:_MANY_CONTACTS]:
         yield (
             contact.name,
-            f"normal force {_amount(contact.force_normal, units['force'])}, "
-            f"friction {_amount(contact.force_tangential, units['force'])}, "
-            f"length {contact.contact_length:.6g} {units['length']}".rstrip()
-            + f", peak pressure {contact.peak_pressure:.6g} {units['stress']}".rstrip()
-            + f", slip up to {contact.largest_slip:.3g} {units['length']}".rstrip(),
+            f"normal force {_amount(contact.force_normal, 'force', units)}, "
+            f"friction {_amount(contact.force_tangential, 'force', units)}, "
+            f"length {amount(contact.contact_length, 'length', units, digits=6)}, "
+            f"peak pressure {amount(contact.peak_pressure, 'stress', units, digits=6)}, "
+            f"slip up to {amount(contact.largest_slip, 'length', units, digits=3)}",
         )
     if len(solution.contacts) > _MANY_CONTACTS:
         yield "", f"and {len(solution.contacts) - _MANY_CONTACTS} contacts more (--json -)"
@@ -208,15 +223,6 @@ def _assembly_rows(solution: AssemblySolution) -> Iterator[tuple[str, Text | str
         )
     if len(solution.rigid) > _MANY_CONTACTS:
         yield "", f"and {len(solution.rigid) - _MANY_CONTACTS} rigid bodies more (--json -)"
-    yield "elastic energy", f"{_amount(solution.energy, unit_of('energy', solution.units))}  per unit thickness"
-    yield from _history_rows(solution)
-    if solution.estimated_error is not None:
-        yield "estimated error", f"{solution.estimated_error:.1e}  relative, in the energy norm"
-    yield "transitions", "\n".join(_transition_lines(solution))
-    solver = SOLVERS.word_of(solution.assembly.solver)
-    yield "linear solves", f"{solution.linear_solves} in {solution.outer_steps} steps ({solver})"
-    yield from _violation_rows(solution)
-    yield "time", _time(solution)
 
 
 def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
@@ -229,15 +235,15 @@ def _violation_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str
 def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, str]]:
     loading = solution.loading
     if loading is not None:
-        work, unit = loading.total(), unit_of("energy", solution.units)
+        work, units = loading.total(), solution.units
         yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
-        yield "external work", f"{_amount(work.external_work, unit)}  in all steps"
-        yield "friction took", f"{_amount(work.dissipation, unit)}  in all steps"
+        yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
+        yield "friction took", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
 
 
 def _status(solution: Solution | AssemblySolution) -> Text:
     colour = "green" if solution.is_converged else "yellow" if solution.is_certified else "red"
-    status = Text(solution.status.name.lower().replace("_", " "), style=f"bold {colour}")
+    status = Text(solution.status_words, style=f"bold {colour}")
     if not solution.is_converged:
         status.append(f": {solution.message or solution.status.value}", style="not bold")
     return status
@@ -255,8 +261,8 @@ def _time(solution: Solution | AssemblySolution) -> str:
     return f"{timings.get('total', sum(timings.values())):.2f} s ({stages})"
 
 
-def _amount(value: float, unit: str) -> str:
-    return f"{value:.8g} {unit}".rstrip()
+def _amount(value: float, quantity: str, units: UnitNames | None) -> str:
+    return amount(value, quantity, units, digits=8)
 
 
 def _worst_entry(measured: Certificate | BetweenNodes) -> str:

@@ -66,7 +66,7 @@ def _steps(steps: SolvedSteps[Any]) -> Element:
         rows.append(
             {
                 "step": number + 1,
-                "status": step.status.name.lower().replace("_", " "),
+                "status": step.status_words,
                 "normal force": step.force_normal,
                 "friction force": step.force_tangential,
                 **{word: words.count(word) for word in ("separated", "slip", "stick")},

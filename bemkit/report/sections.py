@@ -26,7 +26,7 @@ _PACKAGES = ("numpy", "scipy", "h5py", "matplotlib")
 def badge(result: Result) -> Element:
     """Return the status in a word, with a class for its colour."""
     kind = "good" if result.is_converged else "doubtful" if result.is_certified else "bad"
-    return element("strong", result.status.name.lower().replace("_", " "), class_=f"badge {kind}")
+    return element("strong", result.status_words, class_=f"badge {kind}")
 
 
 def headline_rows(result: Result) -> Iterator[tuple[str, str]]:
