@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from bemkit.cli.options import shown_progress
-from bemkit.results.outputs import print_data
+from bemkit.results.streams import print_data
 
 
 @click.command()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING
 
@@ -10,7 +9,7 @@ import click
 
 from bemkit.cli.options import shown_progress
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, Outputs, TextFile
+from bemkit.results.outputs import JSON_START, Outputs, TextFile, json_text
 
 if TYPE_CHECKING:
     from bemkit.runs.critical_friction import CriticalFriction
@@ -30,7 +29,7 @@ def critical_friction(scene: str, elements: int | None, accuracy: float | None, 
         chosen = with_overrides(load_scene(scene), elements=elements, accuracy=accuracy)
 
         def as_json(found: CriticalFriction) -> str:
-            return json.dumps({"title": chosen.title, **found.as_dict()}, indent=2, allow_nan=False) + "\n"
+            return json_text({"title": chosen.title, **found.as_dict()})
 
         outputs = Outputs((TextFile(json_file, "JSON file", JSON_START, as_json),))
         outputs.check()

@@ -13,7 +13,7 @@ import click
 
 from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, NOT_CONVERGED, PIPE_CLOSED
 from bemkit.errors import BemkitError, NoResultError, one_line, printable
-from bemkit.results.outputs import PipeClosedError, guarded_streams
+from bemkit.results.streams import PipeClosedError, guarded_streams
 from bemkit.version import __version__
 
 _COMMANDS = {

@@ -56,9 +56,6 @@ def outputs_of(
         return Outputs()
     from bemkit.results.tables import CSV_STARTS, to_csv, to_json
 
-    def as_json(solution: Solution | AssemblySolution) -> str:
-        return to_json(solution) + "\n"
-
     def as_csv(solution: Solution | AssemblySolution) -> str:
         return to_csv(solution, table)
 
@@ -68,7 +65,7 @@ def outputs_of(
         return figures(solution, what)
 
     texts = (
-        TextFile(json_file, "JSON file", JSON_START, as_json),
+        TextFile(json_file, "JSON file", JSON_START, to_json),
         TextFile(csv_file, f"CSV file of the {table} table", CSV_STARTS[table], as_csv),
     )
     return Outputs(texts, folder, pictures, "deformation")

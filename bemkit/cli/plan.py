@@ -42,9 +42,10 @@ def plan(
         with concerning(scene):
             made = _planned(chosen)
     if is_json:
-        import json
+        from bemkit.results.outputs import json_text
+        from bemkit.results.streams import print_data
 
-        print(json.dumps(made.as_dict(), indent=2))
+        print_data(json_text(made.as_dict()))
     else:
         from bemkit.cli.console import print_plan
 

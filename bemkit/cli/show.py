@@ -7,7 +7,8 @@ from contextlib import ExitStack
 import click
 
 from bemkit.cli.options import outputs_of, pictures_of, result_target, shown_progress
-from bemkit.results.outputs import STDOUT, print_data
+from bemkit.results.outputs import STDOUT
+from bemkit.results.streams import print_data
 
 
 @click.command()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
@@ -12,7 +11,7 @@ import click
 
 from bemkit.cli.options import StudyProgress, reserve, shown_progress
 from bemkit.errors import concerning
-from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, plain_table, stdout_console
+from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, json_text, plain_table, stdout_console
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,13 +158,11 @@ def paper_tables(json_file: str | None, csv_file: str | None, quiet: bool) -> No
 def solutions(scene: str, starts: int, elements: int | None, json_file: str | None) -> int:
     """Look for several solutions of SCENE from several starts."""
     with shown_progress(quiet=False):
-        from bemkit.results.tables import finite_only
         from bemkit.runs.run import run_probe
         from bemkit.scene.toml import load_single_body, with_overrides
 
         def as_json(found: Sequence[Solution]) -> str:
-            content = {"starts": starts, "solutions": [finite_only(solution.summary()) for solution in found]}
-            return json.dumps(content, indent=2, allow_nan=False) + "\n"
+            return json_text({"starts": starts, "solutions": [solution.summary() for solution in found]})
 
         summaries = TextFile(json_file, "JSON file", JSON_START, as_json)
         summaries.check()

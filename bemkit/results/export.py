@@ -141,7 +141,7 @@ FORMATS: Mapping[str, Format] = MappingProxyType(
     {
         ".h5": _HDF5,
         ".hdf5": _HDF5,
-        ".json": _text("JSON file", JSON_START, lambda each: to_json(each) + "\n"),
+        ".json": _text("JSON file", JSON_START, to_json),
         ".csv": _text("CSV file of the contact table", CSV_STARTS["contact"], lambda each: to_csv(each, "contact")),
         ".npz": Format(lambda path: check_target(path, "NPZ file", lambda old: begins_with(old, "PK")), _write_npz),
         ".vtu": _VTK,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +15,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.load_history import step_rows
-from bemkit.results.outputs import csv_text
+from bemkit.results.outputs import csv_text, json_text
 from bemkit.results.solution import Solution
 from bemkit.solvers.base import StepRecord
 
@@ -72,7 +70,7 @@ def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
 
 def to_json(solution: Solution | AssemblySolution) -> str:
     """Return the summary as one JSON object; numbers that are not finite become null."""
-    return json.dumps(finite_only(solution.summary()), indent=2, allow_nan=False)
+    return json_text(solution.summary())
 
 
 def element_displacement(solution: Solution | BodyResult) -> FloatArray:
@@ -128,16 +126,3 @@ def _columns_of_bodies(solution: AssemblySolution) -> dict[str, Any]:
     names = [name for name, table in tables.items() for _ in table["part"]]
     first = next(iter(tables.values()))
     return {"body": names} | {column: np.concatenate([table[column] for table in tables.values()]) for column in first}
-
-
-def finite_only(value: Any) -> Any:
-    """Return tables, lists and numbers as JSON can hold them: numbers that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {key: finite_only(item) for key, item in value.items()}
-    if isinstance(value, str):
-        return value
-    if isinstance(value, Iterable):
-        return [finite_only(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -7,7 +7,6 @@ the start, and the displacements on the contact boundary compared in the largest
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +23,7 @@ from bemkit.geometry.grading import Algebraic
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for
-from bemkit.results.outputs import csv_text, plain_table, stdout_console
+from bemkit.results.outputs import csv_text, json_text, plain_table, stdout_console
 from bemkit.scene.discretisation import ConstantCollocation
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_single_body
@@ -144,7 +143,7 @@ def to_json(tables: Sequence[PaperTable]) -> str:
         }
         for table in tables
     ]
-    return json.dumps({"tables": contents}, indent=2) + "\n"
+    return json_text({"tables": contents})
 
 
 def to_csv(tables: Sequence[PaperTable]) -> str:

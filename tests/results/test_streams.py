@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from bemkit.errors import printable
-from bemkit.results.outputs import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
+from bemkit.results.streams import GuardedStream, PipeClosedError, StreamError, guarded_streams, print_data
 
 PROGRAM = [sys.executable, "-m", "bemkit"]
 TITLE = "Würfel auf Ebene → 接触"

@@ -13,8 +13,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import closest
-from bemkit.results.outputs import csv_text
-from bemkit.results.tables import finite_only
+from bemkit.results.outputs import csv_text, json_text
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_from_toml
@@ -99,7 +98,7 @@ class Sweep:
         solved = [self._as_dict(row, RESULTS) for row in self.solved]
         failed = [self._as_dict(row, ("status", "message", "seconds")) for row in self.failed]
         content = {"title": self.scene.title, "keys": self.keys, "rows": solved, "failed": failed}
-        return json.dumps(finite_only(content), indent=2, allow_nan=False) + "\n"
+        return json_text(content)
 
     def as_pandas(self) -> Any:
         """Return the solved rows as a pandas DataFrame.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bemkit.hdf5 import FileFormat
+from bemkit.results.outputs import json_text
 from bemkit.results.record_file import RecordFile
-from bemkit.results.tables import finite_only
 from bemkit.studies.verification.case import Case, Quantity
 
 
@@ -105,7 +104,7 @@ class VerifiedRow:
 
     def as_dict(self) -> dict[str, object]:
         """Return the row under the names of the JSON output; ``None`` for numbers that do not exist."""
-        content = {
+        return {
             "case": self.name,
             "title": self.case.title,
             "quantity": self.quantity.name,
@@ -122,7 +121,6 @@ class VerifiedRow:
             "met": self.is_met,
             "message": next((record.message for record in self.records if record.message), ""),
         }
-        return finite_only(content)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,7 @@ class Verification:
     def to_json(self) -> str:
         """Return everything as JSON; numbers that do not exist are null."""
         content = {"met": self.is_met, "rows": [row.as_dict() for row in self.rows]}
-        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+        return json_text(content)
 
 
 def rows_of(cases: dict[str, Case], records: Sequence[VerificationRecord]) -> tuple[VerifiedRow, ...]:
