@@ -6,8 +6,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.rigid_motions import RigidMotions
-from bemkit.contact.solvability import contact_forces, friction_envelopes, met, outermost, unit_motions
+from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
+from bemkit.contact.solvability import contact_forces, friction_envelopes, met, outermost
 
 _WITHOUT_BOUND = 1e6
 """Multiple of all other forces from which on a growing load counts as one that contact holds however large it is."""
@@ -35,9 +35,11 @@ def largest_factor(problem: ContactProblem, growing: FloatArray) -> float | None
     law that is an upper bound, because a sliding contact does not dilate: states of the incremental law may fail to
     exist below it, none exists above.
     """
-    motions, unit = unit_motions(problem.body)
+    motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return np.inf
+    unit = largest_components(motions)
+    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
     constant, growing = problem.body.rigid_load() / unit, growing / unit
     size = float(np.abs(growing).max())
     if size == 0.0:

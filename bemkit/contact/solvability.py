@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.body import LinearBody
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 
@@ -87,10 +86,12 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     balance the load. c and s envelop the law from above, and a cap is tried as a second pair (c = cap, s = 0), so the
     test never condemns a load that can be held; what it misses the driver's status still reports.
     """
-    motions, unit = unit_motions(problem.body)
+    motions = as_rows(problem.body.rigid_motions())
     if not motions.shape[0]:
         return None
+    unit = largest_components(motions)
     load = problem.body.rigid_load() / unit
+    motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
     forces = problem.body.weights[:, None] * problem.sticking_state.traction
     force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
@@ -178,15 +179,6 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
         if not np.any(meets & ~takes_part):
             return coefficients
         takes_part |= meets
-
-
-def unit_motions(body: LinearBody) -> tuple[RigidMotions, FloatArray]:
-    """Return the rigid motions of a body, one a row, scaled to a largest component of one, and by what (n_motions,)."""
-    motions = as_rows(body.rigid_motions())
-    if not motions.shape[0]:
-        return motions, np.zeros(0)
-    unit = largest_components(motions)
-    return motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr(), unit
 
 
 def met(motions: RigidMotions, velocities: FloatArray, resistance: FloatArray, slope: FloatArray) -> BoolArray:
