@@ -44,14 +44,12 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
     Support,
     free_modes,
     integrate_traction,
+    turning,
 )
 from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import Scene
 from bemkit.scene.symmetry import check_symmetry
-
-_LEAST_TURN = 1e-9
-"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
@@ -190,7 +188,7 @@ class Prepared:
         if self.contact.nodes.is_shared.any():
             return True
         discretisation, motions = self.scene.discretisation, free_modes(self.space, self.conditions)
-        turns_freely = not discretisation.keeps_rotations and np.ptp(motions, axis=1).max(initial=0.0) > _LEAST_TURN
+        turns_freely = not discretisation.keeps_rotations and turning(motions).any()
         return not discretisation.is_symmetric and bool(turns_freely or discretisation.may_be_negative(self.mesh))
 
     def under(self, scene: Scene) -> Prepared:

@@ -18,7 +18,7 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
@@ -134,8 +134,6 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
         )
 
 
-_LEAST_TURN = 1e-9
-"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
 _LARGEST_RESIDUAL, _SAMPLED = 1e3, 16
 """Residual by the tolerance of the compression, found at so many elements, beyond which equations are inexact. It is
 below one on all bodies that were tried."""
@@ -187,7 +185,7 @@ class LoadedSystem:
         system = map.system(conditions, may_be_loaded, may_move)
         motions = free_modes(map.displacement_space, conditions)
         if not map.keeps_rotations:  # constant elements resist a rotation
-            motions = motions[np.ptp(motions, axis=1).max(axis=1, initial=0.0) < _LEAST_TURN]
+            motions = motions[~turning(motions)]
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))

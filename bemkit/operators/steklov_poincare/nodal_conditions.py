@@ -24,6 +24,8 @@ FREE_MOTION_TOLERANCE = 1e-6
 """A rigid motion that moves the supports by less than this, relative to its size, is free of them. At 1e7 diameters
 from the origin numbers hold the normals along a straight side to about 1e-7; and a support that resists a motion only
 with a million times the load holds nothing."""
+_LEAST_TURN = 1e-9
+"""Difference of a rigid motion between nodes, by its size, that is no round-off."""
 _FACTOR_TOLERANCE = 4.0 * np.finfo(float).eps
 """Relative difference of two loads that the product with a load factor may leave."""
 
@@ -291,3 +293,8 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
         n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
     return motions.transpose(2, 0, 1)
+
+
+def turning(motions: FloatArray) -> BoolArray:
+    """Tell which rigid motions (n_motions, n_nodes, 2) of unit size turn the body."""
+    return np.asarray(np.ptp(motions, axis=1).max(axis=1, initial=0.0) > _LEAST_TURN)
