@@ -13,6 +13,9 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 
+_INCLINATION = 1e-6
+"""Of the dividing line: a side along it, where most elements may be, is divided at a point of its own."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClusterTree:
@@ -42,8 +45,9 @@ class ClusterTree:
             for begin, middle, end in zip(bounds[:-1], middles, bounds[1:], strict=True):
                 members = order[begin:end]
                 own = points[members]
-                coordinate = own[:, int(np.argmax(np.ptp(own, axis=0)))]
-                order[begin:end] = members[np.argpartition(coordinate, middle - begin)]
+                longer = int(np.argmax(np.ptp(own, axis=0)))
+                across = own[:, longer] + _INCLINATION * own[:, 1 - longer]
+                order[begin:end] = members[np.argpartition(across, middle - begin)]
             bounds = np.sort(np.concatenate([bounds, middles]))
         # neighbours stay neighbours in memory
         for begin, end in itertools.pairwise(bounds):

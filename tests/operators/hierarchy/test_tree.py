@@ -37,3 +37,15 @@ def test_both_long_sides_of_a_strip_share_a_leaf() -> None:
         y = strip.centres[tree.order[tree.places(0, leaf)]][:, 1]
         assert y.min() == pytest.approx(0.0)
         assert y.max() == pytest.approx(0.1)
+
+
+def test_a_side_with_most_elements_is_divided_at_points() -> None:
+    """Of elements in line none is nearer than others to a line along them: any half of these would do."""
+    block = discretise(Rectangle(1.0, 1.0).outline(), n_elements=900, density={"bottom": 27.0})
+    tree = ClusterTree.of(block.centres, 64)
+    leaf_of = np.empty(block.n_elements, np.intp)
+    leaf_of[tree.order] = np.repeat(np.arange(tree.n_leaves), np.diff(tree.bounds))
+    bottom = np.flatnonzero(block.centres[:, 1] == 0.0)
+    changes = np.count_nonzero(np.diff(leaf_of[bottom[np.argsort(block.centres[bottom, 0])]]))
+    assert bottom.size > 0.85 * block.n_elements
+    assert changes < tree.n_leaves
