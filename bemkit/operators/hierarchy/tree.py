@@ -13,8 +13,6 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 
-_INCLINATION = 1e-6
-"""Of the dividing line: a side along it, where most elements may be, is divided at a point of its own."""
 _WIDE, _FEWEST = 0.25, 8
 """Two leaves part at a gap, if it is as wide as this share of both and leaves so many elements on either side: few that
 are far from the others make a leaf see half of the body as near."""
@@ -49,9 +47,13 @@ class ClusterTree:
                 members = order[begin:end]
                 own = points[members]
                 longer = int(np.argmax(np.ptp(own, axis=0)))
-                across = own[:, longer] + _INCLINATION * own[:, 1 - longer]
+                across = own[:, longer]
                 n_first = own.shape[0] // 2 if level else _gap(across)
-                order[begin:end] = members[np.argpartition(across, n_first)]
+                halves = np.argpartition(across, n_first)
+                if n_first and across[halves[:n_first]].max() == across[halves[n_first]]:
+                    # most elements may be on a side along the dividing line, which then is divided at a point
+                    halves = np.lexsort((own[:, 1 - longer], across))
+                order[begin:end] = members[halves]
                 middles.append(begin + n_first)
             bounds = np.sort(np.concatenate([bounds, middles]))
         # neighbours stay neighbours in memory
