@@ -24,7 +24,7 @@ PRESSURES = (0.002, 0.005, 0.01, 0.02, 0.04)
 
 def rough_block(n_contact: int) -> bk.Scene:
     """Return the block under the largest pressure, with steps up to it."""
-    obstacle = bk.SelfAffineProfile(period=1.0, rms_height=1e-3, hurst=0.8, roll_off=0.25, cut_off=1 / 256, seed=1)
+    obstacle = bk.SelfAffineProfile(period=1.0, rms_height=1e-3, hurst=0.8, roll_off=0.25, cut_off=1 / 1024, seed=1)
     return bk.Scene(
         title="rough block",
         shape=bk.Rectangle(1.0, 1.0),

@@ -13,6 +13,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 
+_WIDE, _FEWEST = 0.25, 8
+"""Two leaves part at a gap, if it is as wide as this share of both and leaves so many elements on either side: few that
+are far from the others make a leaf see half of the body as near."""
+
 
 @dataclass(frozen=True, eq=False)
 class ClusterTree:
@@ -34,16 +38,23 @@ class ClusterTree:
 
     @classmethod
     def of(cls, points: FloatArray, leaf_size: int) -> ClusterTree:
-        """Divide points (n, 2) into clusters of about `leaf_size`, at least into two."""
+        """Divide points (n, 2) into clusters of about `leaf_size`, twice as many at most, at least into two."""
         n_levels = max(1, round(np.log2(max(len(points) / leaf_size, 1.0))))
         order, bounds = np.arange(len(points)), np.array([0, len(points)])
-        for _ in range(n_levels):
-            middles = (bounds[:-1] + bounds[1:]) // 2
-            for begin, middle, end in zip(bounds[:-1], middles, bounds[1:], strict=True):
+        for level in range(n_levels - 1, -1, -1):
+            middles = []
+            for begin, end in itertools.pairwise(bounds.tolist()):
                 members = order[begin:end]
                 own = points[members]
-                coordinate = own[:, int(np.argmax(np.ptp(own, axis=0)))]
-                order[begin:end] = members[np.argpartition(coordinate, middle - begin)]
+                longer = int(np.argmax(np.ptp(own, axis=0)))
+                across = own[:, longer]
+                n_first = own.shape[0] // 2 if level else _gap(across)
+                halves = np.argpartition(across, n_first)
+                if n_first and across[halves[:n_first]].max() == across[halves[n_first]]:
+                    # most elements may be on a side along the dividing line, which then is divided at a point
+                    halves = np.lexsort((own[:, 1 - longer], across))
+                order[begin:end] = members[halves]
+                middles.append(begin + n_first)
             bounds = np.sort(np.concatenate([bounds, middles]))
         # neighbours stay neighbours in memory
         for begin, end in itertools.pairwise(bounds):
@@ -64,3 +75,12 @@ class ClusterTree:
         """Return the leaves, ascending, that hold some places."""
         found: IntArray = np.unique(np.searchsorted(self.bounds, places, side="right") - 1)
         return found
+
+
+def _gap(across: FloatArray) -> int:
+    """Return how many of some coordinates are on one side of a wide gap, half of them if there is none."""
+    ordered = np.sort(across)
+    gaps = np.diff(ordered[_FEWEST - 1 : 1 - _FEWEST])
+    if not gaps.size or gaps.max() < _WIDE * (ordered[-1] - ordered[0]):
+        return across.size // 2
+    return _FEWEST + int(np.argmax(gaps))
