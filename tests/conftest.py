@@ -7,10 +7,18 @@ import os
 import pytest
 from hypothesis import HealthCheck, settings
 
-# quick runs repeat the same examples everywhere; BEMKIT_HYPOTHESIS=thorough searches ten times as many new ones
-settings.register_profile("quick", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("thorough", deadline=None, max_examples=1000, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile(os.environ.get("BEMKIT_HYPOTHESIS", "quick"))
+# quick runs repeat the same few examples everywhere, runs of slow tests too repeat more;
+# BEMKIT_HYPOTHESIS=thorough searches ten times as many new ones
+COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("quick", COMMON, derandomize=True, max_examples=24)
+settings.register_profile("full", COMMON, derandomize=True, max_examples=100)
+settings.register_profile("thorough", COMMON, max_examples=1000)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Choose how many random examples there are before tests are read."""
+    is_quick = config.option.markexpr == "not slow"
+    settings.load_profile(os.environ.get("BEMKIT_HYPOTHESIS", "quick" if is_quick else "full"))
 
 
 @pytest.hookimpl(tryfirst=True)

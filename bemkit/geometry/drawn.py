@@ -15,6 +15,7 @@ from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_poin
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.shapes import CheckedShape
 from bemkit.geometry.vectors import cross, norms
 
 Point = tuple[float, float]
@@ -210,7 +211,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class OutlineShape:
+class OutlineShape(CheckedShape):
     """A body within a loop of lines, arcs and smooth curves, with or without holes.
 
     Parameters
@@ -236,12 +237,9 @@ class OutlineShape:
         if not self.loops or not all(loop.sides for loop in self.loops):
             raise GeometryError("outline: a loop without sides bounds no body: give every loop at least one side")
 
-    def outline(self) -> Outline:
-        """Return the loops, turned so that the body lies on their left."""
-        return self._outline
-
     @cached_property
     def _outline(self) -> Outline:
+        """Return the loops, turned so that the body lies on their left."""
         loops, number = [], 0
         for loop in self.loops:
             sides = []

@@ -1,6 +1,8 @@
 """Shapes: bodies given by a few plain numbers, so that scene files can name them."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -22,8 +24,20 @@ class Shape(Protocol):
         ...
 
 
+class CheckedShape(ABC):
+    """A shape whose outline is made and checked once, however many scenes, meshes and messages ask for it."""
+
+    def outline(self) -> Outline:
+        """Return the sides of the body."""
+        return self._outline
+
+    @cached_property
+    @abstractmethod
+    def _outline(self) -> Outline: ...
+
+
 @dataclass(frozen=True)
-class Rectangle:
+class Rectangle(CheckedShape):
     """A rectangle with the sides bottom, right, top and left.
 
     Parameters
@@ -42,7 +56,8 @@ class Rectangle:
         require_positive("Rectangle", width=self.width, height=self.height)
         object.__setattr__(self, "corner", as_point(self.corner, "Rectangle: corner"))
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return one loop of four sides."""
         (x, y), x_end, y_end = self.corner, self.corner[0] + self.width, self.corner[1] + self.height
         names = ("bottom", "right", "top", "left")
@@ -50,7 +65,7 @@ class Rectangle:
 
 
 @dataclass(frozen=True)
-class Polygon:
+class Polygon(CheckedShape):
     """A simple polygon.
 
     Parameters
@@ -89,14 +104,15 @@ class Polygon:
         if is_clockwise:
             raise GeometryError("Polygon: vertices run clockwise: list the vertices anticlockwise")
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return one loop of straight sides."""
         names = self.side_names or tuple(f"side-{k + 1}" for k in range(len(self.vertices)))
         return Outline((_polygon_loop(self.vertices, names),))
 
 
 @dataclass(frozen=True)
-class Disk:
+class Disk(CheckedShape):
     """A disk with the sides arc-1 ... arc-4, one for each quadrant, from angle 0 on.
 
     Parameters
@@ -114,13 +130,14 @@ class Disk:
         require_positive("Disk", radius=self.radius)
         object.__setattr__(self, "centre", as_point(self.centre, "Disk: centre"))
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return one loop of four arcs."""
         return Outline((_circle_loop(self.centre, self.radius, "arc"),))
 
 
 @dataclass(frozen=True)
-class Sector:
+class Sector(CheckedShape):
     """A sector of a disk, such as the quarter that symmetry leaves, with the sides arc, end and start.
 
     Parameters
@@ -147,7 +164,8 @@ class Sector:
                 "after the start"
             )
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return one loop of an arc and two radii."""
         arc = Arc(self.centre, self.radius, float(np.radians(self.start_angle)), float(np.radians(self.end_angle)))
         begin, end = ((float(x), float(y)) for x, y in arc.point(np.array([0.0, 1.0])))
@@ -156,7 +174,7 @@ class Sector:
 
 
 @dataclass(frozen=True)
-class Ring:
+class Ring(CheckedShape):
     """A ring with the sides outer-1 ... outer-4 and inner-1 ... inner-4, numbered by quadrant.
 
     Parameters
@@ -180,14 +198,15 @@ class Ring:
             )
         object.__setattr__(self, "centre", as_point(self.centre, "Ring: centre"))
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return the outer loop and the hole."""
         hole = _hole_loop(self.centre, self.inner_radius, "inner")
         return Outline((_circle_loop(self.centre, self.outer_radius, "outer"), hole))
 
 
 @dataclass(frozen=True)
-class PlateWithHole:
+class PlateWithHole(CheckedShape):
     """A rectangle with a round hole in the middle; sides bottom, right, top, left and hole-1 ... hole-4 by quadrant.
 
     Parameters
@@ -214,7 +233,8 @@ class PlateWithHole:
             )
         object.__setattr__(self, "corner", as_point(self.corner, "PlateWithHole: corner"))
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return the rectangle and the hole."""
         centre = (self.corner[0] + 0.5 * self.width, self.corner[1] + 0.5 * self.height)
         plate = Rectangle(self.width, self.height, self.corner).outline()
@@ -222,7 +242,7 @@ class PlateWithHole:
 
 
 @dataclass(frozen=True)
-class ExteriorOf:
+class ExteriorOf(CheckedShape):
     """The infinite plane outside of a shape, with the names of its sides.
 
     Parameters
@@ -243,14 +263,15 @@ class ExteriorOf:
                 "exterior: give a shape without holes"
             )
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return the loop of the shape, reversed."""
         (loop,) = self.shape.outline().loops
         return Outline((_reversed_loop(loop),), is_exterior=True)
 
 
 @dataclass(frozen=True)
-class HalfPlaneBody:
+class HalfPlaneBody(CheckedShape):
     """The elastic half-plane y < 0; its only side, surface, is the strip of y = 0 that may carry tractions.
 
     The rest of its surface is free. The shorter the strip, the more of the elements lie where something happens.
@@ -274,13 +295,14 @@ class HalfPlaneBody:
         if left >= right:
             raise GeometryError(f"HalfPlaneBody: left is {left}, not less than right, {right}: give the left end first")
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return the strip."""
         return _strip(self.left, self.right, Surface())
 
 
 @dataclass(frozen=True)
-class PeriodicHalfPlaneBody:
+class PeriodicHalfPlaneBody(CheckedShape):
     """The elastic half-plane y < 0 under what repeats with a period; its only side, surface, is one period of y = 0.
 
     Parameters
@@ -302,7 +324,8 @@ class PeriodicHalfPlaneBody:
         require_positive("PeriodicHalfPlaneBody", period=self.period)
         as_point((self.left, self.left + self.period), "PeriodicHalfPlaneBody: left and right end")
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return one period."""
         return _strip(self.left, self.left + self.period, Surface(is_periodic=True))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from bemkit.contact.obstacle import Obstacle, measure_contact
 from bemkit.formulas import ScalarField, evaluate_field
 from bemkit.geometry.curves import Curve, MovedCurve, ParametricCurve, Segment
 from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.shapes import Shape
+from bemkit.geometry.shapes import CheckedShape, Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
@@ -128,13 +129,14 @@ class TransformedLaw(RescaledLaw):
 
 
 @dataclass(frozen=True)
-class TransformedShape:
+class TransformedShape(CheckedShape):
     """A shape after an affine map."""
 
     shape: Shape
     affine: AffineMap
 
-    def outline(self) -> Outline:
+    @cached_property
+    def _outline(self) -> Outline:
         """Return the transformed boundary, its sides under their names."""
         outline = self.shape.outline()
         loops = tuple(

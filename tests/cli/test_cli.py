@@ -28,6 +28,7 @@ from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
+from tests.slow import slow_except
 
 SMALL = ["--elements", "40"]
 
@@ -352,7 +353,9 @@ def test_a_closed_pipe_is_no_error() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no device that is always full")
-@pytest.mark.parametrize("arguments", ["run paper-1 --elements 40 --json -", "run paper-1 --elements 40", "scenes"])
+@pytest.mark.parametrize(
+    "arguments", slow_except(["run paper-1 --elements 40 --json -", "run paper-1 --elements 40", "scenes"], "scenes")
+)
 def test_a_full_disk_behind_standard_output_is_one_line(arguments: str) -> None:
     code = "from bemkit.cli.main import main; main()"
     with open("/dev/full", "w", encoding="utf-8") as full:

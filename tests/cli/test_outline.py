@@ -30,7 +30,7 @@ def call(*arguments: str) -> Result:
     return CliRunner().invoke(commands, arguments, catch_exceptions=False)
 
 
-@pytest.mark.parametrize("name", slow_except(FILES, "version-4.msh", "part.dxf", "part.svg"))
+@pytest.mark.parametrize("name", slow_except(FILES, "version-4.msh"))
 def test_from_a_file_to_a_picture(name: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     put(tmp_path, name)

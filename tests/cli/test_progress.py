@@ -119,7 +119,7 @@ print([name for name in ("numpy", "scipy", "h5py", "cattrs", "matplotlib", "rich
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("sweep", "paper-1", "--vary", "law.friction_coefficient=0.3,0.4", "--elements", "24"),
+        ("sweep", "paper-1", "--vary", "law.friction_coefficient=0.3,0.4", "--elements", "24", "--jobs", "1"),
         pytest.param(("verify", "--quick", "cattaneo-mindlin"), marks=pytest.mark.slow),
         pytest.param(("stability", "--random", "1", "--jobs", "1"), marks=pytest.mark.slow),
         pytest.param(

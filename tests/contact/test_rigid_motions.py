@@ -6,6 +6,7 @@ from scipy import sparse
 
 from bemkit.contact.joined.member import diagonal_blocks
 from bemkit.contact.rigid_motions import null_space
+from tests.slow import slow_except
 
 
 def chain(n, held):
@@ -30,7 +31,7 @@ def test_groups_are_told_apart():
     assert (free @ free.T).toarray() == pytest.approx(np.eye(2), abs=1e-12)
 
 
-@pytest.mark.parametrize("n_free", [5, 40])
+@pytest.mark.parametrize("n_free", slow_except([5, 40], 40))
 def test_many_motions_may_be_free_at_once(n_free):
     random = np.random.default_rng(0)
     n = 450

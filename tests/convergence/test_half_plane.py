@@ -10,6 +10,7 @@ import pytest
 
 import bemkit as bk
 from bemkit import reference
+from tests.slow import slow_except
 
 MATERIAL = bk.Material(1.0, 0.3)
 MODULUS = MATERIAL.plane_modulus
@@ -74,7 +75,7 @@ INDENTERS: dict[str, tuple[str, bk.FarField, bk.FrictionLaw, reference.LineConta
 }
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("accuracy", slow_except([1e-2, 1e-3, 1e-4], 1e-2))
 @pytest.mark.parametrize("name", INDENTERS)
 def test_what_is_asked_of_the_pressures_is_what_they_have(name: str, accuracy: float) -> None:
     gap, far, law, exact = INDENTERS[name]

@@ -36,7 +36,7 @@ def energy_of_the_angle() -> float:
         # limited by the corners: 1.1 in the end, not yet reached
         pytest.param("linear", 1.0, (1.4, 2.2), 4e-4, marks=pytest.mark.slow),
         ("linear", 3.0, (2.7, 3.3), 3e-5),  # that of smooth solutions: 3
-        ("quadratic", 1.0, (1.0, 1.8), 6e-5),  # limited by the corners
+        pytest.param("quadratic", 1.0, (1.0, 1.8), 6e-5, marks=pytest.mark.slow),  # limited by the corners
     ],
 )
 def test_energy_of_a_clamped_angle(word: str, exponent: float, order: tuple[float, float], ceiling: float) -> None:
@@ -53,7 +53,10 @@ def test_energy_of_a_clamped_angle(word: str, exponent: float, order: tuple[floa
 @pytest.mark.parametrize(
     ("word", "accuracy", "energy_order", "traction_order"),
     # orders of smooth solutions: 3 and 5 in the energy, 1.5 and 2 in the tractions; these are seen on short sequences
-    [("linear", 8e-4, (2.5, 4.5), (1.4, 3.5)), ("quadratic", 1e-4, (3.0, 7.0), (1.7, 4.5))],
+    [
+        pytest.param("linear", 8e-4, (2.5, 4.5), (1.4, 3.5), marks=pytest.mark.slow),
+        ("quadratic", 1e-4, (3.0, 7.0), (1.7, 4.5)),
+    ],
 )
 def test_adapted_meshes_keep_the_orders_of_smooth_solutions(
     example: int, word: str, accuracy: float, energy_order: tuple[float, float], traction_order: tuple[float, float]

@@ -81,7 +81,7 @@ def test_rings_of_any_thickness_and_ratio(radius: float, discretisation: object)
             assert shaft_error(radius, nu, n, discretisation, symmetry=symmetry, law=law) < limit
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.5])
+@pytest.mark.parametrize("nu", slow_except([0.3, 0.5], 0.5))
 def test_collocation_bends_a_ring_of_a_tenth_of_its_radius(nu: float) -> None:
     load = bk.Part("load", bk.Traction(y=bk.Expression("-y")), sides=OUTER)
     energies = [ring(0.9, nu, 160, each, load).energy for each in (DISCRETISATIONS[0], DISCRETISATIONS[2])]
@@ -117,7 +117,7 @@ class TwoHoles:
         return Outline((*plate.loops, bk.Ring(0.3, 1.0, (1.1, 0.3)).outline().loops[1]))
 
 
-@pytest.mark.parametrize("nu", [0.3, 0.499995, 0.5])
+@pytest.mark.parametrize("nu", slow_except([0.3, 0.499995, 0.5], 0.499995))
 def test_collocation_of_two_holes_against_quadratic_elements(nu: float) -> None:
     parts = (
         bk.Part("floor", bk.Clamped(), sides=("bottom",)),

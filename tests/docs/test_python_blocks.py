@@ -12,13 +12,26 @@ from sybil import Sybil
 from sybil.parsers.markdown import PythonCodeBlockParser
 
 from tests.docs.pages import DOCS, OUTPUTS_SHOWN
+from tests.slow import slow_only
 
 ROOT = DOCS.parent
 PAGES = [ROOT / "README.md", *sorted(set(DOCS.rglob("*.md")) - {DOCS / page for page in OUTPUTS_SHOWN})]
 
 
+# what these show has quick tests of its own: in tests/pictures, tests/report, tests/studies, tests/runs, and beside
+SLOW = [
+    DOCS / name
+    for name in (
+        *("pictures.md", "reports.md", "error-against-run-time.md"),
+        *("tutorials/load-histories.md", "tutorials/a-matrix-free-body.md"),
+    )
+]
+
+
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if "```python" in page.read_text("utf-8")], ids=lambda page: page.stem
+    "page",
+    slow_only([page for page in PAGES if "```python" in page.read_text("utf-8")], *SLOW),
+    ids=lambda page: page.stem,
 )
 def test_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -12,6 +12,7 @@ import pytest
 
 from bemkit.cli.main import main
 from tests.docs.pages import OUTPUTS_SHOWN, blocks, read
+from tests.slow import slow_only
 
 
 def run_command(line: str) -> None:
@@ -38,7 +39,7 @@ def test_the_comparison_can_fail() -> None:
     assert not matches("a\nb\n", "a\nx\nb\n")
 
 
-@pytest.mark.parametrize(("page", "fewest"), OUTPUTS_SHOWN.items())
+@pytest.mark.parametrize(("page", "fewest"), slow_only(OUTPUTS_SHOWN.items(), ("paper-tables.md", 1)))
 def test_shown_output(
     page: str, fewest: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

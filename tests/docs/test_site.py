@@ -11,6 +11,7 @@ import pytest
 import bemkit
 from bemkit.scene.toml import shipped_files
 from tests.docs.pages import DOCS
+from tests.slow import slow_only
 
 
 @pytest.fixture
@@ -104,7 +105,9 @@ def test_the_gallery_shows_every_shipped_scene_and_every_file_of_its_folder(make
     assert len(names) >= 20
 
 
-@pytest.mark.parametrize("name", ["uniform-slip", "wedge-in-groove.toml", "friction-sweep.py"])
+@pytest.mark.parametrize(
+    "name", slow_only(["uniform-slip", "wedge-in-groove.toml", "friction-sweep.py"], "friction-sweep.py")
+)
 def test_a_page_of_the_gallery_has_text_picture_and_code(
     name: str, make_gallery: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

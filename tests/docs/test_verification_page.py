@@ -36,3 +36,14 @@ def test_what_each_case_holds_for_is_said(cases: Mapping[str, Case]) -> None:
     said = table(PAGE.partition("| case | problem |")[1] + PAGE.partition("| case | problem |")[2])
     assert [row[0] for row in said] == list(CASES)
     assert [row[2] for row in said] == [case.validity for case in cases.values()]
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_every_case_says_where_its_answer_comes_from(name: str, cases: Mapping[str, Case]) -> None:
+    case = cases[name]
+    assert f"`[{case.source}]`" in read("references.md")
+    assert 2 <= len(case.resolutions) <= 3
+    assert 1 <= case.n_quick <= 2
+    assert case.validity
+    coarse_to_fine = sorted(case.resolutions, reverse=case.resolutions[0] < 1.0)
+    assert list(case.resolutions) == coarse_to_fine

@@ -9,6 +9,9 @@ import pytest
 
 import bemkit as bk
 from bemkit.model.units import find_units
+from tests.slow import slow_except
+
+ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 
 
 def scene(
@@ -33,7 +36,7 @@ def scene(
     )
 
 
-@pytest.mark.parametrize("discretisation", [bk.LinearGalerkin(), bk.ConstantCollocation()])
+@pytest.mark.parametrize("discretisation", slow_except(ELEMENTS, ELEMENTS[1]))
 @pytest.mark.parametrize(
     ("length", "stress", "shift"),
     [

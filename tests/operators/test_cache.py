@@ -144,7 +144,7 @@ def test_flipped_bits_never_pass(tmp_path: Path) -> None:
     cache.save(path, operator)
     content = bytearray(path.read_bytes())
     refused = 0
-    positions = np.random.default_rng(2).integers(0, len(content), 150).tolist() + list(range(512, 1500, 31))
+    positions = np.random.default_rng(2).integers(0, len(content), 50).tolist() + list(range(512, 1500, 62))
     for position in positions:
         damaged = content.copy()
         damaged[position] ^= 0x10
@@ -156,7 +156,7 @@ def test_flipped_bits_never_pass(tmp_path: Path) -> None:
             refused += 1
         else:  # a byte of padding: the numbers are right
             np.testing.assert_array_equal(fresh.matrix(), operator.matrix())
-    assert refused > 100  # most of the file is numbers
+    assert refused > 33  # most of the file is numbers
 
 
 def test_an_array_of_another_shape_or_none_is_damage(tmp_path: Path) -> None:

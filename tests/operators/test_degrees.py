@@ -17,6 +17,7 @@ from bemkit.geometry.quadrature import gauss_lobatto
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.steklov_poincare.nodal_conditions import integrate_traction
 from bemkit.scene.toml import SceneError, load_scene, scene_from_toml, scene_to_toml, with_overrides
+from tests.slow import slow_except
 
 MATERIAL = bk.Material(1.0, 0.3)
 CENTRE = 0.3 + 0.2j
@@ -61,7 +62,7 @@ MESHES = squares()
 
 
 @pytest.mark.parametrize("name", MESHES)
-@pytest.mark.parametrize("degree", range(1, 13))
+@pytest.mark.parametrize("degree", slow_except(range(1, 13), 1, 2, 3, 8, 12))
 def test_polynomial_fields_are_exact(degree: int, name: str) -> None:
     mesh = MESHES[name]
     space, tractions = (
@@ -123,9 +124,9 @@ def ring_error(degree: int) -> float:
 
 
 def test_smooth_fields_converge_with_the_degree() -> None:
-    errors = [ring_error(degree) for degree in (1, 2, 3, 4, 5, 6, 8)]
+    errors = [ring_error(degree) for degree in (1, 2, 3, 4, 6)]
     assert all(finer < 0.5 * coarser for coarser, finer in itertools.pairwise(errors)), errors
-    assert errors[-1] < 1e-8
+    assert errors[-1] < 1e-6
 
 
 def geometric(singular: list[float], degree: int, ratio: float = 0.2) -> list[float]:

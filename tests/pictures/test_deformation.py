@@ -21,6 +21,7 @@ from bemkit.runs.run import run
 from bemkit.scene.far_field import FarField
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.scene.unit_names import UnitNames
+from tests.slow import slow_except
 
 STEEL = bk.Material(1.0, 0.3)
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -67,7 +68,7 @@ def solution(request: pytest.FixtureRequest) -> Solution:
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("draw", [draw_deformation, draw_zoom])
+@pytest.mark.parametrize("draw", slow_except([draw_deformation, draw_zoom], draw_zoom))
 def test_no_contact_node_is_drawn_beyond_its_obstacle_nor_apart_from_it(name: str, draw: object) -> None:
     """Measured on what is drawn, against the obstacle's own distance: not by more than a line is thick."""
     solution = run(SCENES[name])

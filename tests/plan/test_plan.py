@@ -20,6 +20,7 @@ from bemkit.scene.conditions import Clamped, Condition, Contact, Part, Prescribe
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
+from tests.slow import slow_only
 
 
 def plan_of(scene: Scene) -> Plan:
@@ -151,7 +152,9 @@ TRACED = {
 }
 
 
-@pytest.mark.parametrize("kind", TRACED)
+@pytest.mark.parametrize(
+    "kind", slow_only(TRACED, "constant", "linear", "frictionless", "degree 3", "degree 9", "curved of degree 6")
+)
 def test_the_largest_memory_is_foreseen(kind: str) -> None:
     """Within a fifth: a model of what is alive at once knows no temporary array of a line of code.
 

@@ -12,6 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.reference import MEASURES, Reference, Zone, answer_of, errors_of, find_reference, over_resolved
 from bemkit.reference.compare import OverResolutionError
+from tests.slow import slow_only
 
 WITH_REFERENCE = ("paper-1", "paper-2", "wavy-obstacle", "disc-between-plates", "uniform-slip", "gravity-column")
 
@@ -54,7 +55,7 @@ def test_missing_and_meaningless_errors() -> None:
     assert math.isnan(errors["force_tangential"])
 
 
-@pytest.mark.parametrize("name", WITH_REFERENCE)
+@pytest.mark.parametrize("name", slow_only(WITH_REFERENCE, "paper-2", "disc-between-plates", "wavy-obstacle"))
 def test_computed_solutions_approach_the_references(name: str) -> None:
     scene = bk.load_scene(name)
     reference = known(name)

@@ -69,6 +69,7 @@ def test_other_values_show_their_repr() -> None:
     assert notebook_html(3) == "<pre>3</pre>"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     find_spec("nbclient") is None or find_spec("ipykernel") is None, reason="nbclient and ipykernel are not installed"
 )

@@ -134,11 +134,11 @@ def test_histories_and_several_bodies_have_reports(monkeypatch: pytest.MonkeyPat
     scene = dataclasses.replace(with_overrides(bk.load_scene("paper-1"), elements=24), load_factors=(0.5, 1.0))
     texts = " ".join(Page(report(bk.run(scene))).texts)
     assert "Status over the time of a load history" in texts
-    arch = bk.run(bk.load_scene("masonry-arch"))
+    cylinders = bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=40))
     monkeypatch.setattr("bemkit.report.page.has_pictures", lambda: False)
-    page = Page(report(arch))
+    page = Page(report(cylinders))
     assert "Pictures need matplotlib" in " ".join(page.texts)
-    assert "21" in page.texts
+    assert any("lower" in text for text in page.texts)
 
 
 def test_the_command_writes_it(

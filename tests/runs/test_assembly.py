@@ -12,6 +12,7 @@ from bemkit.errors import InputError
 from bemkit.model.assembled.contacts import OverlapError
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
+from tests.slow import slow_except
 
 STEEL = bk.Material(1.0, 0.3)
 SHEAR = 0.2
@@ -96,7 +97,7 @@ def test_a_body_that_touches_nothing_is_solved_beside_the_others() -> None:
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
-@pytest.mark.parametrize("turn", [0.0, 33.0])
+@pytest.mark.parametrize("turn", slow_except([0.0, 33.0], 33.0))
 def test_uniform_pressure_and_shear_pass_a_joint_of_meshes_that_do_not_match(degree: int, turn: float) -> None:
     """Also an inclined one, whose upper body is a turned copy of its own mesh."""
     solution = bk.run(patch(degree, turn=turn))
@@ -252,7 +253,7 @@ def test_an_incompressible_body_wholly_in_contact_is_named_and_a_nearly_incompre
     assert bk.run(plugged(0.4999)).is_converged
 
 
-@pytest.mark.parametrize("play", [0.0, -1e-3])
+@pytest.mark.parametrize("play", slow_except([0.0, -1e-3], -1e-3))
 def test_what_nothing_feels_turns_where_it_slips_least(play: float) -> None:
     """A pin without friction in the hole of a plate that is pulled: its turn does not depend on how it was drawn."""
     turns = []

@@ -14,7 +14,7 @@ from bemkit.results.load_history import LoadHistory
 from bemkit.runs import checkpoint, load_path
 from bemkit.solvers.base import Status
 from tests.runs.test_rigid_bodies import driven
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 LOOP = replace(bk.load_scene("friction-loop"), mesh=bk.MeshOptions(elements=24))
 LOOP = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=8)))
@@ -123,7 +123,7 @@ def test_a_killed_run_with_an_accuracy_goes_on_on_its_mesh(
             np.testing.assert_array_equal(other.contact.columns()[name], column)
 
 
-@pytest.mark.parametrize("scene", [LOOP, PUNCH], ids=["one body", "punch"])
+@pytest.mark.parametrize("scene", slow_except((LOOP, PUNCH), PUNCH), ids=["one body", "punch"])
 def test_files_hold_all_fields_of_all_steps(scene: bk.Scene | bk.Assembly, tmp_path: Path) -> None:
     whole = bk.run_to_file(scene, tmp_path / "a.h5")
     read = bk.read_result(tmp_path / "a.h5")
@@ -172,7 +172,7 @@ def test_a_failed_step_leaves_the_finished_ones_in_the_file(
 
 
 @pytest.mark.parametrize("scene", [LOOP, PUNCH], ids=["one body", "punch"])
-@pytest.mark.parametrize("ending", ["h5", "hdf5", "json", "csv", "npz", "vtu"])
+@pytest.mark.parametrize("ending", slow_only(["h5", "hdf5", "json", "csv", "npz", "vtu"], "hdf5"))
 def test_histories_are_written_in_every_format(scene: bk.Scene | bk.Assembly, ending: str, tmp_path: Path) -> None:
     if ending == "vtu":
         pytest.importorskip("meshio")

@@ -12,7 +12,7 @@ import bemkit as bk
 from bemkit.geometry.spaces import LinearSpace, QuadraticSpace
 from bemkit.results.error_indicators import element_errors, largest_but_a_share
 from tests.scenes import angle, disc, paper, true_error, wavy
-from tests.slow import slow_except
+from tests.slow import slow_except, slow_only
 
 PROBLEMS: dict[str, Callable[[], bk.Scene]] = {
     "paper-1": lambda: paper(1),
@@ -24,7 +24,7 @@ PROBLEMS: dict[str, Callable[[], bk.Scene]] = {
 ELEMENTS = {"linear": bk.LinearGalerkin(), "quadratic": bk.QuadraticGalerkin()}
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize("problem", slow_only(PROBLEMS, "paper-2"))
 @pytest.mark.parametrize("word", ELEMENTS)
 @pytest.mark.parametrize("exponent", slow_except((1.0, 2.0), 2.0))
 def test_effectivity(problem: str, word: str, exponent: float) -> None:
@@ -36,7 +36,7 @@ def test_effectivity(problem: str, word: str, exponent: float) -> None:
     assert 0.3 <= effectivity <= 5.0
 
 
-@pytest.mark.parametrize("word", ELEMENTS)
+@pytest.mark.parametrize("word", slow_except(ELEMENTS, "quadratic"))
 def test_effectivity_of_adapted_meshes(word: str) -> None:
     scene = paper(1, ELEMENTS[word], bk.MeshOptions(accuracy=4e-3))
     solution = bk.run(scene)

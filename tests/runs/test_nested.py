@@ -30,11 +30,11 @@ def example(number: int, discretisation: str, elements: int) -> bk.Scene:
 @pytest.mark.parametrize("number", slow_except((1, 2), 1))
 @pytest.mark.parametrize("discretisation", slow_except(DISCRETISATIONS, "constant"))
 def test_the_finest_mesh_costs_two_solves(number: int, discretisation: str) -> None:
-    scene = example(number, discretisation, 640)
+    scene = example(number, discretisation, 320)
     levels = run_cascade(scene)
-    assert [level.mesh.n_elements for level in levels] == [40, 80, 160, 320, 640]
+    assert [level.mesh.n_elements for level in levels] == [40, 80, 160, 320]
     assert all(level.is_converged for level in levels)
-    assert all(level.linear_solves <= 2 for level in levels[3:])
+    assert levels[-1].linear_solves <= 2
     cold = bk.run(scene)
     assert cold.linear_solves >= 5
     np.testing.assert_array_equal(levels[-1].contact.status, cold.contact.status)

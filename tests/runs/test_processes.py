@@ -8,11 +8,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from bemkit.cli.main import main
+from tests.slow import slow_except
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes in /proc")
 ENVIRONMENT = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -63,9 +65,13 @@ def test_the_second_of_two_runs_into_one_file_is_refused_before_it_computes(
     assert os.listdir() == ["r.h5"]
 
 
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
-@pytest.mark.parametrize("is_at_work", [False, True], ids=["starting", "at work"])
-def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Signals, *, is_at_work: bool) -> None:
+@pytest.mark.parametrize(
+    ("end", "is_at_work"),
+    slow_except(
+        product((signal.SIGKILL, signal.SIGTERM), (False, True)), (signal.SIGKILL, True), (signal.SIGTERM, False)
+    ),
+)
+def test_workers_end_with_a_study_that_is_killed(tmp_path: Path, end: signal.Signals, is_at_work: bool) -> None:
     """Workers look for work in a queue of which they hold both ends: they would wait for more for ever."""
     sizes = ("--elements", "40,60,1600,1800" if is_at_work else "1600,1800", "--meshes", "uniform")
     choice = ("--solver", "semismooth-newton", "--discretisation", "linear", "--jobs", "2")

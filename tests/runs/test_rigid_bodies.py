@@ -19,6 +19,7 @@ from bemkit.results.tables import to_json
 from bemkit.runs.assembly_adaptive import run_assembly_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.solvers.base import solve
+from tests.slow import slow_except
 
 STEEL = bk.Material(1.0, 0.3)
 FORCE = 0.01
@@ -180,7 +181,7 @@ def test_a_disc_that_contact_alone_holds_rests_between_two_blocks() -> None:
 
 
 @pytest.mark.parametrize("law", [bk.Frictionless(), SOME])
-@pytest.mark.parametrize("turn", [0.0, 30.0])
+@pytest.mark.parametrize("turn", slow_except([0.0, 30.0], 30.0))
 def test_a_rigid_body_that_does_not_move_is_an_obstacle(law: bk.FrictionLaw, turn: float) -> None:
     """Also for a turned copy, whose own mesh is another."""
     placement = bk.Placement(turn=turn)

@@ -15,6 +15,7 @@ from bemkit.geometry.meshing.partition import STEEPEST
 from bemkit.reference import DiscBetweenPlates
 from bemkit.runs.adaptive import _expected_seconds, run_adaptive
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
+from tests.slow import slow_except
 
 
 @lru_cache
@@ -30,7 +31,7 @@ def adapted(example: int, word: str, accuracy: float) -> tuple[bk.Solution, ...]
         # about twice what was measured, and the targets of the project where those are nearer
         # the next to last mesh ends an element 4e-4 beside the transition, whose own elements are longer for it
         ("quadratic", 1e-3, 1e-3, 4e-3, 2e-5, 1e-5, 6e-5),
-        ("quadratic", 1e-4, 1e-4, 2e-4, 1e-5, 1e-5, 1.5e-5),
+        pytest.param("quadratic", 1e-4, 1e-4, 2e-4, 1e-5, 1e-5, 1.5e-5, marks=pytest.mark.slow),
         pytest.param("quadratic", 3e-5, 3e-5, 1.2e-4, 2e-6, 1e-5, 1.5e-5, marks=pytest.mark.slow),
         ("linear", 4e-3, 1e-3, 4e-3, 5e-4, 1e-3, 3e-4),
     ],
@@ -83,6 +84,7 @@ def test_the_wavy_obstacle_has_its_closed_form() -> None:
     assert -solution.contact.sigma_n[0] == pytest.approx(0.048824, rel=1e-4)  # the digits printed
 
 
+@pytest.mark.slow
 def test_the_disc_between_plates_has_its_spectral_solution() -> None:
     solution = run_adaptive(dataclasses.replace(disc(), mesh=bk.MeshOptions(accuracy=1e-4)))[-1]
     exact = DiscBetweenPlates(1.0, 0.0160341, solution.scene.material)
@@ -124,7 +126,7 @@ def test_an_accuracy_out_of_reach_ends_at_the_budget(budget: dict[str, float], r
     assert f"estimated error {best.estimated_error:.1e}" in best.message
 
 
-@pytest.mark.parametrize("size", [1e-9, 1e9])
+@pytest.mark.parametrize("size", slow_except([1e-9, 1e9], 1e9))
 def test_meshes_do_not_depend_on_units(size: float) -> None:
     scene = paper(2, mesh=bk.MeshOptions(accuracy=3e-3))
     loads = {"top-load": bk.Traction(y=bk.Expression("-(x/L)**2 * (1 - x/L)**2".replace("L", repr(size))))}

@@ -136,7 +136,7 @@ def scenes(draw: st.DrawFn) -> Scene:
     )
 
 
-@settings(max_examples=30)
+@settings(max_examples=settings.default.max_examples // 3)
 @given(scenes())
 def test_a_scene_survives_the_way_to_toml_and_back(scene: Scene) -> None:
     text = scene_to_toml(scene)

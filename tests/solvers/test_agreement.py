@@ -14,6 +14,7 @@ from bemkit.solvers.homotopy import AffineBound, follow_path
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.testing.lemke import LemkePivoting
 from tests.handmade import assert_solves, block_problem, random_problem
+from tests.slow import slow_except
 
 DRIVERS = {
     "newton": SemismoothNewton(),
@@ -45,7 +46,7 @@ def check_random_problem(seed):
     assert_same(problem, path.state, referee.state)
 
 
-@settings(max_examples=25)
+@settings(max_examples=settings.default.max_examples // 3)
 @given(st.integers(0, 10**9))
 def test_drivers_agree_on_random_problems(seed):
     check_random_problem(seed)
@@ -62,7 +63,7 @@ RISING = np.linspace(0.0, 0.6, 12)
 
 
 @pytest.mark.parametrize("law", [Frictionless(), Tresca(0.1), Tresca(RISING), Coulomb(0.5), Coulomb(RISING)], ids=repr)
-@pytest.mark.parametrize("press", [1.0, 0.1])
+@pytest.mark.parametrize("press", slow_except([1.0, 0.1], 0.1))
 def test_drivers_agree_on_a_floating_block(law, press):
     problem = block_problem(law, press=press)
     referee = solve(problem, LemkePivoting())

@@ -16,6 +16,7 @@ from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.equilibrium import NOISE_FACTOR, Unbalanced
 from bemkit.studies.stability.independent_check import check_solution
+from tests.slow import slow_except
 
 DRIVERS = [bk.SemismoothNewton(), bk.AugmentedLagrangian(), bk.FixedPoint(), bk.LemkePivoting()]
 TILT = 0.6
@@ -72,7 +73,7 @@ def assert_right_or_unsolved(scene: bk.Scene, distance: float, push: float) -> b
 
 
 @DRIVEN
-@pytest.mark.parametrize("push", [1e-10, 1e-5])
+@pytest.mark.parametrize("push", slow_except([1e-10, 1e-5], 1e-10))
 def test_the_wall_carries_the_push_however_small(driver: bk.ContactSolver, push: float) -> None:
     """Beside what a disc clamped at the wall would exert on it, pushes are nothing; they are all there is."""
     is_solved = assert_right_or_unsolved(carried_disc(0.3, push, law=Coulomb(0.2), solver=driver), 0.3, push)

@@ -30,6 +30,7 @@ from bemkit.operators.boundary import (
 from bemkit.operators.forms import SingleLayerForm
 from bemkit.operators.material import Material, Plane
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
+from tests.slow import slow_only
 from tests.testing.test_spaces import public_classes
 
 MATERIALS = [Material(2.0, 0.3), Material(2.0, 0.5), Material(2.0, 0.2, Plane.STRESS)]
@@ -57,7 +58,7 @@ def operators_on(mesh: BoundaryMesh, material: Material) -> list[BoundaryOperato
 
 
 @pytest.mark.parametrize("material", MATERIALS, ids=str)
-@pytest.mark.parametrize("mesh", [MESH, OUTSIDE, ARCS], ids=["inside", "outside", "arcs"])
+@pytest.mark.parametrize("mesh", slow_only([MESH, OUTSIDE, ARCS], ARCS), ids=["inside", "outside", "arcs"])
 def test_operators_conform(mesh: BoundaryMesh, material: Material) -> None:
     for operator in operators_on(mesh, material):
         check_operator(operator)

@@ -26,8 +26,17 @@ EVERY_OTHER = np.arange(20) % 2 == 0
 FORMS = pytest.mark.parametrize("is_dense", [True, False])
 
 
-@FORMS
-@pytest.mark.parametrize("options", [{}, {"is_frictionless": EVERY_OTHER}, {"is_frictionless": True, "lift": 0.0}])
+@pytest.mark.parametrize(
+    ("options", "is_dense"),
+    [
+        ({}, True),
+        ({"is_frictionless": EVERY_OTHER}, False),
+        ({"is_frictionless": True, "lift": 0.0}, True),
+        pytest.param({}, False, marks=pytest.mark.slow),
+        pytest.param({"is_frictionless": EVERY_OTHER}, True, marks=pytest.mark.slow),
+        pytest.param({"is_frictionless": True, "lift": 0.0}, False, marks=pytest.mark.slow),
+    ],
+)
 def test_floating_blocks_keep_the_promises_of_a_body(options, is_dense):
     body = row_of_blocks((1.0, 3.0, 0.5), is_dense=is_dense, **options)
     assert body.is_costly is not is_dense

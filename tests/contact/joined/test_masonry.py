@@ -1,6 +1,7 @@
 """Walls and arches of blocks: what stands, what falls, and which blocks move."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.contact.joined.blocks import arch, joined, rectangle, wall
+from tests.slow import slow_except
 
 # t/R of semicircular arches of N equal voussoirs at collapse by five hinges, block by block in limit analysis
 THICKNESS = {15: 0.106265824, 25: 0.107030497}
@@ -21,8 +23,7 @@ def on_foundation(body, friction_coefficient=0.6):
     return ContactProblem(body, np.zeros(body.n_contact), Coulomb(friction_coefficient))
 
 
-@pytest.mark.parametrize("is_dense", [True, False])
-@pytest.mark.parametrize("n", [15, 25])
+@pytest.mark.parametrize(("n", "is_dense"), slow_except(product((15, 25), (True, False)), (15, True), (15, False)))
 def test_an_arch_stands_and_falls_at_the_thickness_of_limit_analysis(n, is_dense):
     stands = solve(on_foundation(arch(n, 1.02 * THICKNESS[n], is_dense=is_dense), 0.7), SemismoothNewton())
     assert stands.is_converged
@@ -40,7 +41,7 @@ def test_a_wall_carries_its_weight(is_dense):
     assert found.certificate.worst <= 1e-11
 
 
-@pytest.mark.parametrize("is_dense", [True, False])
+@pytest.mark.parametrize("is_dense", slow_except((True, False), False))
 def test_a_push_beyond_what_friction_holds_moves_the_uppermost_course(is_dense):
     """Friction 0.6 under a course of weight 10 holds 6, on a side of unit height."""
     below, above = (wall(4, 5, 4, gravity=(0.0, -1e-3), push=6e-3 * share, is_dense=is_dense) for share in (0.98, 1.02))
@@ -51,7 +52,7 @@ def test_a_push_beyond_what_friction_holds_moves_the_uppermost_course(is_dense):
 
 
 @pytest.mark.parametrize("is_dense", [True, False])
-@pytest.mark.parametrize("bound", [1e-4, 3e-4])
+@pytest.mark.parametrize("bound", slow_except((1e-4, 3e-4), 1e-4))
 def test_friction_of_all_nodes_counts_where_it_needs_no_pressure(bound, is_dense):
     """A course of length 4 under friction of a given size, pushed on its side of unit height."""
 

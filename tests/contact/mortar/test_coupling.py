@@ -95,7 +95,7 @@ def test_straight_sides_that_cover_each_other(degree: tuple[int, int], n: tuple[
 
 
 @given(st.tuples(degrees, degrees), st.tuples(counts, counts), st.floats(0.2, 1.2))
-@settings(max_examples=30)
+@settings(max_examples=settings.default.max_examples // 3)
 def test_arcs_that_cover_each_other(degree: tuple[int, int], n: tuple[int, int], half_angle: float) -> None:
     one, two = cradle(degree, n, half_angle)
     coupling = couple(one, two)
@@ -159,7 +159,7 @@ def test_means_of_polynomials_are_their_values_at_the_nodes(degree: int) -> None
 
 
 @given(st.tuples(degrees, degrees), st.floats(-0.5, 0.5), st.floats(-9.0, 9.0), st.floats(-3.0, 3.0))
-@settings(max_examples=40)
+@settings(max_examples=settings.default.max_examples // 3)
 def test_units_and_place_do_not_matter(degree: tuple[int, int], shift: float, exponent: float, far: float) -> None:
     first = couple(*stacked(degree, (4, 7), shift=shift, lift=0.125))
     factor = 10.0**exponent

@@ -12,6 +12,7 @@ from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, extents, n_proxies
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
+from tests.slow import slow_except
 
 L_SHAPE = Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0)))
 
@@ -23,7 +24,7 @@ def compressed(mesh: BoundaryMesh, tolerance: float, *, slopes: bool = True) -> 
 
 
 @pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-11])
+@pytest.mark.parametrize("tolerance", slow_except([1e-6, 1e-11], 1e-11))
 @pytest.mark.parametrize("shape", [Rectangle(1.0, 1.0), Rectangle(20.0, 0.1), L_SHAPE], ids=["square", "strip", "L"])
 def test_blocks_between_leaves_follow_from_their_skeletons(
     shape: Rectangle | Polygon, tolerance: float, slopes: bool
@@ -62,6 +63,7 @@ def test_columns_of_one_kind_are_compressed_alone(monkeypatch: pytest.MonkeyPatc
         assert np.abs(error).max() <= 1e-8 * np.abs(exact).max()
 
 
+@pytest.mark.slow
 def test_skeletons_stay_small_on_thin_bodies() -> None:
     for height in (1.0, 1e-3):
         compression = compressed(discretise(Rectangle(10.0, height).outline(), n_elements=1200).unit, 1e-8)
@@ -69,6 +71,7 @@ def test_skeletons_stay_small_on_thin_bodies() -> None:
         assert compression.largest_rank < 200
 
 
+@pytest.mark.slow
 def test_memory_grows_like_the_number_of_elements() -> None:
     small, large = (
         compressed(discretise(Rectangle(1.0, 1.0).outline(), n_elements=n).unit, 1e-6).n_bytes for n in (300, 1200)

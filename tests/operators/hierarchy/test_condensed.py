@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -16,11 +17,12 @@ from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation, InexactEquationsError
 from tests.scenes import paper
+from tests.slow import slow_except, slow_only
 
 TOLERANCE = 1e-11
 
 
-def prepared(scene: bk.Scene, n_elements: int = 300, *, slopes: bool = True) -> Prepared:
+def prepared(scene: bk.Scene, n_elements: int = 240, *, slopes: bool = True) -> Prepared:
     mesh = bk.MeshOptions(elements=n_elements)
     scene = replace(scene, discretisation=bk.ConstantCollocation(slopes=slopes), mesh=mesh)
     return prepare(scene, scene.build_mesh())
@@ -41,7 +43,7 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", slow_only(SCENES, "floating plate with a round hole"))
 def test_the_condensed_map_is_that_of_dense_equations(name: str) -> None:
     scene, slopes = SCENES[name]
     given = prepared(scene, slopes=slopes)
@@ -80,12 +82,15 @@ def test_a_rigid_motion_far_away_takes_no_force() -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "slopes"),
-    [(loose(bk.Rectangle(2.0, 1.0)), False), (loose(bk.Rectangle(1.0, 0.003)), True)],
+    ("scene", "slopes", "n_elements"),
+    [
+        (loose(bk.Rectangle(2.0, 1.0)), False, 200),
+        pytest.param(loose(bk.Rectangle(1.0, 0.003)), True, 400, marks=pytest.mark.slow),
+    ],
     ids=["without slopes", "thin"],
 )
-def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slopes: bool) -> None:
-    given = prepared(replace(scene, linear_solver=Hierarchical(TOLERANCE)), 400, slopes=slopes)
+def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slopes: bool, n_elements: int) -> None:
+    given = prepared(replace(scene, linear_solver=Hierarchical(TOLERANCE)), n_elements, slopes=slopes)
     assert isinstance(build_model(given).body, CondensedBody)
     compressed = bk.run(given.scene)
     dense = bk.run(replace(given.scene, linear_solver=DenseCholesky()))
@@ -95,11 +100,13 @@ def test_where_the_stiffness_may_be_negative_it_is_examined(scene: bk.Scene, slo
     np.testing.assert_allclose(compressed.boundary.traction, dense.boundary.traction, atol=1e-8 * stress)
 
 
-@pytest.mark.parametrize("name", ["two-cylinders", pytest.param("pin-in-plate", marks=pytest.mark.slow)])
-def test_several_bodies_are_those_of_dense_equations(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "elements"), slow_except(product(("two-cylinders", "pin-in-plate"), (240, 600)), ("two-cylinders", 240))
+)
+def test_several_bodies_are_those_of_dense_equations(name: str, elements: int) -> None:
     assembly = bk.load_scene(name)
     assert isinstance(assembly, bk.Assembly)
-    mesh = replace(assembly.mesh, elements=600, accuracy=None)
+    mesh = replace(assembly.mesh, elements=elements, accuracy=None)
     assembly = replace(assembly, discretisation=bk.ConstantCollocation(), mesh=mesh)
     compressed, dense = (
         bk.run(replace(assembly, linear_solver=solver)) for solver in (Hierarchical(TOLERANCE), DenseCholesky())

@@ -14,6 +14,7 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import MixedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from tests.slow import slow_except
 
 MATERIAL = Material(2.0, 0.3)
 OCTAGON = Polygon(tuple((np.cos(a), np.sin(a)) for a in np.pi * (0.25 * np.arange(8) + 0.1)))
@@ -79,10 +80,10 @@ NOWHERE = np.zeros(0, np.intp)
 NOTHING = NodeConditions(np.zeros((0, 2, 2)), np.zeros((0, 2, 2)), np.zeros((0, 2)))
 
 
-@pytest.mark.parametrize("slopes", [True, False], ids=["slopes", "constant"])
+@pytest.mark.parametrize("slopes", slow_except([True, False], True), ids=["slopes", "constant"])
 @pytest.mark.parametrize("name", SHAPES)
 def test_answers_are_those_of_dense_equations(name: str, slopes: bool) -> None:
-    mesh = mesh_of(name, 220)
+    mesh = mesh_of(name, 160)
     conditions, force, kept = conditions_of(mesh, 3)
     dense = MixedSystem(mesh, MATERIAL, conditions, "body", force, slopes=slopes).condensed()
     displacement, all_force = dense.recover(kept)
@@ -176,7 +177,7 @@ def test_a_leaf_that_becomes_singular_is_named() -> None:
 
 
 def test_an_interrupted_factorisation_loses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh = mesh_of("rectangle", 400)
+    mesh = mesh_of("rectangle", 200)
     conditions, force, kept = conditions_of(mesh, 3)
     system, fresh = (system_of(mesh, conditions.frame, True, 1e-9) for _ in range(2))
     laws, other = (laws_of(system, mesh, conditions, force, factor * kept) for factor in (1.0, 2.0))

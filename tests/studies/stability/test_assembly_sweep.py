@@ -43,7 +43,7 @@ def test_every_axis_is_tested_here():
         find_axes(["gap"], ASSEMBLY_AXES)
 
 
-@pytest.mark.parametrize("name", slow_except(EXTREMES, "turn", "position", "elements"))
+@pytest.mark.parametrize("name", slow_except(EXTREMES, "turn", "elements"))
 def test_the_ends_of_every_axis_are_right_or_named(pin, name):
     (axis,) = find_axes([name], ASSEMBLY_AXES)
     for row in sweep(pin, [dataclasses.replace(axis, values=EXTREMES[name])]):
@@ -54,7 +54,7 @@ def test_the_ends_of_every_axis_are_right_or_named(pin, name):
             assert row.drift < 1e-10  # 1e-12 found: round-off of coordinates
 
 
-@pytest.mark.parametrize("name", SIMILAR)
+@pytest.mark.parametrize("name", slow_except(SIMILAR, "turn"))
 def test_parts_chosen_by_a_region_follow_the_body(name):
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     assert isinstance(cylinders, Assembly)
@@ -68,8 +68,8 @@ def test_parts_chosen_by_a_region_follow_the_body(name):
 def test_curved_bodies_far_away_are_what_they_are_at_home():
     cylinders = with_overrides(load_scene("two-cylinders"), elements=40)
     (axis,) = find_axes(["position"], ASSEMBLY_AXES)
-    rows = list(sweep(cylinders, [dataclasses.replace(axis, values=(1.0, 1e6, 1e8))]))
-    assert [row.verdict for row in rows] == ["right", "right", "named"]
+    rows = list(sweep(cylinders, [dataclasses.replace(axis, values=(1e6, 1e8))]))
+    assert [row.verdict for row in rows] == ["right", "named"]
     assert "body 'upper' lies" in rows[-1].message
     upper, *others = cylinders.bodies
     drawn_afar = dataclasses.replace(upper.shape, centre=(1e9, 0.0))
@@ -92,7 +92,7 @@ def sheared():
         shape=bk.Rectangle(2.0, 1.0),
         material=bk.Material(1.0, 0.3),
         parts=(bk.Part("base", bk.Clamped(), ("bottom",)),),
-        mesh=bk.MeshOptions(elements=120),
+        mesh=bk.MeshOptions(elements=60),
     )
     disc = bk.RigidBody(
         name="disc", obstacle=bk.Circle((1.0, 2.0), 1.0), centre=(1.0, 2.0), force_x=0.0, force_y=-0.01, turn=0.0

@@ -19,6 +19,7 @@ from bemkit.hdf5 import MARK, ResultFileError, seal
 from bemkit.results.result_file import read_result, write_result
 from bemkit.studies.stability.records import FILE, StabilityRecord
 from tests.scenes import small_paper_scene
+from tests.slow import slow_except
 
 LABELS = {"scene": "title = 'x'\n"}
 ROW = StabilityRecord("friction", 0.1, "right", "converged", 4, 1e-16, 1e-16, 1e-3, 1e2, 0.0, 1e-12, 0.1, "")
@@ -36,7 +37,7 @@ SWEEPS = """
 import sys
 from bemkit.cli.main import main
 axes = [word for axis in sys.argv[2:] for word in ("--axis", axis)]
-main(["stability", "paper-1", "--elements", "32", *axes, "-q", "-o", sys.argv[1]])
+main(["stability", "paper-1", "--elements", "16", *axes, "-q", "-o", sys.argv[1]])
 """
 
 
@@ -67,7 +68,7 @@ def kill_while_writing(path: Path, delays: list[float]) -> None:
 
 
 def test_a_process_killed_while_writing_leaves_a_whole_result(result: Path) -> None:
-    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(4)])
+    kill_while_writing(result, [random.Random(k).uniform(0.0, 0.1) for k in range(2)])
 
 
 @pytest.mark.slow
@@ -96,7 +97,7 @@ except OutputFileError as error:
 """
 
 
-@pytest.mark.parametrize("n_bytes", [0, 512, 4096, 20_000])
+@pytest.mark.parametrize("n_bytes", slow_except([0, 512, 4096, 20_000], 4096))
 def test_a_full_disk_leaves_the_old_result_and_one_clear_line(result: Path, n_bytes: int) -> None:
     # in a process of its own: the HDF5 library may not recover inside the one that saw the failure
     assert result.stat().st_size > 20_000
@@ -187,7 +188,7 @@ def test_a_killed_sweep_keeps_its_rows_and_goes_on_where_it_stopped(
             with contextlib.suppress(ResultFileError):
                 if len(FILE.read(path)[1]) > n_before:
                     break
-            time.sleep(0.01)
+            time.sleep(0.05)
         process.send_signal(signal.SIGKILL)
         process.wait()
         rows = FILE.read(path)[1]

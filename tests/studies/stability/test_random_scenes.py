@@ -37,10 +37,10 @@ def random_trials(seed: int, count: int, processes: int = 1) -> list[Trial]:
 
 
 def test_random_scenes_end_in_the_right_answer_or_a_named_failure() -> None:
-    trials = random_trials(1, 25)
+    trials = random_trials(1, 8)
     assert_honest(trials)
     counts = Counter(trial.outcome for trial in trials)
-    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 10  # a generator of scenes without answers tests nothing
+    assert counts[Outcome.SUCCESS] + counts[Outcome.WARNED] >= 3  # a generator of scenes without answers tests nothing
 
 
 def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
@@ -53,8 +53,8 @@ def half_planes_among(seed: int, count: int) -> list[RandomCase[bk.Scene]]:
 
 
 def test_random_half_planes_end_in_the_right_answer_or_a_named_failure() -> None:
-    cases = half_planes_among(4, 150)
-    assert len(cases) >= 10  # 12 per cent
+    cases = half_planes_among(4, 60)
+    assert len(cases) >= 4  # 12 per cent
     assert {type(case.scenes[0].shape).__name__ for case in cases} == {"HalfPlaneBody", "PeriodicHalfPlaneBody"}
     for case in cases:
         assert tuple(scene_from_toml(text) for text in case.files().values()) == case.scenes

@@ -19,7 +19,7 @@ from bemkit.studies.stability.independent_check import check_solution
 from bemkit.studies.stability.records import StabilityRecord, Verdict
 from bemkit.studies.stability.sweep import StabilityError, difference, solve_and_judge, sweep
 from tests.scenes import CONSTANT, LINEAR, small_paper_scene
-from tests.slow import slow_only
+from tests.slow import slow_except, slow_only
 
 EXTREMES = {
     "youngs-modulus": (1e-12, 1e15),
@@ -52,7 +52,11 @@ def test_every_axis_is_tested_here() -> None:
 
 
 @pytest.mark.parametrize("name", slow_only(EXTREMES, "grading"))
-@pytest.mark.parametrize(("number", "discretisation"), [(1, CONSTANT), (2, LINEAR)], ids=["paper-1", "paper-2"])
+@pytest.mark.parametrize(
+    ("number", "discretisation"),
+    slow_except([(1, CONSTANT), (2, LINEAR)], (1, CONSTANT)),
+    ids=["paper-1", "paper-2"],
+)
 def test_the_ends_of_every_axis_are_right_or_named(
     name: str, number: int, discretisation: bk.LinearGalerkin | bk.ConstantCollocation
 ) -> None:
@@ -69,14 +73,14 @@ def test_the_ends_of_every_axis_are_right_or_named(
             assert row.message
 
 
-@pytest.mark.parametrize("elements", [64, 65])
+@pytest.mark.parametrize("elements", slow_except([64, 65], 65))
 def test_curved_bodies_far_away_are_what_they_are_at_home(elements: int) -> None:
     # equal sides stay equal whatever the round-off of their lengths; curves are known to that of where they were
     disc = with_overrides(load_scene("disc-between-plates"), elements=elements)
     assert isinstance(disc, bk.Scene)
-    axis = dataclasses.replace(shortened("position"), values=(1.0, 1e4, 1e6, 1e8))
+    axis = dataclasses.replace(shortened("position"), values=(1.0, 1e6, 1e8))
     rows = list(sweep(disc, [axis]))
-    assert [row.verdict for row in rows] == ["right"] * 3 + ["named"]
+    assert [row.verdict for row in rows] == ["right"] * 2 + ["named"]
     assert rows[0].drift <= 1e-12
     assert "times its size from the origin" in rows[-1].message
 
