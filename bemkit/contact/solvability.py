@@ -18,6 +18,10 @@ _RELATIVE_WORK = 1e-6
 """Work below this share of the largest force at hand counts as zero: the load is then on the edge of being held, which
 linear programming (tolerance 1e-7) cannot decide and the drivers can."""
 
+_PLAIN = 1e-3
+"""Work by the forces of the sticking state that no inaccuracy of supports or integrals can leave; and these forces by
+those of a body that is strained by as much as it is carried."""
+
 _FARTHEST = 1e7
 """Travel to an obstacle, in deformations of the body, up to which displacements hold nine digits of the deformation."""
 
@@ -90,10 +94,8 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     if not motions.shape[0]:
         return None
     unit = largest_components(motions)
-    load = problem.body.rigid_load() / unit
+    load, force_scale = _rigid_load(problem, unit)
     motions = motions / unit[:, None] if isinstance(motions, np.ndarray) else (motions.T / unit).T.tocsr()
-    forces = problem.body.weights[:, None] * problem.sticking_state.traction
-    force_scale = max(float(np.abs(load).max()), float(np.abs(forces).sum()))
     if force_scale == 0.0:
         return None
     touches = np.isfinite(problem.gap)
@@ -112,6 +114,27 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
                 who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
                 best = UnsolvableLoad(motion, lift, work, who, where)
     return best
+
+
+def needs_contact(problem: ContactProblem) -> bool:
+    """Whether the load plainly moves the body away if nothing touches it: far more than round-off could.
+
+    That takes no further response; False does not say that the load is balanced.
+    """
+    motions = as_rows(problem.body.rigid_motions())
+    if not motions.shape[0]:
+        return False
+    load, force_scale = _rigid_load(problem, largest_components(motions))
+    modulus = problem.body.stiffness_scale * float(np.median(problem.body.weights))
+    carried = modulus * float(np.abs(problem.sticking_state.displacement).max())  # of which forces may be round-off
+    return bool(np.abs(load).max() > _PLAIN * max(force_scale, _PLAIN * carried))
+
+
+def _rigid_load(problem: ContactProblem, unit: FloatArray) -> tuple[FloatArray, float]:
+    """Return the work (n_motions,) of the load on rigid motions of unit size, and a force to compare it with."""
+    load = problem.body.rigid_load() / unit
+    forces = problem.body.weights[:, None] * problem.sticking_state.traction
+    return load, max(float(np.abs(load).max()), float(np.abs(forces).sum()))
 
 
 def find_long_travel(problem: ContactProblem) -> float | None:

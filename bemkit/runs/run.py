@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
 
 
-_COARSEST, _LARGE = 1024, 5000
-"""Elements that are solved for from cold, and elements of a body on compressed equations that begins on them."""
+_COARSEST, _RATIO = 1024, 16
+"""Elements that are solved for from cold, and by how many there are fewer on each coarser mesh of a large body."""
+_LARGE = 5000
+"""Elements of a mesh that tells whether the equations of such a body are compressed."""
 
 
 class LoadHistoryError(InputError):
@@ -109,10 +111,10 @@ def _gain_by_cascade(scene: Scene) -> int:
         return 0
     if surface is not None and surface.is_periodic:
         return 2 if n_elements >= 2 * _COARSEST else 0
-    if n_elements < _LARGE or surface is not None:
+    if n_elements < _RATIO * _COARSEST or surface is not None:
         return 0
     smaller = replace(scene, mesh=replace(scene.mesh, elements=_LARGE))
-    return 16 if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
+    return _RATIO if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
 
 
 def _run_assembly(

@@ -11,7 +11,7 @@ import numpy as np
 from bemkit.arrays import IntArray
 from bemkit.contact.certificate import Certificate, certify
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
-from bemkit.contact.solvability import find_long_travel, find_unsolvable_load
+from bemkit.contact.solvability import find_long_travel, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, ProjectionEquations, contact_sets
 from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response, with_least_slip
@@ -306,7 +306,7 @@ class _Run:
         """Return the response without any contact, if there is one; it does not depend on the law."""
         known = self.problem.of_body
         if "untouched" not in known:
-            known["untouched"] = untouched_response(self.problem.body)
+            known["untouched"] = None if needs_contact(self.problem) else untouched_response(self.problem.body)
         untouched: FloatingResponse | None = known["untouched"]
         return untouched
 

@@ -17,6 +17,7 @@ from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
+from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -62,7 +63,7 @@ class HierarchicalBody(LinearBody):
     conditions: NodalConditions
     force: FloatArray
     inside: ForcesInside | None = None
-    _responses: list[tuple[ContactState, LinearConditions]] = field(default_factory=list, init=False)
+    _responses: list[_Response] = field(default_factory=list, init=False)
     _fields: list[_Fields] = field(default_factory=list, init=False)
     _travelled: list[LoadedSystem] = field(default_factory=list, init=False)
 
@@ -116,7 +117,7 @@ class HierarchicalBody(LinearBody):
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         state = self._solved(conditions)
-        self._responses.append((state, conditions))
+        self._responses.append(_Response(state, conditions, self._moving.system.answered))
         del self._responses[:-_KEPT]
         return state
 
@@ -185,8 +186,9 @@ class HierarchicalBody(LinearBody):
         for fields in self._fields:
             if fields.state is state:
                 return fields
-        conditions = next((each for known, each in self._responses if known is state), None)
-        self._solved(stick(state.u_n, state.u_t) if conditions is None else conditions)
+        response = next((each for each in self._responses if each.state is state), None)
+        if response is None or response.laws is not self._moving.system.answered:
+            self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
         loaded = self._moving
         strained, traction = loaded.everywhere()
         displacement, force = strained + loaded.motion, traction * loaded.map.weights[:, None]
@@ -252,6 +254,15 @@ class HierarchicalBody(LinearBody):
             self._travelled[:] = [loaded.moved(travel)]
         response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
         return exactly(response, conditions, self.is_held)
+
+
+@dataclass(frozen=True, eq=False)
+class _Response:
+    """A state, the conditions that have led to it, and what the equations made of these."""
+
+    state: ContactState
+    conditions: LinearConditions
+    laws: ElementLaws | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,12 +114,14 @@ class Block:
     entries: FloatArray
     weights: FloatArray
 
-    def combined(self, n_rows: int | None, first: int) -> FloatArray:
-        """Return random combinations (n_rows, n) of the rows, or all of them weighted."""
-        if n_rows is None:
-            return self.entries * self.weights[:, None]
+    def weighted(self) -> FloatArray:
+        """Return all rows (m, n) with their weights."""
+        return self.entries * self.weights[:, None]
+
+    def combined(self, numbers: slice, first: int) -> FloatArray:
+        """Return random combinations (n_rows, n) of the rows by their numbers; `first` counts the rows of others."""
         m = len(self.entries)
-        random = _random(_power_of_two(n_rows), _power_of_two(first + m))[:n_rows, first : first + m]
+        random = _random(_power_of_two(numbers.stop), _power_of_two(first + m))[numbers, first : first + m]
         combinations: FloatArray = (random * self.weights) @ self.entries
         return combinations
 
@@ -151,26 +153,39 @@ def sketched(
     kinds : (n,) array, optional
         Numbers 0, 1 ...: a column is compared with the largest one of its kind, by default of all.
     """
-    m, columns = sum(len(block.entries) for block in blocks), slice(None) if chosen is None else chosen
+    columns = slice(None) if chosen is None else chosen
+    firsts = np.cumsum([0, *(len(block.entries) for block in blocks)]).tolist()
+    parts: list[FloatArray] = []
     while True:
-        n_rows = None if guess is None or guess + _SPARE >= m else guess + _SPARE
-        parts, first = [], 0
-        for block in blocks:
-            part = block.combined(n_rows, first)[:, columns] * sizes
-            parts.append(part / (_norms(part).max(initial=0.0) or 1.0))
-            first += len(block.entries)
-        sketch = np.concatenate(parts) if n_rows is None else sum(parts[1:], start=parts[0])
-        scales = sizes
-        if kinds is not None:
-            norms = _norms(sketch)
-            of_kind = np.array([norms[kinds == kind].max(initial=0.0) or 1.0 for kind in range(kinds.max() + 1)])
-            sketch /= of_kind[kinds]
-            scales = sizes / of_kind[kinds]
-        result = interpolative(sketch, tolerance) if n_rows is None else _of_sketch(sketch, _SKETCHED * tolerance)
+        n_known, n_rows = len(parts[0]) if parts else 0, 0 if guess is None else guess + _SPARE
+        if is_whole := guess is None or n_rows >= firsts[-1]:
+            parts = [block.weighted()[:, columns] for block in blocks]
+        else:
+            some = slice(n_known, n_rows)
+            more = [block.combined(some, first)[:, columns] for block, first in zip(blocks, firsts, strict=False)]
+            parts = [np.concatenate(pair) for pair in zip(parts, more, strict=True)] if parts else more
+        sketch, scales = _compared(parts, sizes, kinds, is_whole=is_whole)
+        result = interpolative(sketch, tolerance) if is_whole else _of_sketch(sketch, _SKETCHED * tolerance)
         if result is not None:
             return result.scaled(scales)
         assert guess is not None  # all rows are always enough
         guess += guess // 2
+
+
+def _compared(
+    parts: list[FloatArray], sizes: FloatArray, kinds: IntArray | None, *, is_whole: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rows, or the sum of the combinations, of blocks of one size, and the factors (n,) of their columns."""
+    scaled = [part * sizes for part in parts]
+    for part in scaled:
+        part /= _norms(part).max(initial=0.0) or 1.0
+    sketch = np.concatenate(scaled) if is_whole else sum(scaled[1:], start=scaled[0])
+    if kinds is None:
+        return sketch, sizes
+    norms = _norms(sketch)
+    of_kind = np.array([norms[kinds == kind].max(initial=0.0) or 1.0 for kind in range(kinds.max() + 1)])
+    sketch /= of_kind[kinds]
+    return sketch, sizes / of_kind[kinds]
 
 
 def _of_sketch(sketch: FloatArray, tolerance: float) -> Interpolation | None:

@@ -110,6 +110,11 @@ class MatrixFreeSystem(HierarchicalSystem):
         self.steps: list[int] = []
         """Steps of all responses so far."""
 
+    @property
+    def answered(self) -> ElementLaws | None:
+        """What the last `state` was asked."""
+        return self._laws
+
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements; see `HierarchicalSystem.state`.
 

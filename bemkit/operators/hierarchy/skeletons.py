@@ -82,12 +82,17 @@ class LevelView(ABC):
         )
         return max(self.tolerance * float(np.sqrt(min(1.0, share))), _FLOOR)
 
-    def guess(self, n_candidates: int, elements: IntArray) -> int | None:
-        """Return a guess of the rank, none where random combinations would lose the smallest elements."""
+    def guess(self, n_candidates: int, elements: IntArray, tolerance: float, n_kinds: int) -> int | None:
+        """Return a guess of the rank, none where random combinations would lose the smallest elements.
+
+        That of a leaf hardly depends on its size, but on whether tractions and displacements are two kinds of columns.
+        """
         lengths = self.columns.lengths[elements]
         if lengths.max(initial=0.0) > _UNEVEN * lengths.min(initial=np.inf):
             return None
-        return 34 + n_candidates // 5 if self.is_lowest else 3 * n_candidates // 5
+        if self.is_lowest:
+            return min((3 * n_kinds + 2) * (14 + 2 * n_proxies(tolerance) // 3) // 5, n_candidates)
+        return 3 * n_candidates // 5
 
     def proxies(self, cluster: int) -> ComplexArray:
         """Return the points that stand for all that is far from a cluster."""
@@ -117,12 +122,14 @@ class CollocationView(LevelView):
         fields = of.fields(np.append(proxies, of.centre[points]), places, candidates)
         spacing = 2.0 * np.pi * PROXY_RATIO * self.discs.radius[cluster] / proxies.size
         weights = np.repeat(np.sqrt(np.append(np.full(proxies.size, spacing), of.lengths[points])), 2)
+        elements, kinds = candidates // 4, (candidates // 2) % 2
+        tolerance, n_kinds = self.tolerance_at(cluster, elements), 1 + int(np.ptp(kinds)) if kinds.size else 1
         return sketched(
             [Block(fields, weights)],
-            1.0 / np.sqrt(of.lengths[candidates // 4]),
-            self.tolerance_at(cluster, candidates // 4),
-            self.guess(candidates.size, np.append(points, candidates // 4)),
-            kinds=(candidates // 2) % 2,
+            1.0 / np.sqrt(of.lengths[elements]),
+            tolerance,
+            self.guess(candidates.size, np.append(points, elements), tolerance, n_kinds),
+            kinds=kinds,
         )
 
     def _row_map(self, cluster: int, near_columns: IntArray) -> Interpolation:
@@ -136,10 +143,11 @@ class CollocationView(LevelView):
         for kind in (0, 1):
             if (seen := near_columns[(near_columns // 2) % 2 == kind]).size:
                 blocks.append(Block(of.fields(x, points, seen).T, 1.0 / np.sqrt(of.lengths[seen // 4])))
+        tolerance = self.tolerance_at(cluster, rows // 2)
         return sketched(
             blocks,
             np.sqrt(of.lengths[rows // 2]),
-            self.tolerance_at(cluster, rows // 2),
-            self.guess(rows.size, np.append(points, near_columns // 4)),
+            tolerance,
+            self.guess(rows.size, np.append(points, near_columns // 4), tolerance, 1),
             chosen=None if rows.size == 2 * points.size else 2 * number + rows % 2,
         )

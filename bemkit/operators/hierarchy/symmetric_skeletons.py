@@ -33,8 +33,9 @@ class SymmetricView(LevelView):
         weights = np.append(np.ones(near.size), np.full(2 * proxies.size, of.material.plane_modulus))
         fields = np.concatenate([entries, of.fields(proxies, candidates)])
         own = candidates // 4
-        guess = self.guess(own.size, np.append(own, near // 4))
-        map_ = sketched([Block(fields, weights)], np.ones(own.size), self.tolerance_at(cluster, own), guess)
+        tolerance = self.tolerance_at(cluster, own)
+        guess = self.guess(own.size, np.append(own, near // 4), tolerance, 2)
+        map_ = sketched([Block(fields, weights)], np.ones(own.size), tolerance, guess)
         columns = candidates[map_.skeleton]
         return Skeleton(of.rows_of(columns), map_, columns, map_)
 

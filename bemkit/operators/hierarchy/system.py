@@ -79,6 +79,11 @@ class HierarchicalSystem:
         """Number of elements."""
         return self._n_elements
 
+    @property
+    def answered(self) -> ElementLaws | None:
+        """What the last `state` was asked; another object after every further one."""
+        return self.factor.laws
+
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.
 
