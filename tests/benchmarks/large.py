@@ -109,7 +109,7 @@ def scene_of(n_elements: int, linear_solver: object, degree: int) -> bk.Scene:
     return replace(scene, mesh=mesh, linear_solver=linear_solver, discretisation=discretisation)
 
 
-def row_of(n_elements: int, parts: Parts, degree: int, *, with_dense: bool) -> Row:
+def row_of(n_elements: int, parts: Parts, degree: int) -> tuple[Row, bk.Solution]:
     """Measure one number of elements."""
     clock, begin = time.process_time(), time.perf_counter()
     solution = bk.run(scene_of(n_elements, bk.Hierarchical(), degree))
@@ -117,15 +117,17 @@ def row_of(n_elements: int, parts: Parts, degree: int, *, with_dense: bool) -> R
     places = [each.x for each in solution.transitions]
     miss = max(abs(place - known) for place, known in zip(places, REFERENCE, strict=True))
     steps = [seconds for leaves, seconds in parts.updates if 0 < leaves <= FEW]
-    row = Row(
+    return Row(
         n_elements, parts.build, parts.updates[0][1], float(np.median(steps or [math.nan])),
         float(np.median(parts.certificates)), parts.n_bytes, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
         parts.rank, whole, wall, solution.outer_steps, solution.certificate.worst, miss,
-    )  # fmt: skip
-    if not with_dense:
-        return row
+    ), solution  # fmt: skip
+
+
+def beside_dense(row: Row, solution: bk.Solution, degree: int) -> Row:
+    """Solve the same on dense equations."""
     clock = time.process_time()
-    dense = run_on_mesh(scene_of(n_elements, bk.DenseCholesky(), degree))
+    dense = run_on_mesh(scene_of(row.n_elements, bk.DenseCholesky(), degree))
     seconds = time.process_time() - clock
     assert np.array_equal(dense.contact.status, solution.contact.status), "the statuses differ"
     apart = np.abs(dense.contact.sigma_n - solution.contact.sigma_n).max() / np.abs(dense.contact.sigma_n).max()
@@ -188,9 +190,17 @@ def main() -> None:
     compiled.functions()  # compiles now, not within a measurement
     console, rows, parts = Console(width=160), [], Parts()
     parts.listen()
+    solutions = []
     for number in options.numbers:
-        rows.append(row_of(number, parts, options.galerkin, with_dense=number <= options.dense))
+        row, solution = row_of(number, parts, options.galerkin)
+        rows.append(row)
+        solutions.append(solution if number <= options.dense else None)
         console.print(table_of(rows[-1:]))
+    # dense runs come last: their memory would be the largest of the process ever since
+    rows = [
+        row if solution is None else beside_dense(row, solution, options.galerkin)
+        for row, solution in zip(rows, solutions, strict=True)
+    ]
     console.print(table_of(rows))
     growth = Table(title="growth exponents")
     for column in ("from", "to", "build", "factor", "step", "memory"):

@@ -17,6 +17,7 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.hierarchy.system import HierarchicalSystem
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
@@ -182,6 +183,20 @@ def test_the_certificate_finds_states_that_are_no_responses() -> None:
     bump = 1e-3 * np.sin(np.arange(len(state.u_n)))[:, None]
     bent = ContactState(state.displacement + bump, state.traction)
     assert not model.body.imbalance(bent).is_below(1e-6)
+
+
+def test_a_certificate_asks_for_no_further_response(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_of(in_both_ways(paper(1), 240)[0])
+    body, problem, solved = model.body, model.problem, []
+    state = HierarchicalSystem.state
+    monkeypatch.setattr(HierarchicalSystem, "state", lambda *asked: [solved.append(asked), state(*asked)][1])
+    one = problem.sticking_state
+    two = body.respond(stick(problem.gap + 1e-4, problem.slip_origin))
+    n_responses = len(solved)
+    assert body.imbalance(two).is_below(1e-9)
+    assert len(solved) == n_responses
+    assert body.imbalance(one).is_below(1e-9)  # an earlier one, whose fields take its conditions again
+    assert len(solved) > n_responses
 
 
 def test_a_coarse_tolerance_is_stated_and_seen_in_the_certificate() -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
-from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.contact.solvability import find_unsolvable_load, needs_contact
+from bemkit.solvers.newton import untouched_response
 from tests.handmade import block_problem
 
 
@@ -67,6 +68,21 @@ def test_an_obstacle_that_is_nowhere():
 def test_no_load_is_no_trouble():
     problem = block_problem(Coulomb(0.5), press=0.0, push=0.0)
     assert find_unsolvable_load(problem) is None
+
+
+@pytest.mark.parametrize(
+    ("press", "push", "travel"), [(1.0, 0.0, 0.0), (0.0, 1e-2, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 3.0)]
+)
+def test_where_a_load_plainly_needs_contact_no_response_without_it_balances(press, push, travel):
+    problem = block_problem(Coulomb(0.5), is_held_sideways=False, press=press, push=push)
+    problem = replace(problem, gap=problem.gap - travel)  # carried by the obstacle, which leaves round-off of forces
+    assert needs_contact(problem) == bool(press or push)
+    assert (untouched_response(problem.body) is None) == bool(press or push)
+
+
+def test_a_held_body_needs_no_contact():
+    body = DenseBody(np.eye(2), np.full(2, -5.0), np.ones(1))
+    assert not needs_contact(ContactProblem(body, np.zeros(1), Coulomb(0)))
 
 
 def memory_of_the_programme(n_contact):

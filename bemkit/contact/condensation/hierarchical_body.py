@@ -24,7 +24,7 @@ from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalMap, LoadedSystem
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
 
-_SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 500_000, 100, 8
+_SAMPLED_PAIRS, _MOST_SAMPLED, _FEWEST_SAMPLED = 250_000, 50, 8
 """Points where a residual is evaluated: so many that their pairs with all elements take about as long as a response."""
 _KEPT = 3
 """Responses whose conditions are remembered, so that fields of the whole boundary follow without another one."""

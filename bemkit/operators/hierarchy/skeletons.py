@@ -20,6 +20,8 @@ from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, n_proxies, po
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
+_FEW = 16
+"""Clusters of a level that are few."""
 _UNEVEN = 1e3
 """Ratio of lengths of elements that see each other beyond which no random combinations are taken."""
 
@@ -85,14 +87,15 @@ class LevelView(ABC):
     def guess(self, n_candidates: int, elements: IntArray, tolerance: float, n_kinds: int) -> int | None:
         """Return a guess of the rank, none where random combinations would lose the smallest elements.
 
-        That of a leaf hardly depends on its size, but on whether tractions and displacements are two kinds of columns.
+        That of a leaf hardly depends on its size, but on whether tractions and displacements are two kinds of columns;
+        most of the few clusters below the root have corners or others all around.
         """
         lengths = self.columns.lengths[elements]
         if lengths.max(initial=0.0) > _UNEVEN * lengths.min(initial=np.inf):
             return None
         if self.is_lowest:
             return min((3 * n_kinds + 2) * (14 + 2 * n_proxies(tolerance) // 3) // 5, n_candidates)
-        return 3 * n_candidates // 5
+        return (7 if len(self.rows) <= _FEW else 6) * n_candidates // 10
 
     def proxies(self, cluster: int) -> ComplexArray:
         """Return the points that stand for all that is far from a cluster."""

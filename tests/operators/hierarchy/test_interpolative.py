@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bemkit.arrays import FloatArray
 from bemkit.operators.hierarchy.interpolative import Block, interpolative, sketched
 
 
@@ -41,6 +43,20 @@ def test_a_rank_above_the_guess_is_found() -> None:
     rng = np.random.default_rng(0)
     matrix = rng.normal(size=(400, 60)) @ rng.normal(size=(60, 150))
     assert sketched([Block(matrix, np.ones(400))], np.ones(150), 1e-9, 5).skeleton.size == 60
+
+
+def test_combinations_that_were_too_few_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    matrix, taken, combined = rng.normal(size=(400, 60)) @ rng.normal(size=(60, 150)), [], Block.combined
+
+    def recorded(block: Block, numbers: slice, first: int) -> FloatArray:
+        taken.append(numbers)
+        return combined(block, numbers, first)
+
+    monkeypatch.setattr(Block, "combined", recorded)
+    assert sketched([Block(matrix, np.ones(400))], np.ones(150), 1e-9, 20).skeleton.size == 60
+    assert len(taken) > 2
+    assert [each.start for each in taken] == [0, *(each.stop for each in taken[:-1])]
 
 
 def test_weights_hold_for_the_columns_as_they_are() -> None:
