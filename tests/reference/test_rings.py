@@ -22,7 +22,7 @@ from bemkit.reference import (
     persson_load,
     persson_pressure,
 )
-from tests.slow import slow_only
+from tests.slow import slow_except
 
 STEEL = Material(1.0, 0.3)
 SHEET = Material(1.0, 0.3, Plane.STRESS)
@@ -117,7 +117,7 @@ TABLE = {
 ROWS = [(ratio, row) for ratio, rows in TABLE.items() for row in rows]
 
 
-@pytest.mark.parametrize(("ratio", "row"), slow_only(ROWS, ROWS[0], ROWS[3]))
+@pytest.mark.parametrize(("ratio", "row"), slow_except(ROWS, ROWS[1], ROWS[4]))
 def test_a_receding_layer_has_its_tabulated_values(ratio: float, row: tuple[float, float, float]) -> None:
     load, contact, peak = row
     layer = RecedingLayer(3.0, 2.0 * load, 2.0, ratio)

@@ -33,6 +33,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     path = tmp_path / "rows.h5"
     process = subprocess.Popen([sys.executable, "-c", STUDY, str(path)])
@@ -54,6 +55,7 @@ def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
     assert repr(after[: len(finished)]) == repr(finished)
 
 
+@pytest.mark.slow
 def test_a_process_killed_in_the_middle_of_a_write_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "rows.h5"
     rows = tuple(row(size=float(n)) for n in range(200))
