@@ -345,6 +345,7 @@ def test_an_interrupt_while_the_command_line_loads_is_one_line(
     assert capsys.readouterr().err == "bemkit: error: interrupted; no file is half written\n"
 
 
+@pytest.mark.slow
 def test_a_closed_pipe_is_no_error() -> None:
     command = f"{sys.executable} -c 'from bemkit.cli.main import main; main()' run paper-1 --csv - | head -n 1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)

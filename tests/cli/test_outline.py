@@ -40,7 +40,19 @@ def test_from_a_file_to_a_picture(name: str, tmp_path, monkeypatch) -> None:
     assert "outer" in shown.output
     assert "hole 1" in shown.output
     assert Path("figures/outline.png").stat().st_size > 5000
-    solved = call("run", "scene.toml", "--plot", "figures", "--json", "result.json", "-q", "--elements", "80")
+    solved = call(
+        "run",
+        "scene.toml",
+        "--plot",
+        "figures",
+        "--what",
+        "deformation",
+        "--json",
+        "result.json",
+        "-q",
+        "--elements",
+        "80",
+    )
     assert solved.exit_code == 0
     assert json.loads(Path("result.json").read_text())["certified"]
     assert Path("figures/deformation.png").stat().st_size > 5000

@@ -24,7 +24,7 @@ from tests.slow import slow_except
 TOLERANCE = 1e-11
 # held at all its corners, where its supports would contradict each other at a common node
 BODIES = {name: scene for name, scene in SCENES.items() if name != "tilted block"}
-QUICK = (("paper-1", 1), ("loose block", 2))
+QUICK = (("paper-1", 1),)
 
 
 def in_both_ways(scene: bk.Scene, n_elements: int, degree: int) -> tuple[bk.Scene, bk.Scene]:
@@ -55,9 +55,10 @@ def test_statuses_and_tractions_are_those_of_dense_equations(name: str, degree: 
     assert compressed.certificate.worst < 1e-9
 
 
-@pytest.mark.parametrize("name", slow_except(("paper-1", "loose block"), "loose block"))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["paper-1", "loose block"])
 def test_the_body_keeps_the_promises_of_a_body(name: str) -> None:
-    compressed = (in_both_ways(replace(BODIES[name], load_factors=(factor,)), 200, 1)[0] for factor in (1.0, 0.4))
+    compressed = (in_both_ways(replace(BODIES[name], load_factors=(factor,)), 240, 1)[0] for factor in (1.0, 0.4))
     body, reloaded = (build_model(prepare(each, each.build_mesh())).body for each in compressed)
     assert isinstance(body, HierarchicalBody)
     check_body(body, reloaded=reloaded)

@@ -106,6 +106,7 @@ def test_a_cylinder_as_hertz() -> None:
     assert pressure_error(solution, lambda x: peak * np.sqrt(1.0 - (x / a) ** 2), 0.95 * a) < WITHIN
 
 
+@pytest.mark.slow
 def test_a_flat_punch() -> None:
     solution = pressed("0 * x", 1.0, ALONG)
     assert pressure_error(solution, lambda x: 1.0 / (np.pi * np.sqrt(1.0 - x**2)), 0.95) < WITHIN
@@ -120,6 +121,7 @@ def test_a_punch_under_a_moment() -> None:
     assert force.moment == pytest.approx(0.1, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_blunt_wedge() -> None:
     slope = 0.01
     solution = pressed("0.01 * abs(x)", 2.0, bk.FarField(force_y=slope * MODULUS, x=0.0, turn=0.0))
@@ -127,6 +129,7 @@ def test_a_blunt_wedge() -> None:
     assert pressure_error(solution, lambda x: MODULUS * slope / np.pi * np.arccosh(1.0 / np.abs(x)), 0.95) < WITHIN
 
 
+@pytest.mark.slow
 def test_a_punch_that_slides() -> None:
     """Moved far to the right the half-plane feels friction to the left, and the pressure leans to one side."""
     nu = MATERIAL.poisson_ratio
@@ -165,6 +168,7 @@ def test_a_punch_that_is_bonded() -> None:
     assert (off / size[rows]).max() < WITHIN
 
 
+@pytest.mark.slow
 def test_a_rounded_punch() -> None:
     """Flat for |x| < b, then a parabola [Ciavarella1998]: half-width a by 2 P R / (a^2 E') of the angle asin(b / a)."""
     b, half_width = 0.5, 1.0

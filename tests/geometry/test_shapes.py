@@ -1,3 +1,6 @@
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -44,6 +47,16 @@ def test_area_and_perimeter(shape: Shape, area: float, perimeter: float, n_eleme
 )
 def test_side_names(shape: Shape, names: str) -> None:
     assert shape.outline().side_names == tuple(names.split())
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_outlines_are_made_and_checked_once(name: str) -> None:
+    shape = SHAPES[name][0]
+    assert shape.outline() is shape.outline()
+    assert pickle.loads(pickle.dumps(shape)) == shape
+    other = replace(shape)  # a shape of its own, equal
+    assert other == shape
+    assert other.outline() is not shape.outline()
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,15 @@ def call(*arguments: str) -> int:
     return int(ended.value.code or 0)
 
 
-def test_all_pictures_are_complete(solution: Solution, tmp_path: Path) -> None:
-    names = [name for name in PICTURES if name not in HISTORY]
+@pytest.mark.parametrize(
+    "names",
+    [
+        pytest.param([name for name in PICTURES if name not in HISTORY], marks=pytest.mark.slow),
+        ["contacts", "traction", "von-mises", "convergence"],
+    ],
+    ids=["all", "of every kind"],
+)
+def test_pictures_are_complete(names: list[str], solution: Solution, tmp_path: Path) -> None:
     paths = save_pictures(solution, tmp_path, names, dots_per_inch=70)
     assert sorted(path.stem for path in paths) == sorted(names)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(f"{name}.png" for name in names)

@@ -153,7 +153,18 @@ TRACED = {
 
 
 @pytest.mark.parametrize(
-    "kind", slow_only(TRACED, "constant", "linear", "frictionless", "degree 3", "degree 9", "curved of degree 6")
+    "kind",
+    slow_only(
+        TRACED,
+        "constant",
+        "linear",
+        "frictionless",
+        "degree 3",
+        "degree 9",
+        "curved of degree 6",
+        "contact all along",
+        "few curved",
+    ),
 )
 def test_the_largest_memory_is_foreseen(kind: str) -> None:
     """Within a fifth: a model of what is alive at once knows no temporary array of a line of code.

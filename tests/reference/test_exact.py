@@ -9,6 +9,7 @@ import pytest
 
 from bemkit.operators.material import Material, Plane
 from bemkit.reference import DiscBetweenPlates, WavyObstacle, westergaard_half_width, westergaard_pressure
+from tests.slow import slow_except
 
 PLATE = Material(0.91, 0.3)  # E' = 1
 BLOCK = Material(1.0, 0.3)
@@ -80,7 +81,7 @@ def test_the_tangential_displacement_of_the_block_belongs_to_its_pressure(plane:
     np.testing.assert_allclose(strain[chosen], expected[chosen], atol=2e-3 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("along_normals", [False, True])
+@pytest.mark.parametrize("along_normals", slow_except([False, True], True))
 def test_energies_are_half_the_work_of_the_load(along_normals: bool) -> None:
     disc = DiscBetweenPlates(1.0, 0.016, PLATE, n_terms=9, along_normals=along_normals)
     # pushing a little further costs the load times the way, on two plates; gaps along normals n make the way 1 / n_y

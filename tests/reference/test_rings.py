@@ -22,7 +22,7 @@ from bemkit.reference import (
     persson_load,
     persson_pressure,
 )
-from tests.slow import slow_only
+from tests.slow import slow_except
 
 STEEL = Material(1.0, 0.3)
 SHEET = Material(1.0, 0.3, Plane.STRESS)
@@ -68,7 +68,10 @@ def test_rotating_discs_have_their_printed_factors() -> None:
 
 
 @pytest.mark.parametrize(
-    ("degrees", "clearance", "peak"), [(30, 7.943540, 1.260289), (45, 2.823121, 0.882111), (75, 0.287077, 0.628103)]
+    ("degrees", "clearance", "peak"),
+    slow_except(
+        [(30, 7.943540, 1.260289), (45, 2.823121, 0.882111), (75, 0.287077, 0.628103)], (45, 2.823121, 0.882111)
+    ),
 )
 def test_a_pin_between_equal_materials_is_perssons(degrees: float, clearance: float, peak: float) -> None:
     angle = np.radians(degrees)
@@ -117,7 +120,7 @@ TABLE = {
 ROWS = [(ratio, row) for ratio, rows in TABLE.items() for row in rows]
 
 
-@pytest.mark.parametrize(("ratio", "row"), slow_only(ROWS, ROWS[0], ROWS[3]))
+@pytest.mark.parametrize(("ratio", "row"), slow_except(ROWS, ROWS[1], ROWS[4]))
 def test_a_receding_layer_has_its_tabulated_values(ratio: float, row: tuple[float, float, float]) -> None:
     load, contact, peak = row
     layer = RecedingLayer(3.0, 2.0 * load, 2.0, ratio)

@@ -24,7 +24,7 @@ def adapted(example: int, word: str, accuracy: float) -> tuple[bk.Solution, ...]
     return run_adaptive(paper(example, discretisation, bk.MeshOptions(accuracy=accuracy)))
 
 
-@pytest.mark.parametrize("example", [1, 2])
+@pytest.mark.parametrize("example", slow_except([1, 2], 1))
 @pytest.mark.parametrize(
     ("word", "accuracy", "sigma_n", "sigma_t", "displacement", "scalar", "place"),
     [

@@ -74,7 +74,11 @@ def test_one_of_ones_own_goes_all_the_way(plugin: None, capsys: pytest.CaptureFi
     """From a scene file to the plan, the result file, the tables and the pictures."""
     text = bk.scene_to_toml(replace(bk.load_scene("paper-1"), mesh=bk.MeshOptions(elements=24)))
     Path("own.toml").write_text(text.replace('discretisation = "constant"', 'discretisation = "jumping"'), "utf-8")
-    for arguments in ("plan own.toml --json", "run own.toml -o own.h5 --plot pictures", "show own.h5 --csv boundary"):
+    for arguments in (
+        "plan own.toml --json",
+        "run own.toml -o own.h5 --plot pictures --what deformation",
+        "show own.h5 --csv boundary",
+    ):
         with pytest.raises(SystemExit) as end:
             main(arguments.split())
         assert end.value.code == 0

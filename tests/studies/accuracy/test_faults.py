@@ -33,6 +33,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
     path = tmp_path / "rows.h5"
     process = subprocess.Popen([sys.executable, "-c", STUDY, str(path)])
@@ -41,7 +42,7 @@ def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
         with contextlib.suppress(ResultFileError):
             if FILE.read(path)[1]:
                 break
-        time.sleep(0.05)
+        time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.wait()
     finished = FILE.read(path)[1]
@@ -54,11 +55,12 @@ def test_a_killed_study_keeps_its_rows_and_goes_on_where_it_stopped(tmp_path: Pa
     assert repr(after[: len(finished)]) == repr(finished)
 
 
+@pytest.mark.slow
 def test_a_process_killed_in_the_middle_of_a_write_leaves_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "rows.h5"
     rows = tuple(row(size=float(n)) for n in range(200))
     FILE.write(path, dict.fromkeys(FILE.labels, "x"), rows)
-    for delay in (0.01,):
+    for delay in (0.0, 0.01):
         process = subprocess.Popen([sys.executable, "-c", WRITES_FOREVER, str(path)], stdout=subprocess.PIPE)
         assert process.stdout is not None
         assert process.stdout.readline() == b"ready\n"

@@ -177,6 +177,7 @@ def rows_of_the_angle(most: int) -> tuple[ErrorRecord, ...]:
     return tuple(rows[run.key] for run in runs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("element", "meshes", "low", "high"),
     [

@@ -172,7 +172,7 @@ def sweep_process(path: Path, axes: tuple[str, ...]) -> subprocess.Popen[bytes]:
 @pytest.mark.parametrize(
     ("axes", "n_kills", "n_rows"),
     [
-        (("sliding",), 1, 11),
+        pytest.param(("sliding",), 1, 11, marks=pytest.mark.slow),
         pytest.param(("friction", "sliding"), 2, 24, marks=pytest.mark.slow),
     ],
 )
