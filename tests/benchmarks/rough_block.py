@@ -4,18 +4,22 @@
 
 A block of width 1 is pressed on a self-affine profile (Hurst exponent 0.8, friction coefficient 0.3) in steps; nine
 tenths of the elements are in contact (default 20 000). It prints for each pressure the share of the lower side that
-touches, that of it which sticks, contact steps and the largest violation.
+touches, what Persson's theory says of a half-plane without friction [Persson2001], the share of it that sticks,
+contact steps and the largest violation.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy.special import erf
 
 import bemkit as bk
+from bemkit.arrays import FloatArray
 from bemkit.operators.hierarchy import compiled
 from bemkit.solvers.active_sets import NodeStatus
 
@@ -41,20 +45,41 @@ def rough_block(n_contact: int) -> bk.Scene:
     )
 
 
-def picture(steps: list[bk.Solution], areas: list[float]) -> plt.Figure:
-    """Draw the real area against pressure, and pressures on a hundredth of the block."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.0, 3.6), layout="constrained")
-    left.loglog(PRESSURES, areas, "o-")
+def persson_share(pressures: FloatArray, scene: bk.Scene) -> FloatArray:
+    """Return the share that touches by [Persson2001], in plane strain and without friction.
+
+    Waves of amplitude h and wave number q take pressures E' q h / 2 to be pressed flat, so that those of the whole
+    profile have the variance (E' slope / 2)^2; that of the pressures at contact is the same less what tension
+    would take: erf(sqrt(2) p / (E' slope)).
+    """
+    condition = scene.parts[0].condition
+    assert isinstance(condition, bk.Contact)
+    assert isinstance(condition.obstacle, bk.SelfAffineProfile)
+    stiffness = scene.material.plane_modulus * condition.obstacle.rms_slope
+    return np.asarray(erf(np.sqrt(2.0) * pressures / stiffness))
+
+
+def picture(scene: bk.Scene, steps: Sequence[bk.Solution], areas: list[float]) -> plt.Figure:
+    """Draw the real area against pressure, and pressures on a part of the block and on a part of that."""
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(13.0, 3.8), layout="constrained")
+    pressures = np.geomspace(0.7 * PRESSURES[0], 1.4 * PRESSURES[-1])
+    theory = persson_share(pressures, scene)
+    left.loglog(pressures, theory, "-", color="0.6", label="Persson's theory")
+    left.loglog(pressures, theory[0] / pressures[0] * pressures, "--", color="0.8", label="in proportion to pressure")
+    left.loglog(PRESSURES, areas, "o", label="block with friction 0.3")
+    left.set_ylim(0.7 * areas[0], 1.2)
     for axis, values in ((left.xaxis, PRESSURES), (left.yaxis, np.round(areas, 2))):
         axis.set_ticks(values, [f"{value:g}" for value in values])
         axis.set_ticks([], minor=True)
     left.set(xlabel="pressure on the block [E]", ylabel="share of the lower side that touches")
-    for step, pressure in ((steps[k], PRESSURES[k]) for k in (0, 2, 4)):
-        x, order = step.contact.x, np.argsort(step.contact.x)
-        order = order[(x[order] > 0.48) & (x[order] < 0.52)]
-        right.plot(x[order], -step.contact.sigma_n[order], label=f"{pressure:g}")
-    right.set(xlabel="x", ylabel="contact pressure [E]")
-    right.legend(title="pressure on the block")
+    left.legend(fontsize="small")
+    for axes, (begin, end) in ((middle, (0.45, 0.55)), (right, (0.498, 0.502))):
+        for k in (4, 2, 0):
+            x, order = steps[k].contact.x, np.argsort(steps[k].contact.x)
+            order = order[(x[order] > begin) & (x[order] < end)]
+            axes.fill_between(x[order], -steps[k].contact.sigma_n[order], label=f"{PRESSURES[k]:g}", lw=0.0)
+        axes.set(xlabel="x", ylabel="contact pressure [E]", xlim=(begin, end), ylim=(0.0, None))
+    right.legend(title="pressure", fontsize="small")
     return figure
 
 
@@ -66,22 +91,25 @@ def main() -> None:
     options = parser.parse_args()
     compiled.functions()  # compiles now, not within a measurement
     clock = time.process_time()
-    steps = bk.run_history([rough_block(options.contact)])
+    scene = rough_block(options.contact)
+    steps = bk.run_history([scene])
     seconds = time.process_time() - clock
     print(f"{steps[0].contact.n_contact} contact elements of {steps[0].mesh.n_elements}, {seconds:.0f} CPU seconds")
-    print("pressure  touching  of it sticking  steps  largest violation")
+    print("pressure  touching  Persson  of it sticking  steps  largest violation")
     areas = []
-    for step, pressure in zip(steps, PRESSURES, strict=True):
+    theory = persson_share(np.array(PRESSURES), scene)
+    for step, pressure, expected in zip(steps, PRESSURES, theory, strict=True):
         contact = step.contact
         touches, sticks = contact.status != NodeStatus.SEPARATED, contact.status == NodeStatus.STICK
         areas.append(float(contact.weight[touches].sum()))
         share = float(contact.weight[sticks].sum()) / areas[-1]
         print(
-            f"{pressure:8g}  {areas[-1]:8.4f}  {share:14.3f}  {step.outer_steps:5d}  {step.certificate.worst:17.0e}",
+            f"{pressure:8g}  {areas[-1]:8.4f}  {expected:7.4f}  {share:14.3f}  {step.outer_steps:5d}  "
+            f"{step.certificate.worst:17.0e}",
             flush=True,
         )
     if options.picture:
-        picture(list(steps), areas).savefig(options.picture, dpi=110)
+        picture(scene, steps, areas).savefig(options.picture, dpi=110)
 
 
 if __name__ == "__main__":
