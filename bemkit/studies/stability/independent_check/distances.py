@@ -11,8 +11,9 @@ from bemkit.studies.stability.independent_check.joints import Joints
 from bemkit.studies.stability.independent_check.nodes import distance_to, mean_normals
 from bemkit.studies.stability.independent_check.sides import measure_flat, sampled_overlap
 
-_SAMPLED = 1.1
-"""How much deeper an overlap may be found at other points of the same elements."""
+_SAMPLED = 1.25
+"""How much deeper an overlap may be found at other points of the same elements, also where those of the other side are
+shorter than the points are apart."""
 
 _DIRECTIONS = 1e-2
 """Angle [rad] by which directions of contact on curved sides may differ: a body that spins moves along them."""
