@@ -327,8 +327,8 @@ def check_memory(plan: Plan) -> None:
 def check_elements(scene: Scene) -> None:
     """Refuse a number of elements whose matrices cannot fit into this computer, before the mesh is made.
 
-    Memory grows with the square of that number, or in proportion to it where the equations are compressed: the plan for
-    a small mesh tells what a large one takes. A periodic half-plane has no matrices.
+    Memory grows with the square of that number, or linearly where the equations are compressed: the plans for small
+    meshes tell what a large one takes. A periodic half-plane has no matrices.
 
     Raises
     ------
@@ -339,11 +339,17 @@ def check_elements(scene: Scene) -> None:
     surface = scene.shape.outline().surface
     if n_elements is None or n_elements <= _MANY or (surface is not None and surface.is_periodic):
         return
-    small = replace(scene, mesh=replace(scene.mesh, elements=_FEW))
-    plan = make_plan(small, small.build_mesh())
-    growth = n_elements / _FEW
-    memory = int(growth ** (1 if plan.is_compressed else 2) * plan.memory)
+    plan, growth = _plan_of(scene, _FEW), n_elements / _FEW
+    if plan.is_compressed:
+        memory = plan.memory + int((growth - 1.0) * (_plan_of(scene, 2 * _FEW).memory - plan.memory))
+    else:
+        memory = int(growth**2 * plan.memory)
     _check(int(growth * plan.sizes.n_elements), memory, plan.is_compressed)
+
+
+def _plan_of(scene: Scene, n_elements: int) -> Plan:
+    scene = replace(scene, mesh=replace(scene.mesh, elements=n_elements))
+    return make_plan(scene, scene.build_mesh())
 
 
 def _check(n_elements: int, memory: int, is_compressed: bool) -> None:

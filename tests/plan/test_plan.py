@@ -182,6 +182,20 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("n_elements", [3000, 10_000])
+def test_the_largest_memory_of_compressed_equations_is_foreseen(n_elements: int) -> None:
+    scene = dataclasses.replace(load_scene("paper-1"), linear_solver=bk.Hierarchical())
+    bk.run(with_overrides(scene, elements=400))  # loads what is loaded on first use
+    tracemalloc.start()
+    try:
+        solution = bk.run(with_overrides(scene, elements=n_elements))
+    finally:
+        tracemalloc.stop()
+    assert solution.plan.is_compressed
+    assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
+
+
 def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plan_of(load_scene("paper-1"))
     check_memory(plan)
