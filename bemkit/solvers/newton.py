@@ -21,6 +21,10 @@ _WEAKEST = 1e-8
 """Springs become weaker by the first factor with every step that ends in the sets it began with, so that a small force
 soon carries the body to where other sets hold it; by the second at most."""
 
+_BEYOND = 1.01
+"""Share of the way to the next node that closes by which a body is carried there: a little beyond it, so that the node
+counts as closed although springs pull it back, and no other one does."""
+
 _NEGLIGIBLE = 100.0
 """Residuals and imbalances below this many times the accuracy of a body mean nothing. Of a direct solver that is 1e-12:
 a certificate asks for 1e-9, but a load of 1e-10 may still carry a body to an obstacle."""
@@ -81,6 +85,20 @@ def spring_stiffness(problem: ContactProblem, state: ContactState) -> float:
     if np.isfinite(nearest) and nearest > 0.0:
         return _SPRING * stiffness / (1.0 + _SPRING * stiffness * nearest / stress)
     return _SPRING * stiffness
+
+
+def carried_on(problem: ContactProblem, before: ContactState, after: ContactState) -> ContactState:
+    """Return a state in which springs hold a body, moved on the way it takes until the next open node closes.
+
+    A force so small that it hardly moves the body against the springs would need ever weaker ones, and these at last
+    let go: a disc that stands on a single node, a little out of balance. If no node closes, it stays where it is.
+    """
+    way, clearance = after.displacement - before.displacement, problem.gap - after.u_n
+    closes = (clearance > 0.0) & (way[:, 0] > 0.0)
+    if not closes.any():
+        return after
+    share = _BEYOND * float(np.min(clearance[closes] / way[closes, 0]))
+    return ContactState(after.displacement + share * way, after.traction)
 
 
 def merit(problem: ContactProblem, residual: Residual) -> float:

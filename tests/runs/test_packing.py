@@ -25,10 +25,13 @@ def test_a_packing_of_twelve_discs_rests() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_packings_of_two_hundred_discs_rest(seed: int) -> None:
-    """Springs throughout, then full steps; of seed 1 a path of 37 pieces where these come back."""
-    check_packing(packing(200, 20.0, seed=seed))
+@pytest.mark.parametrize(("n", "width", "seed"), [(200, 20.0, 0), (200, 20.0, 1), (200, 20.0, 2), (300, 24.0, 1)])
+def test_packings_of_hundreds_of_discs_rest(n: int, width: float, seed: int) -> None:
+    """Springs throughout, then full steps; of 200 discs and seed 1 a path of 37 pieces where these come back.
+
+    Of 300 discs one stands on a single node, out of balance by 1e-8 of its weight, until it is carried to the next.
+    """
+    check_packing(packing(n, width, seed=seed))
 
 
 @pytest.mark.slow

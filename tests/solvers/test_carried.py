@@ -15,6 +15,7 @@ from bemkit.contact.problem import ContactState
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.equilibrium import NOISE_FACTOR, Unbalanced
+from bemkit.solvers.newton import carried_on
 from bemkit.studies.stability.independent_check import check_solution
 from tests.slow import slow_except
 
@@ -91,6 +92,21 @@ def test_a_carried_disc_is_right_or_has_no_answer(
         for push in (0.0, 1e-15, 1e-10, 1e-5, 1e-2):
             scene = carried_disc(distance, push, law=law, solver=driver, discretisation=discretisation)
             assert_right_or_unsolved(scene, distance, push)
+
+
+def test_a_body_that_springs_hold_is_carried_to_the_next_node_alone() -> None:
+    problem = build_model(prepare(scene := carried_disc(0.1), scene.build_mesh())).problem
+    before, way = ContactState(np.zeros((problem.n_contact, 2)), np.ones((problem.n_contact, 2))), np.zeros(2)
+    clearance = np.sort(problem.gap)[:2]
+    assert clearance[1] > 1.1 * clearance[0]
+    way[0] = 1e-9  # towards the wall with all nodes alike
+    after = ContactState(before.displacement + way, before.traction)
+    found = carried_on(problem, before, after)
+    assert np.count_nonzero(found.u_n > problem.gap) == 1
+    np.testing.assert_array_equal(found.traction, after.traction)
+    # away from the wall none closes
+    away = ContactState(before.displacement - way, before.traction)
+    assert carried_on(problem, before, away) is away
 
 
 def test_what_springs_leave_on_a_carried_body_is_no_equilibrium() -> None:
