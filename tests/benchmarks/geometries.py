@@ -73,9 +73,9 @@ def gear() -> bk.Scene:
     return pressed("gear with 40 teeth", wheel, parts=parts)
 
 
-def perforated() -> bk.Scene:
-    """The plate with 40 x 25 holes."""
-    scene = pressed("plate with 1000 holes", Perforated(40, 25))
+def perforated(n_x: int, n_y: int) -> bk.Scene:
+    """A plate with rows of holes."""
+    scene = pressed(f"plate with {n_x * n_y} holes", Perforated(n_x, n_y))
     floor = bk.Contact(bk.HalfPlane((0.0, -1.0), (0.0, 1.0)))
     return replace(scene, parts=(replace(scene.parts[0], condition=floor), scene.parts[1]))
 
@@ -86,7 +86,7 @@ def graded() -> bk.Scene:
     return replace(scene, mesh=bk.MeshOptions(grading=bk.Geometric(0.5, 27)))
 
 
-LEAST = {"holes": 20000}
+LEAST = {"holes-300": 7000, "holes-1000": 20000}
 """Elements that a body needs at least."""
 SCENES = {
     "strip-10": pressed("strip 10 : 1", bk.Rectangle(10.0, 1.0)),
@@ -94,7 +94,9 @@ SCENES = {
     "strip-1000": pressed("strip 1000 : 1", bk.Rectangle(1000.0, 1.0)),
     "graded": graded(),
     "gear": gear(),
-    "holes": perforated(),
+    "holes-100": perforated(10, 10),
+    "holes-300": perforated(20, 15),
+    "holes-1000": perforated(40, 25),
 }
 
 
