@@ -13,6 +13,7 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.outline import Outline
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.notebook import ShownInNotebooks
@@ -36,6 +37,8 @@ _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 4_000
 """Elements of the mesh from whose plan larger ones are told."""
+_OF_SIDE = 4
+"""Elements of a side on a coarse mesh; no mesh has less than one between two ends of sides and parts."""
 _DEGREES = ("constant", "linear", "quadratic")
 
 
@@ -335,16 +338,22 @@ def check_elements(scene: Scene) -> None:
     TooLargeError
         As `check_memory`.
     """
-    n_elements = scene.mesh.elements
-    surface = scene.shape.outline().surface
-    if n_elements is None or n_elements <= _MANY or (surface is not None and surface.is_periodic):
+    n_elements, outline = scene.mesh.elements, scene.shape.outline()
+    few = max(_FEW, few_on(outline))
+    is_periodic = outline.surface is not None and outline.surface.is_periodic
+    if n_elements is None or n_elements <= max(_MANY, few) or is_periodic:
         return
-    plan, growth = _plan_of(scene, _FEW), n_elements / _FEW
+    plan, growth = _plan_of(scene, few), n_elements / few
     if plan.is_compressed:
-        memory = plan.memory + int((growth - 1.0) * (_plan_of(scene, 2 * _FEW).memory - plan.memory))
+        memory = plan.memory + int((growth - 1.0) * (_plan_of(scene, 2 * few).memory - plan.memory))
     else:
         memory = int(growth**2 * plan.memory)
     _check(int(growth * plan.sizes.n_elements), memory, plan.is_compressed)
+
+
+def few_on(outline: Outline) -> int:
+    """Return how many elements an outline takes at least, so that coarse meshes of it are possible."""
+    return _OF_SIDE * len(outline.sides)
 
 
 def _plan_of(scene: Scene, n_elements: int) -> Plan:

@@ -14,7 +14,7 @@ from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage
-from bemkit.plan import make_plan
+from bemkit.plan.plan import few_on, make_plan
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
 from bemkit.runs.history import ONE_BODY, run_history, run_on_mesh, solution_of
@@ -106,14 +106,15 @@ def _gain_by_cascade(scene: Scene) -> int:
     That pays where a contact step costs about as much as all the rest: of periodic half-planes, which have no matrices,
     and of large bodies on compressed equations.
     """
-    n_elements, surface = scene.mesh.n_elements, scene.shape.outline().surface
+    n_elements, outline = scene.mesh.n_elements, scene.shape.outline()
+    surface, least = outline.surface, few_on(outline)
     if scene.n_steps > 1 or not scene.contact_parts:
         return 0
     if surface is not None and surface.is_periodic:
         return 2 if n_elements >= 2 * _COARSEST else 0
-    if n_elements < _RATIO * _COARSEST or surface is not None:
+    if n_elements < _RATIO * max(_COARSEST, least) or surface is not None:
         return 0
-    smaller = replace(scene, mesh=replace(scene.mesh, elements=_LARGE))
+    smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, least)))
     return _RATIO if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
 
 

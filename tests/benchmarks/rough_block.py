@@ -109,7 +109,7 @@ def main() -> None:
             flush=True,
         )
     if options.picture:
-        picture(scene, steps, areas).savefig(options.picture, dpi=110)
+        picture(scene, steps, areas).savefig(options.picture, dpi=80)
 
 
 if __name__ == "__main__":

@@ -137,3 +137,18 @@ def test_large_compressed_scenes_begin_on_coarser_meshes(monkeypatch: pytest.Mon
 def test_a_ratio_of_meshes_below_two_is_refused() -> None:
     with pytest.raises(ValueError, match="ratio = 1: give a whole number from 2 on"):
         run_cascade(scene_of(400), ratio=1)
+
+
+def test_a_body_of_many_sides_takes_no_mesh_that_is_too_coarse_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plate with 40 holes in place of one with 1000, whose 2004 sides are more than 20000 elements divided by 16."""
+    parts = (
+        bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, -1.0), (0.0, 1.0))), sides=("bottom",)),
+        bk.Part("press", bk.Pressure(0.1), sides=("top",)),
+    )
+    scene = scene_of(900, shape=Perforated(8, 5), parts=parts, linear_solver=bk.Hierarchical())
+    for module, name, value in ((run, "_COARSEST", 40), (run, "_LARGE", 50), (plan_module, "_FEW", 50)):
+        monkeypatch.setattr(module, name, value)
+    monkeypatch.setattr(plan_module, "_MANY", 100)
+    check_elements(scene)
+    assert not run._gain_by_cascade(scene)
+    assert run._gain_by_cascade(replace(scene, mesh=replace(scene.mesh, elements=6000))) == 16
