@@ -18,6 +18,7 @@ from bemkit.errors import InputError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.system import HierarchicalSystem
+from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 from bemkit.operators.steklov_poincare.nodal_conditions import Support
@@ -194,6 +195,16 @@ def test_a_certificate_asks_for_no_further_response(monkeypatch: pytest.MonkeyPa
     assert len(solved) == n_responses
     assert body.imbalance(one).is_below(1e-9)  # an earlier one, whose fields take its conditions again
     assert len(solved) > n_responses
+
+
+def test_two_threads_give_the_bits_of_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    solutions = []
+    for count in (1, 2):
+        monkeypatch.setattr(threads, "n_threads", lambda n_integrals, count=count: count)
+        solutions.append(bk.run(in_both_ways(paper(1), 300)[0]))
+    one, two = solutions
+    assert np.array_equal(one.boundary.displacement, two.boundary.displacement)
+    assert np.array_equal(one.contact.sigma_t, two.contact.sigma_t)
 
 
 def test_a_coarse_tolerance_is_stated_and_seen_in_the_certificate() -> None:

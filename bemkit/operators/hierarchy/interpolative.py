@@ -21,6 +21,8 @@ _SPARE = 10
 """Random rows beyond the rank; with fewer of them a decomposition is made anew from more."""
 _SKETCHED = 0.3
 """Tolerance of a sketch by that asked for: LU of random combinations leaves a few times more out than pivoted QR."""
+_ROUND_OFF = 5e-14
+"""No tolerance of a sketch is smaller: pivots below that are round-off of the sums, and would raise the rank."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +167,8 @@ def sketched(
             more = [block.combined(some, first)[:, columns] for block, first in zip(blocks, firsts, strict=False)]
             parts = [np.concatenate(pair) for pair in zip(parts, more, strict=True)] if parts else more
         sketch, scales = _compared(parts, sizes, kinds, is_whole=is_whole)
-        result = interpolative(sketch, tolerance) if is_whole else _of_sketch(sketch, _SKETCHED * tolerance)
+        of_sketch = max(_SKETCHED * tolerance, _ROUND_OFF)
+        result = interpolative(sketch, tolerance) if is_whole else _of_sketch(sketch, of_sketch)
         if result is not None:
             return result.scaled(scales)
         assert guess is not None  # all rows are always enough

@@ -59,6 +59,13 @@ def test_combinations_that_were_too_few_are_kept(monkeypatch: pytest.MonkeyPatch
     assert [each.start for each in taken] == [0, *(each.stop for each in taken[:-1])]
 
 
+def test_round_off_of_rows_is_no_rank() -> None:
+    rng = np.random.default_rng(0)
+    matrix = rng.normal(size=(400, 8)) @ rng.normal(size=(8, 150))
+    matrix *= 1.0 + 1e-15 * rng.normal(size=matrix.shape)
+    assert sketched([Block(matrix, np.ones(400))], np.ones(150), 1e-15, 60).skeleton.size == 8
+
+
 def test_weights_hold_for_the_columns_as_they_are() -> None:
     rng = np.random.default_rng(0)
     matrix, sizes = rng.normal(size=(90, 5)) @ rng.normal(size=(5, 40)), 10.0 ** rng.uniform(-3, 3, 40)
