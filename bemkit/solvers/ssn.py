@@ -41,8 +41,9 @@ _MOST_WITH_SPRINGS = 90
 _MOST_OF_ONE = 3
 """Rigid motions of a single body."""
 
-_MOST_ALIKE = 2
-"""Steps held by springs with the same sets, after which the body is carried to the next node that closes."""
+_MOST_ALIKE = 8
+"""Steps held by springs with the same sets, by which these are at their weakest: then the body is carried to the next
+node that closes."""
 
 _MOST_HELD = 8
 """Full steps with springs after which many costly bodies are held by springs throughout; a wall that leans to 98 % of
