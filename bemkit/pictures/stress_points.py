@@ -23,6 +23,8 @@ from bemkit.results.solved_body import SolvedBody
 
 _STEP = 0.7
 """Distance of the first points inside from the boundary, in lengths of their elements."""
+_SMALLEST = 1.0 / 8.0
+"""Distance from the boundary, by the spacing far from it, below which points are not seen apart."""
 _GROWTH = 2.0
 """Of the distances from the boundary, from one layer of points to the next."""
 _PER_ELEMENT = 2
@@ -145,7 +147,7 @@ def _inner_points(
     """Return layers of points along the inner normals, the denser the shorter the elements, and a grid between them."""
     tree = KDTree(on_boundary)
     layers = []
-    depth = _STEP * lengths
+    depth = np.maximum(_STEP * lengths, _SMALLEST * spacing)
     while (going := depth < 1.5 * spacing).any():
         points = on_boundary[going] - depth[going, None] * normals[going]
         distance, _ = tree.query(points)

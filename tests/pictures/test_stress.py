@@ -24,6 +24,18 @@ def points_of(solution: bk.Solution) -> StressPoints:
     return stress_points(solution, 0.1, shown(solution).frame)
 
 
+def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
+    scene = replace(bk.load_scene("bending"), mesh=bk.MeshOptions(elements=400), discretisation=bk.LinearGalerkin())
+    solution = bk.run(scene)
+    spacing = 20.0 * float(solution.mesh.lengths.max())
+    low, high = solution.mesh.nodes.min(axis=0), solution.mesh.nodes.max(axis=0)
+    found = stress_points(solution, spacing, shown(solution).frame).points
+    distance = np.minimum(found - low, high - found).min(axis=1)
+    inner = distance > 1e-9
+    assert inner.sum() > 20
+    assert distance[inner].min() >= 0.999 * spacing / 8.0
+
+
 @pytest.mark.parametrize(
     ("discretisation", "accuracy"),
     slow_except([("constant", 0.06), ("linear", 0.04), ("quadratic", 0.01)], ("quadratic", 0.01)),
