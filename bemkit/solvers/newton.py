@@ -17,9 +17,9 @@ _SPRING = 1e-3
 springs still carry by about this factor. Not tiny: the response must stay well determined."""
 
 _WEAKER = 0.1
-_WEAKEST = 1e-8
-"""Springs become weaker by the first factor with every step that ends in the sets it began with, so that a small force
-soon carries the body to where other sets hold it; by the second at most."""
+WEAKEST_AFTER = 8
+"""Springs become weaker by the factor with every step that ends in the sets it began with, so that a small force soon
+carries the body to where other sets hold it; so many times at most."""
 
 _BEYOND = 1.01
 """Share of the way to the next node that closes by which a body is carried there: a little beyond it, so that the node
@@ -72,7 +72,7 @@ def respond(equations: ProjectionEquations, residual: Residual, sets: ActiveSets
         floating = floating_response(body, linear)
         if floating is not None:
             return Response(floating.nearest(residual.state.displacement), 2, is_regularised=False)
-        stiffness = spring_stiffness(equations.problem, residual.state) * max(_WEAKER**n_regularised, _WEAKEST)
+        stiffness = spring_stiffness(equations.problem, residual.state) * _WEAKER ** min(n_regularised, WEAKEST_AFTER)
         springs = linear.regularised(residual.state.displacement, stiffness)
         return Response(equations.problem.respond(springs), 2, is_regularised=True)
 

@@ -7,7 +7,7 @@ from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.base import Iterate, Status, check_count, check_max_steps, check_rho
 from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
-from bemkit.solvers.newton import carried_on, merit, negligible, respond
+from bemkit.solvers.newton import WEAKEST_AFTER, carried_on, merit, negligible, respond
 
 PATH_MESSAGE, SPRINGS_MESSAGE = "path of", "springs of"
 """How the messages of steps begin that follow a path of solutions, and that hold all bodies by springs."""
@@ -40,10 +40,6 @@ _MOST_WITH_SPRINGS = 90
 
 _MOST_OF_ONE = 3
 """Rigid motions of a single body."""
-
-_MOST_ALIKE = 8
-"""Steps held by springs with the same sets, by which these are at their weakest: then the body is carried to the next
-node that closes."""
 
 _MOST_HELD = 8
 """Full steps with springs after which many costly bodies are held by springs throughout; a wall that leans to 98 % of
@@ -208,7 +204,7 @@ class SemismoothNewton:
         equations = self._equations(problem)
         response = respond(equations, iterate.residual, iterate.sets, iterate.n_regularised)
         state = response.state
-        if response.is_regularised and iterate.n_regularised >= _MOST_ALIKE:
+        if response.is_regularised and iterate.n_regularised >= WEAKEST_AFTER:
             state = carried_on(problem, iterate.state, state)
         residual = equations.evaluate(state)
         sets = equations.through_stick(residual, iterate.sets)
