@@ -80,9 +80,8 @@ class Solution(SolvedProblem, SolvedBody):
         Of a half-plane that of all tractions but loads, in the mean. None without an estimate and without such
         tractions.
         """
-        if self.mean_traction_errors is not None:
-            size = self.mean_traction_size
-            return float(self.mean_traction_errors.sum()) / size if size > 0.0 else None
+        if self.surface_errors is not None:
+            return self.surface_errors.in_the_mean
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
         from bemkit.results.error_indicators import contact_errors, place_errors
@@ -102,11 +101,7 @@ class Solution(SolvedProblem, SolvedBody):
         Relative to the traction there or to the mean of all, whichever is larger, and without the worst elements on an
         equally small share of what carries tractions: at infinite ones no element is right.
         """
-        if self.local_traction_errors is None or self.mean_traction_size == 0.0:
-            return None
-        from bemkit.results.error_indicators import largest_but_a_share
-
-        return largest_but_a_share(self.local_traction_errors, self.mesh.lengths)
+        return None if self.surface_errors is None else self.surface_errors.largest
 
     @property
     def stated(self) -> Scene:

@@ -19,6 +19,7 @@ from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from bemkit.results.coefficient_decay import CoefficientErrors
+    from bemkit.results.surface_errors import SurfaceErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,37 +139,13 @@ class SolvedBody:
         return squared_errors(self.mesh, make_space, fields.displacement, fields.traction, modulus)
 
     @cached_property
-    def mean_traction_errors(self) -> FloatArray | None:
-        """(n_elements,) array [N/m]: estimated errors of the tractions of a half-plane; None of another body.
-
-        They are zero where loads give the tractions.
-        """
+    def surface_errors(self) -> SurfaceErrors | None:
+        """Estimated errors of the tractions of a half-plane; None of another body."""
         if self.mesh.surface is None:
             return None
-        from bemkit.results.error_indicators import mean_traction_errors
+        from bemkit.results.surface_errors import SurfaceErrors
 
-        return np.where(self._is_loaded, 0.0, mean_traction_errors(self.mesh, self.boundary.traction))
-
-    @cached_property
-    def mean_traction_size(self) -> float:
-        """What they are measured by [N/m]: the integral of the sizes of all tractions but loads."""
-        sizes = np.linalg.norm(self.boundary.traction, axis=1)
-        return float(self.mesh.lengths @ np.where(self._is_loaded, 0.0, sizes))
-
-    @cached_property
-    def local_traction_errors(self) -> FloatArray | None:
-        """(n_elements,) array [-]: the same over the length of each element, relative to its traction.
-
-        Tractions below the mean of those that there are count as that mean.
-        """
-        if self.mean_traction_errors is None:
-            return None
-        lengths, sizes = self.mesh.lengths, np.linalg.norm(self.boundary.traction, axis=1)
-        carrying = float(lengths @ ((sizes > 0.0) & ~self._is_loaded))
-        mean = self.mean_traction_size / carrying if carrying else 1.0
-        from bemkit.results.error_indicators import LOCAL_CALIBRATION
-
-        return np.asarray(LOCAL_CALIBRATION * self.mean_traction_errors / (lengths * np.maximum(sizes, mean)))
+        return SurfaceErrors.of(self.mesh, self.boundary.traction, self._is_loaded)
 
     @property
     def _is_loaded(self) -> BoolArray:

@@ -10,12 +10,13 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
+from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.history import ONE_BODY, run_on_mesh
-from bemkit.runs.history_accuracy import HistoryRefinement
 from bemkit.runs.hp import LayeredMeshes
 from bemkit.runs.mesh_sequence import Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
-from bemkit.runs.steps import solved_history
+from bemkit.runs.step_errors import in_which_step
+from bemkit.runs.steps import joined, solved_history
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -43,7 +44,7 @@ def run_adaptive(
     callback : callable, optional
         Receives a record of every step on every mesh.
     done, finished : optional
-        Of a load history; see `HistoryRefinement`.
+        Of a load history; see `EarlierSteps`.
 
     Returns
     -------
@@ -62,42 +63,37 @@ def run_adaptive(
     contact = [part.name for part in scene.contact_parts]
     first = scene.mesh.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
     accuracy = required_accuracy(scene.mesh)
-    if scene.n_steps > 1:
-        if scene.discretisation.needs_accuracy:
-            raise InputError(
-                f"discretisation is {scene.discretisation.method}, and there are {scene.n_steps} load steps: degrees "
-                "rise for single loads alone: choose 'quadratic', or another fixed degree"
-            )
-        single = _SceneRefinement(DensityMeshes(accuracy), callback)
-        whole = HistoryRefinement(
-            single,
-            lambda level, *known: solved_history(ONE_BODY, [level.scene], level.partition.mesh, callback, *known),
-            done,
-            finished,
+    if scene.n_steps > 1 and scene.discretisation.needs_accuracy:
+        raise InputError(
+            f"discretisation is {scene.discretisation.method}, and there are {scene.n_steps} load steps: degrees "
+            "rise for single loads alone: choose 'quadratic', or another fixed degree"
         )
-        return refined(Level(scene, first), whole, scene.mesh)
-    sequence = LayeredMeshes if scene.discretisation.takes_layers else DensityMeshes
-    return refined(Level(scene, first), _SceneRefinement(sequence(accuracy), callback), scene.mesh)
+    sequence = LayeredMeshes if scene.discretisation.takes_layers and scene.n_steps == 1 else DensityMeshes
+    refinement = _SceneRefinement(sequence(accuracy), callback, EarlierSteps(done, finished))
+    return refined(Level(scene, first), refinement, scene.mesh)
 
 
 @dataclass(frozen=True)
 class _SceneRefinement:
     meshes: MeshSequence
     callback: Callable[[StepRecord], None] | None
+    earlier: EarlierSteps[Solution]
 
     def solved(self, level: Level, start: Solution | None) -> Solution:
-        """Solve a scene from the solution before, and if that leads nowhere from the beginning."""
+        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
         scene, mesh = level.scene, level.partition.mesh
-        if start is not None and scene.contact_parts:
+        if start is not None and scene.contact_parts and scene.n_steps == 1:
             solution = run_on_mesh(scene, mesh, start, self.callback)
             if solution.is_converged:
                 return solution
-        return run_on_mesh(scene, mesh, None, self.callback)
+        return joined(*solved_history(ONE_BODY, [scene], mesh, self.callback, *self.earlier.on(level)))
 
     def error(self, solution: Solution) -> float:
         return self.meshes.error(solution)
 
     def shown_error(self, solution: Solution) -> str:
+        if where := in_which_step(solution):
+            return f"{self.error(solution):.1e}{where}"
         energy, tractions = solution.estimated_error, solution.estimated_traction_error
         of_energy = "unknown" if energy is None else f"{energy:.1e}"
         return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"

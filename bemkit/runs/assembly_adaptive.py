@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import SPREAD, Partition, better_partition
 from bemkit.geometry.vectors import norms
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import resolved_transitions
-from bemkit.runs.assembly import SEVERAL_BODIES, run_assembly
+from bemkit.runs.assembly import SEVERAL_BODIES
 from bemkit.runs.density import SAFETY, error_rate, is_enough, needed_elements, next_size
-from bemkit.runs.history_accuracy import HistoryRefinement
+from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import ZoneEnd, zone_cuts
 from bemkit.runs.refinement import refined, required_accuracy
-from bemkit.runs.steps import solved_history
+from bemkit.runs.step_errors import StepErrors, in_which_step
+from bemkit.runs.steps import joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.solvers.base import StepRecord
 
@@ -43,7 +43,7 @@ def run_assembly_adaptive(
     callback : callable, optional
         Receives a record of every step on every mesh.
     done, finished : optional
-        Of a load history; see `HistoryRefinement`.
+        Of a load history; see `EarlierSteps`.
 
     Returns
     -------
@@ -55,15 +55,8 @@ def run_assembly_adaptive(
     ValueError
         If the assembly has no accuracy, or for the reasons of `bemkit.run`.
     """
-    refinement = _AssemblyRefinement(required_accuracy(assembly.mesh), callback)
-    if assembly.n_steps > 1:
-        whole = HistoryRefinement(
-            refinement,
-            lambda level, *known: solved_history(SEVERAL_BODIES, [level.assembly], level.meshes, callback, *known),
-            done,
-            finished,
-        )
-        return refined(_Level.first(assembly), whole, assembly.mesh)
+    earlier = EarlierSteps(done, finished)
+    refinement = _AssemblyRefinement(required_accuracy(assembly.mesh), callback, earlier)
     return refined(_Level.first(assembly), refinement, assembly.mesh)
 
 
@@ -71,22 +64,25 @@ def run_assembly_adaptive(
 class _AssemblyRefinement:
     accuracy: float
     callback: Callable[[StepRecord], None] | None
+    earlier: EarlierSteps[AssemblySolution]
 
     def solved(self, level: _Level, start: AssemblySolution | None) -> AssemblySolution:
         """Solve from the beginning: contact nodes of several bodies are not carried from mesh to mesh."""
-        return run_assembly(level.assembly, meshes=level.meshes, callback=self.callback)
+        known = self.earlier.on(level)
+        return joined(*solved_history(SEVERAL_BODIES, [level.assembly], level.meshes, self.callback, *known))
 
     def error(self, solution: AssemblySolution) -> float:
-        return float("inf") if solution.estimated_error is None else solution.estimated_error
+        return StepErrors.of(solution).energy
 
     def shown_error(self, solution: AssemblySolution) -> str:
-        return f"{self.error(solution):.1e}"
+        return f"{self.error(solution):.1e}{in_which_step(solution)}"
 
     def is_enough(self, solutions: Sequence[AssemblySolution]) -> bool:
-        return is_enough([self.error(each) for each in solutions], zone_ends(solutions[-1]), self.accuracy)
+        ends = zone_ends(StepErrors.of(solutions[-1]).worst)
+        return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
 
     def following(self, level: _Level, solutions: Sequence[AssemblySolution]) -> _Level:
-        return level.following(solutions[-1], self.accuracy)
+        return level.following(StepErrors.of(solutions[-1]), self.accuracy)
 
     def excess(self, level: _Level, most_elements: int) -> str:
         """Compare the number of elements of a body, on average; copies count as one."""
@@ -131,25 +127,21 @@ class _Level:
         """Number of elements of all bodies."""
         return sum(len(self.partitions[key].sides) for key in self.keys.values())
 
-    def following(self, solution: AssemblySolution, accuracy: float) -> _Level:
+    def following(self, errors: StepErrors[AssemblySolution], accuracy: float) -> _Level:
         """Return partitions whose density follows the estimated errors."""
-        results = solution.bodies
+        solution = errors.worst
         rate = error_rate(
-            min(body.scene.discretisation.displacement_space(body.mesh).degree for body in results.values())
+            min(body.scene.discretisation.displacement_space(body.mesh).degree for body in solution.solved_bodies)
         )
         worst: dict[int, FloatArray] = {}
-        for name, key in self.keys.items():
-            own = _errors(results[name])
+        for key, own in zip(self.keys.values(), errors.required(), strict=True):
             worst[key] = np.maximum(worst.get(key, own), own)
-        errors = [worst[key] for key in self.keys.values()]
-        allowed = (SAFETY * accuracy) ** 2 * solution.error_unit
-        needed = needed_elements(np.concatenate(errors), rate, allowed)
-        ends_of_bodies = np.cumsum([len(own) for own in errors])[:-1]
+        of_bodies = [worst[key] for key in self.keys.values()]
+        needed = needed_elements(np.concatenate(of_bodies), rate, (SAFETY * accuracy) ** 2 * errors.unit)
+        ends_of_bodies = np.cumsum([len(own) for own in of_bodies])[:-1]
         densities = dict(zip(self.keys.values(), np.split(needed, ends_of_bodies), strict=True))
         total = float(needed.sum())
-        error = solution.estimated_error
-        is_accurate = error is not None and error <= accuracy
-        n_elements = next_size(solution.n_elements, total / (1.0 - SPREAD), is_accurate=is_accurate)
+        n_elements = next_size(solution.n_elements, total / (1.0 - SPREAD), is_accurate=errors.energy <= accuracy)
         ends = zone_ends(solution)
         better = {}
         for key, partition in self.partitions.items():
@@ -185,9 +177,3 @@ def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple
     along = np.clip(np.sum((point - start) * chord, axis=1) / np.sum(chord**2, axis=1), 0.0, 1.0)
     k = int(np.argmin(norms(start + along[:, None] * chord - point)))
     return int(elements[k]), float(along[k])
-
-
-def _errors(body: BodyResult) -> FloatArray:
-    if body.element_errors is None:
-        raise InputError(f"body {body.name!r}: collocation has no error estimate: choose a Galerkin discretisation")
-    return body.element_errors

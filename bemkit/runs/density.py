@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.errors import InputError
+from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import LEAST_DENSITY, SPREAD, better_partition
 from bemkit.results.solution import Solution
+from bemkit.results.surface_errors import SurfaceErrors
 from bemkit.runs.mesh_sequence import Level, ZoneEnd, zone_cuts, zone_ends
+from bemkit.runs.step_errors import StepErrors
 
 LARGEST_GROWTH = 2.5
 """Factor between the numbers of elements of two meshes: the places where the status changes must keep up."""
@@ -54,13 +56,11 @@ class DensityMeshes:
 
     def error(self, solution: Solution) -> float:
         """Return the estimated error in the energy norm, of a half-plane those of its tractions if they are larger."""
-        if solution.estimated_error is None:
-            return float("inf")
-        errors = [solution.estimated_error]
-        if solution.mean_traction_errors is not None:
-            errors.append(solution.estimated_traction_error or 0.0)
-            errors.append((solution.estimated_local_traction_error or 0.0) * self.accuracy / self._local_accuracy)
-        return max(errors)
+        errors = StepErrors.of(solution)
+        if errors.surface is None:
+            return errors.energy
+        local = (errors.surface.largest or 0.0) * self.accuracy / self._local_accuracy
+        return max(errors.energy, errors.surface.in_the_mean or 0.0, local)
 
     @property
     def _local_accuracy(self) -> float:
@@ -68,25 +68,25 @@ class DensityMeshes:
 
     def is_enough(self, solutions: Sequence[Solution]) -> bool:
         """Tell whether the estimated error is small enough, and the elements in which the status changes short."""
-        return is_enough([self.error(each) for each in solutions], zone_ends(solutions[-1]), self.accuracy)
+        ends = zone_ends(StepErrors.of(solutions[-1]).worst)
+        return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
 
     def following(self, level: Level, solutions: Sequence[Solution]) -> Level:
         """Return a mesh whose density follows the estimated errors."""
-        solution = solutions[-1]
-        if solution.element_errors is None:
-            raise InputError("collocation has no error estimate: choose a Galerkin discretisation")
-        rate, goal = error_rate(solution.scene.discretisation.displacement_space(solution.mesh).degree), self.accuracy
-        density = needed_elements(solution.element_errors, rate, (SAFETY * goal) ** 2 * solution.error_unit)
-        if solution.mean_traction_errors is not None:
-            allowed = SAFETY * goal * solution.mean_traction_size
-            density = np.maximum(density, needed_elements(solution.mean_traction_errors, MEAN_RATE, allowed))
-            density = np.maximum(density, _needed_locally(solution, LOCAL_SAFETY * self._local_accuracy))
-            density = _gradual(density, solution)
+        solution, errors, goal = solutions[-1], StepErrors.of(solutions[-1]), self.accuracy
+        mesh, (squared,) = solution.mesh, errors.required()
+        rate = error_rate(solution.scene.discretisation.displacement_space(mesh).degree)
+        density = needed_elements(squared, rate, (SAFETY * goal) ** 2 * errors.unit)
+        if errors.surface is not None:
+            allowed = SAFETY * goal * errors.surface.total
+            density = np.maximum(density, needed_elements(errors.surface.errors, MEAN_RATE, allowed))
+            density = np.maximum(density, _needed_locally(errors.surface, LOCAL_SAFETY * self._local_accuracy))
+            density = _gradual(density, mesh)
         parts = [part.name for part in solution.scene.contact_parts]
-        spread = (SPREAD if solution.mesh.surface is None else HALF_PLANE_SPREAD) if parts else 0.0
+        spread = (SPREAD if mesh.surface is None else HALF_PLANE_SPREAD) if parts else 0.0
         is_accurate = self.error(solution) <= goal
         n_elements = int(next_size(solution.n_elements, float(density.sum()) / (1.0 - spread), is_accurate=is_accurate))
-        cuts = zone_cuts(level.partition, zone_ends(solution))
+        cuts = zone_cuts(level.partition, zone_ends(errors.worst))
         partition = better_partition(
             level.partition,
             density,
@@ -94,7 +94,7 @@ class DensityMeshes:
             cuts=cuts,
             spread_over=parts,
             spread=spread,
-            idle=_idle_elements(solution),
+            idle=_idle_elements(errors.worst),
         )
         return replace(level, partition=partition)
 
@@ -130,13 +130,12 @@ def needed_elements(errors: FloatArray, rate: int, allowed: float) -> FloatArray
     return density * (float(density.sum()) / allowed) ** (1.0 / rate) if allowed > 0.0 else density
 
 
-def _needed_locally(solution: Solution, allowed: float) -> FloatArray:
+def _needed_locally(surface: SurfaceErrors, allowed: float) -> FloatArray:
     """Return how many elements should replace each one of a half-plane, so that its own error is allowed.
 
     The worst elements may stay as they are where they are no more than an allowed share of all.
     """
-    errors, lengths = solution.local_traction_errors, solution.mesh.lengths
-    assert errors is not None
+    errors, lengths = surface.local, surface.lengths
     order = np.argsort(-errors)
     is_short = np.cumsum(lengths[order]) <= allowed * float(lengths[errors > 0.0].sum())
     errors = errors.copy()
@@ -144,9 +143,9 @@ def _needed_locally(solution: Solution, allowed: float) -> FloatArray:
     return np.asarray((errors / allowed) ** (1.0 / MEAN_RATE))
 
 
-def _gradual(density: FloatArray, solution: Solution) -> FloatArray:
+def _gradual(density: FloatArray, mesh: BoundaryMesh) -> FloatArray:
     """Raise densities on a half-plane until wanted lengths grow by no more than `LENGTH_GROWTH` of the distance."""
-    lengths, place = solution.mesh.lengths, solution.mesh.centres[:, 0]
+    lengths, place = mesh.lengths, mesh.centres[:, 0]
     distance = np.maximum(np.abs(place[:, None] - place) - 0.5 * lengths, 0.0)
     wanted = np.min(lengths / np.maximum(density, LEAST_DENSITY) + LENGTH_GROWTH * distance, axis=1)
     return np.asarray(lengths / wanted)

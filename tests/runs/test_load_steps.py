@@ -14,7 +14,7 @@ from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare_steps
 from bemkit.results.load_history import LoadHistory, StepWork
 from bemkit.runs import load_path
-from bemkit.runs.history_accuracy import worst_of
+from bemkit.runs.step_errors import StepErrors
 from bemkit.scene.load_history import load_steps
 from bemkit.solvers.base import Status
 from bemkit.studies.stability.independent_check import check_solution
@@ -305,12 +305,13 @@ def test_histories_of_bodies_with_an_accuracy() -> None:
 def test_the_worst_step_guides_the_mesh() -> None:
     """Errors are the largest of all steps on every element, measured by the largest energy."""
     steps = bk.run_history([replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=3)))])
-    guide, errors = worst_of(steps), np.array([step.element_errors for step in steps])
+    guide, errors = StepErrors(steps), np.array([step.element_errors for step in steps])
     unit = max(step.error_unit for step in steps)
-    assert guide.estimated_error == pytest.approx(np.sqrt(errors.max(axis=0).sum() / unit), rel=1e-14)
-    relative = guide.element_errors / guide.error_unit
-    np.testing.assert_allclose(relative, errors.max(axis=0) / unit, rtol=1e-14)
-    assert guide.estimated_error >= max(np.sqrt(own.sum() / unit) for own in errors)
+    assert guide.unit == unit
+    np.testing.assert_array_equal(guide.required(), [errors.max(axis=0)])
+    assert guide.energy == pytest.approx(np.sqrt(errors.max(axis=0).sum() / unit), rel=1e-14)
+    assert guide.energy >= max(np.sqrt(own.sum() / unit) for own in errors)
+    assert guide.worst is steps[int(np.argmax(errors.sum(axis=1)))]
 
 
 def test_degrees_do_not_rise_in_histories() -> None:

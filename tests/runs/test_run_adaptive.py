@@ -14,6 +14,7 @@ import bemkit.runs.adaptive
 from bemkit.geometry.meshing.partition import STEEPEST
 from bemkit.reference import DiscBetweenPlates
 from bemkit.runs.adaptive import _expected_seconds, run_adaptive
+from bemkit.runs.mesh_sequence import Level
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
 
@@ -156,12 +157,13 @@ def test_times_and_solves_are_those_of_all_meshes() -> None:
 def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = paper(1, mesh=bk.MeshOptions(accuracy=1e-3))
 
-    def failing(scene: bk.Scene, mesh: bk.BoundaryMesh, start: bk.Solution | None, callback: Any) -> bk.Solution:
-        solution = bk.run(scene, mesh=mesh, start=start)
-        is_first = mesh.n_elements < 100
-        return solution if is_first else dataclasses.replace(solution, status=bk.Status.STALLED)
+    solved = bemkit.runs.adaptive._SceneRefinement.solved
 
-    monkeypatch.setattr(bemkit.runs.adaptive, "run_on_mesh", failing)
+    def failing(refinement: Any, level: Level, start: bk.Solution | None) -> bk.Solution:
+        solution = solved(refinement, level, start)
+        return solution if level.n_elements < 100 else dataclasses.replace(solution, status=bk.Status.STALLED)
+
+    monkeypatch.setattr(bemkit.runs.adaptive._SceneRefinement, "solved", failing)
     failed, best = run_adaptive(scene)
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED

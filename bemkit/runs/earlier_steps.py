@@ -1,0 +1,50 @@
+"""Steps of a load history with an accuracy that an earlier run has solved on one of its meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.runs.refinement import SizedLevel
+
+AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
+
+_SAME = 1e-9
+"""Relative difference of the lengths of equal elements, in the coordinates of the shape and in those of its place."""
+
+
+@dataclass(frozen=True)
+class EarlierSteps(Generic[AnySolution]):
+    """What was solved before, and who hears of what is solved now.
+
+    Parameters
+    ----------
+    done : Solution or AssemblySolution, optional
+        Some steps on one of the meshes; meshes before that one are solved again, unheard.
+    finished : callable, optional
+        Receives the result of all steps so far on a mesh after each of them but the last.
+    """
+
+    done: AnySolution | None = None
+    finished: Callable[[AnySolution], None] | None = None
+
+    def on(self, level: SizedLevel) -> tuple[AnySolution | None, Callable[[AnySolution], None] | None]:
+        """Return the steps that are done on the meshes of a level, and who hears of others there."""
+        if self.done is None:
+            return None, self.finished
+        if _has_meshes(self.done, level.meshes):
+            return self.done, self.finished
+        return None, None if level.n_elements < self.done.n_elements else self.finished
+
+
+def _has_meshes(solution: Solution | AssemblySolution, meshes: Mapping[str, BoundaryMesh]) -> bool:
+    """Tell whether a solution is one on these meshes, wherever its bodies lie."""
+    own = {"": solution.mesh} if isinstance(solution, Solution) else {k: v.mesh for k, v in solution.bodies.items()}
+    pairs = [(own[name].lengths, mesh.lengths) for name, mesh in meshes.items()]
+    return all(one.shape == two.shape and np.allclose(one, two, rtol=_SAME, atol=0.0) for one, two in pairs)

@@ -1,0 +1,100 @@
+"""Estimated errors of all load steps on one mesh: what the next mesh follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from bemkit.arrays import FloatArray
+from bemkit.errors import InputError
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.solution import Solution
+from bemkit.results.surface_errors import SurfaceErrors
+
+AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
+
+
+@dataclass(frozen=True, eq=False)
+class StepErrors(Generic[AnySolution]):
+    """The largest errors of all steps on each element.
+
+    The largest energy among the steps measures all of them, so that those of an unloaded body are not measured by
+    nothing.
+
+    Parameters
+    ----------
+    steps : sequence of Solution or AssemblySolution
+        On one mesh of each body.
+    """
+
+    steps: Sequence[AnySolution]
+
+    @classmethod
+    def of(cls, solution: AnySolution) -> StepErrors[AnySolution]:
+        """Return the errors of all finished steps of a solution; a single load is one step."""
+        ends: list[Any] = [] if solution.loading is None else [step.end for step in solution.loading.steps]
+        return cls(ends or [solution])
+
+    @cached_property
+    def unit(self) -> float:
+        """What squared errors in the energy norm are measured by [J/m]."""
+        return max(step.error_unit for step in self.steps)
+
+    @cached_property
+    def bodies(self) -> list[FloatArray] | None:
+        """(n_elements,) arrays [J/m]: squared errors in the energy norm of each body; None without an estimate."""
+        errors = [[body.element_errors for body in step.solved_bodies] for step in self.steps]
+        known = [[own for own in of_step if own is not None] for of_step in errors]
+        if any(len(own) < len(each) for own, each in zip(known, errors, strict=True)):
+            return None
+        return [np.max(of_body, axis=0) for of_body in zip(*known, strict=True)]
+
+    def required(self) -> list[FloatArray]:
+        """Return the errors of each body.
+
+        Raises
+        ------
+        InputError
+            Without an estimate.
+        """
+        if self.bodies is None:
+            raise InputError("collocation has no error estimate: choose a Galerkin discretisation")
+        return self.bodies
+
+    @property
+    def energy(self) -> float:
+        """Relative error in the energy norm; infinite without an estimate, and if it is measured by nothing."""
+        if self.bodies is None:
+            return float("inf")
+        squared = sum(float(own.sum()) for own in self.bodies)
+        if squared == 0.0:
+            return 0.0
+        return float(np.sqrt(squared / self.unit)) if self.unit > 0.0 else float("inf")
+
+    @cached_property
+    def worst(self) -> AnySolution:
+        """The step with the largest error, at whose places of change a mesh is cut; without an estimate the last."""
+        if len(self.steps) == 1 or self.bodies is None:
+            return self.steps[-1]
+        totals = [
+            sum(float(body.element_errors.sum()) for body in step.solved_bodies if body.element_errors is not None)
+            for step in self.steps
+        ]
+        return self.steps[int(np.argmax(totals))]
+
+    @cached_property
+    def surface(self) -> SurfaceErrors | None:
+        """Errors of the tractions of a half-plane; None of other bodies."""
+        errors = [body.surface_errors for step in self.steps for body in step.solved_bodies]
+        known = [each for each in errors if each is not None]
+        own = self.worst.solved_bodies[0].surface_errors
+        return None if own is None else own.at_worst(known)
+
+
+def in_which_step(solution: Solution | AssemblySolution) -> str:
+    """Return what follows an error in words: nothing of a single load."""
+    return "" if solution.stated.n_steps == 1 else " in one of the steps"
