@@ -13,9 +13,11 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import SlipHistory
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes
+from bemkit.results.contact_table import resolved_transitions
 from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
+from bemkit.results.zone_ends import Side, ZoneEnd
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 
@@ -150,17 +152,96 @@ class AssemblySolution(SolvedProblem):
         return violations_between_bodies(self.assembly, self.bodies, self.rigid, self.contact, motion)
 
     def contact_elements(self, body: str) -> IntArray:
-        """Return the elements of a body that may touch other bodies."""
-        mesh = self.bodies[body].mesh
+        """Return the elements of a body that may touch other bodies or obstacles.
+
+        Without those at edges that press into another side: pressures there have no bound.
+        """
+        own = self.bodies[body]
         sides = [side.split(".", 1) for pair in self.assembly.contacts for side in pair.elastic_sides]
         parts = dict.fromkeys(part for owner, part in sides if owner == body)
-        return np.concatenate([np.zeros(0, np.intp), *(mesh.part(part) for part in parts)])
+        parts.update(dict.fromkeys(part.name for part in own.scene.contact_parts))
+        at_edges = [
+            side.elements_at(point) for one, two, point, _ in self._edges for side in (one, two) if side.body == body
+        ]
+        elements = np.concatenate([np.zeros(0, np.intp), *(own.mesh.part(part) for part in parts)])
+        return np.setdiff1d(elements, np.concatenate([np.zeros(0, np.intp), *at_edges]))
+
+    def _sides_of(self, contact: str) -> list[Side]:
+        """Return the sides of a contact of the table, of an obstacle the one that there is."""
+        names = (side.split(".", 1) for side in self._elastic_sides.get(contact, (contact,)))
+        return [Side(body, self.bodies[body].mesh, part) for body, part in names]
+
+    @cached_property
+    def _elastic_sides(self) -> dict[str, tuple[str, ...]]:
+        return {pair.name: pair.elastic_sides for pair in self.assembly.contacts}
+
+    @cached_property
+    def zone_ends(self) -> tuple[ZoneEnd, ...]:
+        """Where zones of one status end, on all sides, as far as they are resolved; see `resolved_transitions`."""
+        resolved = resolved_transitions(self.contact, self.transitions)
+        return tuple(
+            side.near(np.array([transition.x, transition.y]))
+            for transition in resolved
+            for side in self._sides_of(transition.part)
+        )
+
+    @cached_property
+    def _edges(self) -> list[tuple[Side, Side, FloatArray, ZoneEnd]]:
+        """Two sides, the point where the second ends inside the first, and where that is on the first."""
+        pairs = [self._sides_of(pair.name) for pair in self.assembly.elastic_contacts]
+        ordered = [order for one, two in pairs for order in ((one, two), (two, one))]
+        return [(own, other, *edge) for own, other in ordered for edge in own.edges(other)]
+
+    @property
+    def facing_ends(self) -> tuple[ZoneEnd, ...]:
+        """Where a side ends inside another one that it lies on: its edge presses into that."""
+        return tuple(place for _, _, _, place in self._edges)
+
+    @property
+    def contact_traction_size(self) -> float:
+        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]: those between two bodies count on either."""
+        table = self.contact
+        squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
+        return float(
+            np.sqrt(
+                sum(
+                    len(self._elastic_sides.get(each, (each,))) * squared[table.rows(each)].sum()
+                    for each in table.parts
+                )
+            )
+        )
+
+    @cached_property
+    def estimated_traction_error(self) -> float | None:
+        """Estimated error of the contact tractions of all bodies in L2, relative to them.
+
+        From degree 3 on; None of other elements, and without such tractions. Elements at edges that press into another
+        side are left out, see `contact_elements`.
+        """
+        size, known = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
+        if size == 0.0 or any(each is None for each in known):
+            return None
+        from bemkit.results.error_indicators import place_error
+
+        elements = {name: self.contact_elements(name) for name in self.bodies}
+        squared = sum(
+            float(errors.traction[elements[name]].sum())
+            for name, errors in zip(self.bodies, known, strict=True)
+            if errors is not None
+        )
+        for transition in self.transitions:
+            for side in self._sides_of(transition.part):
+                end = side.near(np.array([transition.x, transition.y]))
+                if end.element in elements[side.body]:
+                    squared += place_error(self.contact, transition, self.transitions, end)
+        return float(np.sqrt(squared)) / size
 
     def _sizes(self) -> dict[str, int]:
         return {"n_bodies": len(self.bodies)}
 
     def _parts(self) -> dict[str, Any]:
         return {
+            "estimated_traction_error": self.estimated_traction_error,
             "contacts": [contact.as_dict() for contact in self.contacts],
             "bodies": {name: body.summary() for name, body in self.bodies.items()},
             "rigid": {name: body.as_dict() for name, body in self.rigid.items()},

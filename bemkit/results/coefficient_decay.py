@@ -8,6 +8,7 @@ that elements at corners, where fields are singular and one-sided, are judged li
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,6 +48,20 @@ class CoefficientErrors:
     traction: FloatArray
     energy_decay: FloatArray
     traction_decay: FloatArray
+
+    @classmethod
+    def joined(cls, several: Sequence[CoefficientErrors]) -> CoefficientErrors:
+        """Return the errors of all elements, one list after the other."""
+        return cls(
+            *(np.concatenate(columns) for columns in zip(*(vars(each).values() for each in several), strict=True))
+        )
+
+    @classmethod
+    def at_worst(cls, copies: Sequence[CoefficientErrors]) -> CoefficientErrors:
+        """Return the largest errors of copies of a body on each element, as often as there are copies."""
+        columns = zip(*(vars(each).values() for each in copies), strict=True)
+        energy, traction, *decays = (np.max(column, axis=0) for column in columns)
+        return cls(len(copies) * energy, len(copies) * traction, *decays)
 
     def at_higher_degrees(self, rise: IntArray) -> CoefficientErrors:
         """Return what the errors would be with so many (n_elements,) degrees more."""

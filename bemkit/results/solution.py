@@ -23,6 +23,7 @@ from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
+from bemkit.results.zone_ends import ZoneEnd, zone_ends_on
 from bemkit.scene.scene import Scene
 
 
@@ -143,6 +144,11 @@ class Solution(SolvedProblem, SolvedBody):
     def contact_elements(self) -> IntArray:
         """The elements of all contact parts."""
         return np.concatenate([np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)])
+
+    @cached_property
+    def zone_ends(self) -> tuple[ZoneEnd, ...]:
+        """Where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
+        return tuple(zone_ends_on(self.mesh, self.contact, self.transitions))
 
     @property
     def contact_traction_size(self) -> float:

@@ -1,22 +1,25 @@
-"""Meshes that follow the solution until the accuracy asked for is reached."""
+"""Meshes of one body or of several that follow the solution until the accuracy asked for is reached."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Generic
 
 from bemkit.errors import InputError
-from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.plan import make_plan
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
+from bemkit.runs.assembly import SEVERAL_BODIES
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.history import ONE_BODY, run_on_mesh
 from bemkit.runs.hp import LayeredMeshes
-from bemkit.runs.mesh_sequence import Level, MeshSequence
+from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, MeshSequence
 from bemkit.runs.refinement import refined, required_accuracy
 from bemkit.runs.step_errors import in_which_step
-from bemkit.runs.steps import joined, solved_history
+from bemkit.runs.steps import Kind, joined, solved_history
+from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import StepRecord
 
@@ -60,63 +63,122 @@ def run_adaptive(
     ValueError
         If the scene has no accuracy, degrees shall rise in a load history, or for the reasons of `bemkit.run`.
     """
-    contact = [part.name for part in scene.contact_parts]
-    first = scene.mesh.first_partition(scene.shape.outline(), scene.selections, contact, scene.symmetry)
-    accuracy = required_accuracy(scene.mesh)
-    if scene.n_steps > 1 and scene.discretisation.needs_accuracy:
+    return refined(
+        Level.first(scene), _SceneRefinement(_rule(scene), callback, EarlierSteps(done, finished)), scene.mesh
+    )
+
+
+def run_assembly_adaptive(
+    assembly: Assembly,
+    *,
+    callback: Callable[[StepRecord], None] | None = None,
+    done: AssemblySolution | None = None,
+    finished: Callable[[AssemblySolution], None] | None = None,
+) -> tuple[AssemblySolution, ...]:
+    """Solve an assembly on a sequence of meshes until the estimated error is below its accuracy.
+
+    All bodies are divided anew after each solve, as in `run_adaptive`; both sides of a contact get nodes where its
+    status changes. Copies keep one mesh in common, as fine as the worst of them needs.
+
+    Parameters
+    ----------
+    assembly : Assembly
+        With `MeshOptions.accuracy`.
+    callback : callable, optional
+        Receives a record of every step on every mesh.
+    done, finished : optional
+        Of a load history; see `EarlierSteps`.
+
+    Returns
+    -------
+    tuple of AssemblySolution
+        One for each mesh, the best one last; see `run_adaptive`.
+
+    Raises
+    ------
+    ValueError
+        If the assembly has no accuracy, or for the reasons of `bemkit.run`.
+    """
+    refinement = _AssemblyRefinement(_rule(assembly), callback, EarlierSteps(done, finished))
+    return refined(Level.first(assembly), refinement, assembly.mesh)
+
+
+def _rule(problem: Scene | Assembly) -> MeshSequence[Any]:
+    """Return how better meshes are made: in layers for elements of high degree, if there is a single load."""
+    accuracy = required_accuracy(problem.mesh)
+    own = [problem.discretisation]
+    if isinstance(problem, Assembly):
+        own = [body.discretisation or problem.discretisation for body in problem.bodies]
+    if problem.n_steps > 1 and any(each.needs_accuracy for each in own):
         raise InputError(
-            f"discretisation is {scene.discretisation.method}, and there are {scene.n_steps} load steps: degrees "
-            "rise for single loads alone: choose 'quadratic', or another fixed degree"
+            f"discretisation is 'hp', and there are {problem.n_steps} load steps: degrees rise for single loads alone: "
+            "choose 'quadratic', or another fixed degree"
         )
-    sequence = LayeredMeshes if scene.discretisation.takes_layers and scene.n_steps == 1 else DensityMeshes
-    refinement = _SceneRefinement(sequence(accuracy), callback, EarlierSteps(done, finished))
-    return refined(Level(scene, first), refinement, scene.mesh)
+    takes_layers = all(each.takes_layers for each in own) and problem.n_steps == 1
+    return LayeredMeshes(accuracy) if takes_layers else DensityMeshes(accuracy)
 
 
 @dataclass(frozen=True)
-class _SceneRefinement:
-    meshes: MeshSequence
+class _Refinement(Generic[AnyScene, AnySolution]):
+    """What one body and several have in common."""
+
+    meshes: MeshSequence[AnySolution]
     callback: Callable[[StepRecord], None] | None
-    earlier: EarlierSteps[Solution]
+    earlier: EarlierSteps[AnySolution]
 
-    def solved(self, level: Level, start: Solution | None) -> Solution:
-        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
-        scene, mesh = level.scene, level.partition.mesh
-        if start is not None and scene.contact_parts and scene.n_steps == 1:
-            solution = run_on_mesh(scene, mesh, start, self.callback)
-            if solution.is_converged:
-                return solution
-        return joined(*solved_history(ONE_BODY, [scene], mesh, self.callback, *self.earlier.on(level)))
+    def _solved(self, kind: Kind[Any, AnySolution], level: Level[AnyScene], meshes: Any) -> AnySolution:
+        return joined(*solved_history(kind, [level.scene], meshes, self.callback, *self.earlier.on(level)))
 
-    def error(self, solution: Solution) -> float:
+    def error(self, solution: AnySolution) -> float:
         return self.meshes.error(solution)
 
-    def shown_error(self, solution: Solution) -> str:
+    def shown_error(self, solution: AnySolution) -> str:
         if where := in_which_step(solution):
             return f"{self.error(solution):.1e}{where}"
         energy, tractions = solution.estimated_error, solution.estimated_traction_error
         of_energy = "unknown" if energy is None else f"{energy:.1e}"
         return of_energy if tractions is None else f"{of_energy}, of contact tractions {tractions:.1e}"
 
-    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
         return self.meshes.is_enough(solutions)
 
-    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
+    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
         following = self.meshes.following(level, solutions)
         if following is not None:
-            _ = following.partition.mesh  # whatever is wrong with it is said now
+            _ = following.meshes  # whatever is wrong with them is said now
         return following
 
-    def excess(self, level: Level, most_elements: int) -> str:
-        """Compare the number of elements; of high degree, of quadratic elements with as many nodes."""
-        degree = level.scene.discretisation.displacement_space(level.partition.mesh).degree
-        n_elements = len(level.partition.sides) * max(degree, 2) // 2
-        return f"{most_elements} elements" if n_elements > most_elements else ""
+    def excess(self, level: Level[AnyScene], most_elements: int) -> str:
+        """Compare the number of elements of a body, on average; of high degree, of quadratic ones with as many nodes.
 
-    def expected_seconds(self, level: Level, solution: Solution, spent: float) -> float:
-        return _expected_seconds(solution, spent, level.scene, level.partition.mesh)
+        Copies count as one.
+        """
+        degree = level.scene.discretisation.displacement_space(level.partitions[0].mesh).degree
+        n_elements = sum(len(partition.sides) for partition in level.partitions) // len(level.partitions)
+        of_each = " a body" if len(level.keys) > 1 else ""
+        return f"{most_elements} elements{of_each}" if n_elements * max(degree, 2) // 2 > most_elements else ""
 
 
-def _expected_seconds(solution: Solution, spent: float, scene: Scene, mesh: BoundaryMesh) -> float:
-    """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
-    return spent * make_plan(scene, mesh).seconds / solution.plan.seconds
+class _SceneRefinement(_Refinement[Scene, Solution]):
+    def solved(self, level: Level[Scene], start: Solution | None) -> Solution:
+        """Solve a single load from the solution before, and if that leads nowhere from the beginning."""
+        scene, mesh = level.scene, level.partition.mesh
+        if start is not None and scene.contact_parts and scene.n_steps == 1:
+            solution = run_on_mesh(scene, mesh, start, self.callback)
+            if solution.is_converged:
+                return solution
+        return self._solved(ONE_BODY, level, mesh)
+
+    def expected_seconds(self, level: Level[Scene], solution: Solution, spent: float) -> float:
+        """Return how long the next mesh will take: what the last one took, in the proportion of their plans."""
+        return spent * make_plan(level.scene, level.partition.mesh).seconds / solution.plan.seconds
+
+
+class _AssemblyRefinement(_Refinement[Assembly, AssemblySolution]):
+    def solved(self, level: Level[Assembly], start: AssemblySolution | None) -> AssemblySolution:
+        """Solve from the beginning: contact nodes of several bodies are not carried from mesh to mesh."""
+        return self._solved(SEVERAL_BODIES, level, level.meshes)
+
+    def expected_seconds(self, level: Level[Assembly], solution: AssemblySolution, spent: float) -> float:
+        """Return how long the next meshes will take."""
+        return spent * (level.n_elements / solution.n_elements) ** 2

@@ -9,9 +9,8 @@ from typing import Any, overload
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import check_result_target, read_result, write_result
 from bemkit.results.solution import Solution
-from bemkit.runs.adaptive import run_adaptive
+from bemkit.runs.adaptive import run_adaptive, run_assembly_adaptive
 from bemkit.runs.assembly import SEVERAL_BODIES
-from bemkit.runs.assembly_adaptive import run_assembly_adaptive
 from bemkit.runs.history import ONE_BODY
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly

@@ -10,9 +10,10 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import LEAST_DENSITY, SPREAD, better_partition
-from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
 from bemkit.results.surface_errors import SurfaceErrors
-from bemkit.runs.mesh_sequence import Level, ZoneEnd, zone_cuts, zone_ends
+from bemkit.results.zone_ends import ZoneEnd
+from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, zone_cuts
 from bemkit.runs.step_errors import StepErrors
 
 LARGEST_GROWTH = 2.5
@@ -54,7 +55,7 @@ class DensityMeshes:
 
     accuracy: float
 
-    def error(self, solution: Solution) -> float:
+    def error(self, solution: AnySolution) -> float:
         """Return the estimated error in the energy norm, of a half-plane those of its tractions if they are larger."""
         errors = StepErrors.of(solution)
         if errors.surface is None:
@@ -66,37 +67,48 @@ class DensityMeshes:
     def _local_accuracy(self) -> float:
         return max(self.accuracy, LEAST_LOCAL)
 
-    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
         """Tell whether the estimated error is small enough, and the elements in which the status changes short."""
-        ends = zone_ends(StepErrors.of(solutions[-1]).worst)
+        ends = StepErrors.of(solutions[-1]).worst.zone_ends
         return is_enough([self.error(each) for each in solutions], ends, self.accuracy)
 
-    def following(self, level: Level, solutions: Sequence[Solution]) -> Level:
-        """Return a mesh whose density follows the estimated errors."""
-        solution, errors, goal = solutions[-1], StepErrors.of(solutions[-1]), self.accuracy
-        mesh, (squared,) = solution.mesh, errors.required()
-        rate = error_rate(solution.scene.discretisation.displacement_space(mesh).degree)
-        density = needed_elements(squared, rate, (SAFETY * goal) ** 2 * errors.unit)
+    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene]:
+        """Return meshes whose density follows the estimated errors; copies share one, as fine as the worst needs."""
+        errors = StepErrors.of(solutions[-1])
+        densities = self._densities(level, errors)
+        own = [float(densities[key].sum()) for key in level.keys.values()]
+        bodies = errors.worst.solved_bodies
+        spread = (SPREAD if bodies[0].mesh.surface is None else HALF_PLANE_SPREAD) if any(level.touching) else 0.0
+        is_accurate = self.error(solutions[-1]) <= self.accuracy
+        n_elements = int(next_size(errors.worst.n_elements, sum(own) / (1.0 - spread), is_accurate=is_accurate))
+        partitions = [
+            better_partition(
+                member.partition,
+                density,
+                int(np.ceil(n_elements * ((1.0 - spread) * float(density.sum()) / sum(own) + spread / len(own)))),
+                cuts=zone_cuts(member.partition, member.ends),
+                spread_over=touching,
+                spread=spread,
+                idle=_idle_elements(member.bodies[0]),
+            )
+            for member, density, touching in zip(level.members(errors.worst), densities, level.touching, strict=True)
+        ]
+        return replace(level, partitions=tuple(partitions))
+
+    def _densities(self, level: Level[AnyScene], errors: StepErrors[AnySolution]) -> list[FloatArray]:
+        """Return for each partition how many elements (n_elements,) should replace each one."""
+        bodies = errors.worst.solved_bodies
+        rate = error_rate(min(body.scene.discretisation.displacement_space(body.mesh).degree for body in bodies))
+        worst = level.at_worst(errors.required())
+        of_bodies = np.concatenate([worst[key] for key in level.keys.values()])
+        needed = needed_elements(of_bodies, rate, (SAFETY * self.accuracy) ** 2 * errors.unit)
         if errors.surface is not None:
-            allowed = SAFETY * goal * errors.surface.total
-            density = np.maximum(density, needed_elements(errors.surface.errors, MEAN_RATE, allowed))
-            density = np.maximum(density, _needed_locally(errors.surface, LOCAL_SAFETY * self._local_accuracy))
-            density = _gradual(density, mesh)
-        parts = [part.name for part in solution.scene.contact_parts]
-        spread = (SPREAD if mesh.surface is None else HALF_PLANE_SPREAD) if parts else 0.0
-        is_accurate = self.error(solution) <= goal
-        n_elements = int(next_size(solution.n_elements, float(density.sum()) / (1.0 - spread), is_accurate=is_accurate))
-        cuts = zone_cuts(level.partition, zone_ends(errors.worst))
-        partition = better_partition(
-            level.partition,
-            density,
-            n_elements,
-            cuts=cuts,
-            spread_over=parts,
-            spread=spread,
-            idle=_idle_elements(errors.worst),
-        )
-        return replace(level, partition=partition)
+            allowed = SAFETY * self.accuracy * errors.surface.total
+            needed = np.maximum(needed, needed_elements(errors.surface.errors, MEAN_RATE, allowed))
+            needed = np.maximum(needed, _needed_locally(errors.surface, LOCAL_SAFETY * self._local_accuracy))
+            needed = _gradual(needed, bodies[0].mesh)
+        ends = np.cumsum([len(worst[key]) for key in level.keys.values()])[:-1]
+        return level.at_worst(np.split(needed, ends))
 
 
 def is_enough(errors: Sequence[float], ends: Iterable[ZoneEnd], accuracy: float) -> bool:
@@ -151,9 +163,9 @@ def _gradual(density: FloatArray, mesh: BoundaryMesh) -> FloatArray:
     return np.asarray(lengths / wanted)
 
 
-def _idle_elements(solution: Solution) -> BoolArray | None:
+def _idle_elements(body: SolvedBody) -> BoolArray | None:
     """Return which elements of a half-plane carry no tractions; of other bodies all do what they must."""
-    return None if solution.mesh.surface is None else np.asarray(~solution.boundary.traction.any(axis=1))
+    return None if body.mesh.surface is None else np.asarray(~body.boundary.traction.any(axis=1))
 
 
 def next_size(n_elements: int, needed: float, *, is_accurate: bool) -> float:

@@ -26,11 +26,14 @@ from bemkit.geometry.meshing.layers import (
     shortest_length,
 )
 from bemkit.geometry.meshing.partition import Partition
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.coefficient_decay import CoefficientErrors
+from bemkit.results.contact_table import resolved_transitions
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
-from bemkit.runs.mesh_sequence import Level, zone_cuts, zone_ends
+from bemkit.runs.mesh_sequence import AnyScene, AnySolution, Level, Member, zone_cuts
+from bemkit.scene.discretisation import Discretisation
 
 SAFETY = 0.4
 """The next mesh is planned for this part of the error asked for."""
@@ -46,6 +49,8 @@ then told well enough for two digits more at once."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
+MOST_CUTS = 8
+"""Places of change at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
 MOST_LOOKS = 3
 """Meshes to resolve zones for which a single node stands; what is left then is a node that a support holds."""
 
@@ -65,29 +70,32 @@ class LayeredMeshes:
 
     accuracy: float
 
-    def error(self, solution: Solution) -> float:
+    def error(self, solution: Solution | AssemblySolution) -> float:
         """Return the larger one of the estimated errors of energy and of contact tractions."""
         errors = solution.estimated_error, solution.estimated_traction_error
         if errors[0] is None:
             return float("inf")
         return max(error for error in errors if error is not None)
 
-    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+    def is_enough(self, solutions: Sequence[AnySolution]) -> bool:
         """Tell whether the error is small enough; not after the first look, whose zones end inside of elements."""
         is_first = len(solutions) == 1 and bool(solutions[0].transitions)
         return not is_first and self.error(solutions[-1]) <= self.accuracy
 
-    def _is_stuck(self, solutions: Sequence[Solution]) -> bool:
+    def _is_stuck(self, solutions: Sequence[AnySolution]) -> bool:
         """Tell whether the last two meshes have not halved the error of the best before them, all in layers."""
-        errors = [self.error(solution) for solution in solutions if solution.coefficient_errors is not None]
+        errors = [
+            self.error(solution)
+            for solution in solutions
+            if all(body.coefficient_errors is not None for body in solution.solved_bodies)
+        ]
         return len(errors) > FEWEST_LEVELS and min(errors[-2:]) > 0.5 * min(errors[:-2])
 
-    def _check_lengths(self, solution: Solution) -> None:
+    def _check_lengths(self, members: Sequence[Member], errors: _Errors) -> None:
         """Raise an error that names the place if the largest error is that of an element as short as can be."""
-        errors, mesh = solution.coefficient_errors, solution.mesh
-        if errors is None:
-            return
-        worst = int(np.argmax(self._share(solution, errors)))
+        shares = errors.split(self._share(errors, errors.elements))
+        member, own = max(zip(members, shares, strict=True), key=lambda pair: float(pair[1].max()))
+        mesh, worst = member.bodies[0].mesh, int(np.argmax(own))
         if mesh.lengths[worst] < 2.0 / FACTOR * shortest_length(mesh):
             x, y = mesh.centres[worst]
             raise GeometryError(
@@ -95,94 +103,152 @@ class LayeredMeshes:
                 f"{mesh.lengths[worst]:.1e} is about as short as coordinates hold"
             )
 
-    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
-        """Return a mesh of the next degree, with more layers where that is not enough."""
-        solution, partition = solutions[-1], level.partition
+    def following(self, level: Level[AnyScene], solutions: Sequence[AnySolution]) -> Level[AnyScene] | None:
+        """Return meshes of the next degree, with more layers where that is not enough."""
+        solution = solutions[-1]
         if level.number > 0 and solution.estimated_error is None:
             return None
+        members, errors = level.members(solution), _Errors.of(level, solution)
         if self._is_stuck(solutions):
-            self._check_lengths(solution)
+            if errors is not None:
+                self._check_lengths(members, errors)
             return None
-        ends = zone_ends(solution)
-        if level.number == 0 and len(solutions) < MOST_LOOKS and len(ends) < len(solution.transitions):
+        is_coarse = len(resolved_transitions(solution.contact, solution.transitions)) < len(solution.transitions)
+        has_copies = any(len(member.bodies) > 1 for member in members)
+        if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
-        cuts = {side: _settled(places) for side, places in zone_cuts(partition, ends).items()}
-        fresh = layered_partition(partition.base, cuts)
+        cuts = [_settled_cuts(member) for member in members]
+        fresh = [layered_partition(each.partition.base, own) for each, own in zip(members, cuts, strict=True)]
         if level.number == 0:
-            return Level(level.asked, fresh, 2 if self.accuracy < FINE else 1)
-        has_moved = has_same_pieces(partition, fresh)
-        needed = self._needed_rise(solution, ~is_at_end(partition)) if has_moved else 0
+            return replace(level, partitions=tuple(fresh), number=2 if self.accuracy < FINE else 1)
+        if errors is None:
+            method = solution.solved_bodies[0].scene.discretisation.method
+            raise InputError(f"{method} has no error estimate: take another discretisation")
+        has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
+        is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
+        needed = self._needed_rise(errors, is_inner) if has_moved else 0
         is_last = has_moved and needed <= LAST_RISE
-        following = Level(level.asked, fresh, level.number + (needed if is_last else min(needed, LARGEST_RISE)))
-        old_degrees = element_degrees(level.scene.discretisation.displacement_space(solution.mesh))
-        degree = following.scene.discretisation.displacement_space(solution.mesh).degree
+        number = level.number + (needed if is_last else min(needed, LARGEST_RISE))
+        higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
-        resolution = max(self.accuracy, FLICKER)
-        refined = refined_partition(partition, self._excess(solution, degree - old_degrees, goal), cuts, resolution)
+        resolution, excesses = max(self.accuracy, FLICKER), errors.split(errors.excess(np.concatenate(higher), goal))
+        refined = tuple(
+            refined_partition(member.partition, excess, own, resolution)
+            for member, excess, own in zip(members, excesses, cuts, strict=True)
+        )
         degrees: tuple[int, ...] = ()
-        if has_moved and level.asked.discretisation.needs_accuracy:
-            degrees = self._degrees(solution, partition, refined, old_degrees, degree)
-        return replace(following, partition=refined, degrees=degrees)
+        if has_moved and level.asked.discretisation.needs_accuracy and isinstance(solution, Solution):
+            degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
+        return replace(level, partitions=refined, number=number, degrees=degrees)
 
-    def _degrees(
-        self, solution: Solution, old: Partition, new: Partition, old_degrees: IntArray, largest: int
-    ) -> tuple[int, ...]:
+    def _degrees(self, errors: _Errors, old: Partition, new: Partition, largest: int) -> tuple[int, ...]:
         """Return the degrees of new elements that come from those of a solution."""
-        errors = solution.coefficient_errors
-        if errors is None:
-            return ()
         elements, layers = origins(old, new)
-        is_cut = np.bincount(elements, minlength=old_degrees.size)[elements] > 1
+        is_cut = np.bincount(elements, minlength=errors.degrees.size)[elements] > 1
 
         def excess(degrees: IntArray) -> FloatArray:
-            return self._share(solution, errors.at_higher_degrees(degrees - old_degrees))
+            return self._share(errors, errors.elements.at_higher_degrees(degrees - errors.degrees))
 
         # never below the old degree: coefficients that have reached round-off do not tell how fast they fell before
-        kept = np.maximum(sufficient_degrees(excess, old_degrees.size, largest), old_degrees)[elements]
+        kept = np.maximum(sufficient_degrees(excess, errors.degrees.size, largest), errors.degrees)[elements]
         return tuple(few_kinds(below_layers(np.where(is_cut, largest, kept), layers)).tolist())
 
-    def _share(self, solution: Solution, errors: CoefficientErrors) -> FloatArray:
+    def _share(self, errors: _Errors, of_elements: CoefficientErrors) -> FloatArray:
         """Return by which factor (n_elements,) errors are above equal shares of half of what is allowed."""
-        elements, size = solution.contact_elements, solution.contact_traction_size
-        allowed = 0.5 * (SAFETY * self.accuracy) ** 2 / errors.energy.size
-        excess = np.sqrt(errors.energy / (allowed * solution.error_unit))
-        if size > 0.0:
-            excess[elements] = np.maximum(excess[elements], np.sqrt(errors.traction[elements] / (allowed * size**2)))
-        return excess
+        allowed = 0.5 * (SAFETY * self.accuracy) ** 2 / errors.degrees.size
+        excess = np.sqrt(of_elements.energy / (allowed * errors.error_unit))
+        if errors.size > 0.0:
+            tractions = np.where(errors.is_contact, of_elements.traction, 0.0)
+            excess = np.maximum(excess, np.sqrt(tractions / (allowed * errors.size**2)))
+        return np.asarray(excess)
 
-    def _needed_rise(self, solution: Solution, inner: BoolArray) -> int:
+    def _needed_rise(self, errors: _Errors, inner: BoolArray) -> int:
         """Return how many degrees the errors of the inner elements need, one for those at the ends, none for places."""
         allowed = SAFETY * self.accuracy
-        needed = np.log(max(self._element_error(solution, inner), allowed) / allowed) / np.log(GAIN)
-        is_inexact = self._element_error(solution, np.ones_like(inner)) > allowed
+        needed = np.log(max(errors.relative(inner), allowed) / allowed) / np.log(GAIN)
+        is_inexact = errors.relative(np.ones_like(inner)) > allowed
         return max(int(np.ceil(needed)), int(is_inexact))
 
-    def _element_error(self, solution: Solution, chosen: BoolArray) -> float:
+
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """Estimated errors on the elements of all partitions, one after the other, and what they are measured by.
+
+    Parameters
+    ----------
+    elements : CoefficientErrors
+        Of copies the largest, as often as there are copies.
+    is_contact : (n_elements,) bool array
+    degrees : (n_elements,) int array
+    ends : (n_partitions - 1,) int array
+        Where the partitions end.
+    error_unit : float [J/m]
+    size : float [Pa m^(1/2)]
+        Of the contact tractions.
+    """
+
+    elements: CoefficientErrors
+    is_contact: BoolArray
+    degrees: IntArray
+    ends: IntArray
+    error_unit: float
+    size: float
+
+    @classmethod
+    def of(cls, level: Level[AnyScene], solution: AnySolution) -> _Errors | None:
+        """Return the errors of a solution; None if degrees are too low to tell them."""
+        members = level.members(solution)
+        known = [[body.coefficient_errors for body in member.bodies] for member in members]
+        if any(own is None for of_copies in known for own in of_copies):
+            return None
+        of_members = [CoefficientErrors.at_worst([own for own in of_copies if own is not None]) for of_copies in known]
+        is_contact = [np.isin(np.arange(len(each.partition.sides)), each.contact_elements) for each in members]
+        return cls(
+            elements=CoefficientErrors.joined(of_members),
+            is_contact=np.concatenate(is_contact),
+            degrees=np.concatenate([_degrees_of(each, each.bodies[0].scene.discretisation) for each in members]),
+            ends=np.cumsum([own.size for own in is_contact])[:-1],
+            error_unit=solution.error_unit,
+            size=solution.contact_traction_size,
+        )
+
+    def split(self, values: FloatArray) -> list[FloatArray]:
+        """Return the values on each partition."""
+        return np.split(values, self.ends)
+
+    def relative(self, chosen: BoolArray) -> float:
         """Return the larger one of the relative errors of some elements, in energy and in contact tractions."""
-        errors, size, contact = solution.coefficient_errors, solution.contact_traction_size, solution.contact_elements
-        if errors is None:
-            return float("inf")
-        energy = float(errors.energy[chosen].sum()) / solution.error_unit
-        tractions = float(errors.traction[contact[chosen[contact]]].sum()) / size**2 if size > 0.0 else 0.0
+        energy = float(self.elements.energy[chosen].sum()) / self.error_unit
+        own = self.elements.traction[chosen & self.is_contact]
+        tractions = float(own.sum()) / self.size**2 if self.size > 0.0 else 0.0
         return float(np.sqrt(max(energy, tractions)))
 
-    def _excess(self, solution: Solution, rise: IntArray, goal: float) -> FloatArray:
+    def excess(self, degrees: IntArray, goal: float) -> FloatArray:
         """Return by which factor (n_elements,) errors at higher degrees would be above their shares of a goal."""
-        errors = solution.coefficient_errors
-        if errors is None:
-            raise InputError(
-                f"{solution.scene.discretisation.method} has no error estimate: take another discretisation"
-            )
-        errors = errors.at_higher_degrees(rise)
-        excess = _excess_of(errors.energy, solution.error_unit * goal**2)
-        elements, size = solution.contact_elements, solution.contact_traction_size
-        if size > 0.0:
-            of_tractions = _excess_of(errors.traction[elements], (size * goal) ** 2)
-            excess[elements] = np.maximum(excess[elements], of_tractions)
+        errors = self.elements.at_higher_degrees(degrees - self.degrees)
+        excess = _excess_of(errors.energy, self.error_unit * goal**2)
+        if self.size > 0.0:
+            of_tractions = _excess_of(errors.traction[self.is_contact], (self.size * goal) ** 2)
+            excess[self.is_contact] = np.maximum(excess[self.is_contact], of_tractions)
         return excess
+
+
+def _degrees_of(member: Member, discretisation: Discretisation) -> IntArray:
+    """Return the degree (n_elements,) of each element."""
+    return element_degrees(discretisation.displacement_space(member.bodies[0].mesh))
+
+
+def _settled_cuts(member: Member) -> dict[int, list[float]]:
+    """Return where a partition is cut, as parameters by the number of the side.
+
+    Where sides of other bodies end, and where zones of one status do, of copies only if these places are few.
+    """
+    has_many = len(member.bodies) > 1 and len(member.ends) > MOST_CUTS
+    ends = member.facing_ends if has_many else (*member.ends, *member.facing_ends)
+    return {side: _settled(places) for side, places in zone_cuts(member.partition, ends).items()}
 
 
 def _settled(places: Sequence[float]) -> list[float]:

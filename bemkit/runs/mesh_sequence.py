@@ -1,109 +1,170 @@
-"""What leads from one mesh to a better one: the protocol, and where zones of one status end."""
+"""What leads from the meshes of one body or of several to better ones: the levels, and the protocol of their rules."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from operator import is_
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.partition import Partition
-from bemkit.geometry.neighbours import along_boundary
-from bemkit.results.contact_table import resolved_transitions
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
+from bemkit.results.zone_ends import ZoneEnd
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.body import Body
 from bemkit.scene.scene import Scene
-from bemkit.solvers.active_sets import NodeStatus
+
+AnyScene = TypeVar("AnyScene", Scene, Assembly)
+AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
+AnyStated = TypeVar("AnyStated", Scene, Assembly, Body)
+
+
+class Member(NamedTuple):
+    """What was found on a partition, by one body or by several copies of it.
+
+    Zones of one status end at `ends`, and sides of other bodies at `facing_ends`.
+    """
+
+    partition: Partition
+    bodies: tuple[SolvedBody, ...]
+    contact_elements: IntArray
+    ends: tuple[ZoneEnd, ...]
+    facing_ends: tuple[ZoneEnd, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class Level(Generic[AnyScene]):
     """What is solved next.
 
     Parameters
     ----------
-    asked : Scene
-    partition : Partition
+    asked : Scene or Assembly
+    partitions : tuple of Partition
+        How bodies are divided; copies have one in common.
+    keys : mapping of str to int
+        The number of the partition of each body, by its name; a body alone has none.
+    touching : tuple of tuple of str
+        The parts of each partition that are in contact.
     number : int
         Which of the discretisations that follow each other; see `Discretisation.at_level`.
     degrees : tuple of int
-        Of each element, where they are lower than those of that discretisation.
+        Of each element of a body alone, where they are lower than those of that discretisation.
     """
 
-    asked: Scene
-    partition: Partition
+    asked: AnyScene
+    partitions: tuple[Partition, ...]
+    keys: Mapping[str, int]
+    touching: tuple[tuple[str, ...], ...]
     number: int = 0
     degrees: tuple[int, ...] = ()
 
+    @classmethod
+    def first(cls, asked: AnyScene) -> Level[AnyScene]:
+        """Divide outlines of whose solution nothing is known."""
+        keys, scenes, touching = _divided_bodies(asked)
+        partitions = (
+            scene.mesh.first_partition(scene.shape.outline(), scene.selections, parts, scene.symmetry)
+            for scene, parts in zip(scenes, touching, strict=True)
+        )
+        return cls(asked, tuple(partitions), keys, touching)
+
+    @property
+    def partition(self) -> Partition:
+        """How a body alone is divided."""
+        (partition,) = self.partitions
+        return partition
+
     @cached_property
-    def scene(self) -> Scene:
-        """The scene with the discretisation of this level."""
-        discretisation = self.asked.discretisation.at_level(self.number)
-        return replace(self.asked, discretisation=discretisation.with_degrees(self.degrees))
+    def scene(self) -> AnyScene:
+        """What is solved, with the discretisations of this level."""
+        scene = self._at_level(self.asked)
+        if isinstance(scene, Scene):
+            return scene
+        bodies = tuple(self._at_level(body) for body in scene.bodies)
+        return scene if all(map(is_, bodies, scene.bodies)) else replace(scene, bodies=bodies)
+
+    def _at_level(self, stated: AnyStated) -> AnyStated:
+        own = stated.discretisation
+        new = None if own is None else own.at_level(self.number).with_degrees(self.degrees)
+        return stated if new is own else replace(stated, discretisation=new)
 
     @property
     def n_elements(self) -> int:
-        """Number of elements."""
-        return self.partition.mesh.n_elements
+        """Number of elements of all bodies."""
+        return sum(len(self.partitions[key].sides) for key in self.keys.values())
 
     @property
     def meshes(self) -> dict[str, BoundaryMesh]:
-        """The mesh, without a name."""
-        return {"": self.partition.mesh}
+        """The mesh of each body by its name."""
+        return {name: self.partitions[key].mesh for name, key in self.keys.items()}
+
+    def members(self, solution: Solution | AssemblySolution) -> list[Member]:
+        """Return what a solution on this level found on each partition."""
+        if isinstance(solution, Solution):
+            return [Member(self.partition, solution.solved_bodies, solution.contact_elements, solution.zone_ends)]
+        members = []
+        for number, partition in enumerate(self.partitions):
+            names = [name for name, key in self.keys.items() if key == number]
+            ends, facing = (
+                tuple(end for end in each if end.body in names) for each in (solution.zone_ends, solution.facing_ends)
+            )
+            bodies = tuple(solution.bodies[name] for name in names)
+            members.append(Member(partition, bodies, solution.contact_elements(names[0]), ends, facing))
+        return members
+
+    def at_worst(self, bodies: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return for each partition the largest values (n_elements,) that any of its bodies has."""
+        worst: dict[int, FloatArray] = {}
+        for key, own in zip(self.keys.values(), bodies, strict=True):
+            worst[key] = np.maximum(worst.get(key, own), own)
+        return [worst[key] for key in range(len(self.partitions))]
 
 
-class MeshSequence(Protocol):
+def _divided_bodies(asked: Scene | Assembly) -> tuple[dict[str, int], list[Scene], tuple[tuple[str, ...], ...]]:
+    """Return by the name of each body which scene says what it is, these scenes, and their parts in contact."""
+    if isinstance(asked, Scene):
+        return {"": 0}, [asked], (tuple(part.name for part in asked.contact_parts),)
+    keys: dict[str, int] = {}
+    numbers: dict[int, int] = {}
+    scenes: list[Scene] = []
+    touching: list[tuple[str, ...]] = []
+    for body in asked.placed_bodies:
+        scene = asked.scene_of(body)
+        if id(scene) not in numbers:
+            numbers[id(scene)] = len(scenes)
+            scenes.append(scene)
+            touching.append((*asked.contact_parts(body), *(part.name for part in scene.contact_parts)))
+        keys[body.name] = numbers[id(scene)]
+    return keys, scenes, tuple(touching)
+
+
+AnyJudged = TypeVar("AnyJudged", Solution, AssemblySolution, contravariant=True)
+
+
+class MeshSequence(Protocol[AnyJudged]):
     """A rule for better meshes; a frozen dataclass without memory."""
 
-    def error(self, solution: Solution) -> float:
+    def error(self, solution: AnyJudged) -> float:
         """Return the estimated error that is to be made small; infinite without an estimate."""
         ...
 
-    def is_enough(self, solutions: Sequence[Solution]) -> bool:
+    def is_enough(self, solutions: Sequence[AnyJudged]) -> bool:
         """Tell whether the last of the solutions is as accurate as it shall be."""
         ...
 
-    def following(self, level: Level, solutions: Sequence[Solution]) -> Level | None:
-        """Return the next mesh, with the discretisation for it; None if that would not help.
+    def following(self, level: Level[AnyScene], solutions: Sequence[AnyJudged]) -> Level[AnyScene] | None:
+        """Return the next meshes, with the discretisation for them; None if that would not help.
 
         The last of the solutions is that of `level`.
         """
         ...
-
-
-class ZoneEnd(NamedTuple):
-    """Where zones of one status end: in which element, and at which fraction of its length.
-
-    The zone length says what the element is short or long compared with [m].
-    """
-
-    mesh: BoundaryMesh
-    zone_length: float
-    element: int
-    fraction: float
-    body: str = ""
-
-
-def zone_ends(solution: Solution) -> list[ZoneEnd]:
-    """Return where zones of one status end, as far as they are resolved; see `resolved_transitions`.
-
-    Zones are as long as their part; on a half-plane, of which a part may be any strip, as half of what touches there.
-    """
-    mesh, table = solution.mesh, solution.contact
-    found = []
-    for transition in resolved_transitions(solution.contact, solution.transitions):
-        elements = along_boundary(mesh, mesh.part(transition.part))
-        ends = np.cumsum(mesh.lengths[elements])
-        k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
-        fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
-        zone_length = float(ends[-1])
-        if mesh.surface is not None:
-            touches = table.rows(transition.part) & (table.status != NodeStatus.SEPARATED)
-            zone_length = 0.5 * float(table.weight[touches].sum())
-        found.append(ZoneEnd(mesh, zone_length, int(elements[k]), fraction))
-    return found
 
 
 def zone_cuts(partition: Partition, ends: Iterable[ZoneEnd]) -> dict[int, list[float]]:

@@ -128,7 +128,7 @@ def _run_assembly(
         if given is not None:
             raise InputError(f"{name} is given with an assembly of several bodies: leave it out")
     if assembly.mesh.accuracy is not None:
-        from bemkit.runs.assembly_adaptive import run_assembly_adaptive
+        from bemkit.runs.adaptive import run_assembly_adaptive
 
         return run_assembly_adaptive(assembly, callback=callback)[-1]
     from bemkit.runs.assembly import run_assembly

@@ -230,10 +230,13 @@ class Assembly(ShownInNotebooks):
     def _check_accuracy(self, accuracy: float) -> None:
         for body in self.bodies:
             discretisation = self.discretisation if body.discretisation is None else body.discretisation
-            if discretisation.needs_accuracy:
+            if discretisation.needs_accuracy != self.discretisation.needs_accuracy:
+                own, others = (
+                    ("'hp'", "a fixed degree") if discretisation.needs_accuracy else ("a fixed degree", "'hp'")
+                )
                 raise InputError(
-                    f"discretisation is 'hp', of body {body.name!r}: degrees rise in scenes of one body alone: choose "
-                    "'quadratic', or another fixed degree"
+                    f"body {body.name!r} has {own}, the assembly {others}: degrees rise for all bodies or for none: "
+                    "give the assembly alone a discretisation"
                 )
             if not discretisation.estimates_error:
                 raise InputError(

@@ -11,6 +11,7 @@ nested one relative to bemkit's, and what is left of it if every kept pair were 
 
 from __future__ import annotations
 
+import dataclasses
 import statistics
 import sys
 from dataclasses import dataclass
@@ -22,9 +23,10 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.geometry.meshing.partition import Partition
-from bemkit.runs import mesh_sequence
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.density import DensityMeshes
+from bemkit.runs.mesh_sequence import Level as MeshLevel
+from bemkit.runs.mesh_sequence import zone_cuts
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from tests.benchmarks.accuracy import measured_errors
@@ -82,16 +84,16 @@ def kept_share(old: Partition, new: Partition) -> float:
 def nested_levels(scene: bk.Scene) -> list[Level]:
     """Solve a scene as `run_adaptive` does, by its own rules, on nested meshes."""
     meshes = DensityMeshes(scene.mesh.accuracy)
-    contact = [part.name for part in scene.contact_parts]
-    partition = scene.mesh.first_partition(scene.shape.outline(), scene.selections, contact)
+    first = MeshLevel.first(scene)
+    partition = first.partition
     levels = [Level(bk.run(scene, mesh=partition.mesh), 0.0)]
     while True:
         solution = levels[-1].solution
         solutions = [level.solution for level in levels]
         if meshes.is_enough(solutions):
             return levels
-        wanted = meshes.following(mesh_sequence.Level(scene, partition), solutions).partition
-        new = nested_partition(partition, wanted, mesh_sequence.zone_cuts(partition, mesh_sequence.zone_ends(solution)))
+        wanted = meshes.following(dataclasses.replace(first, partitions=(partition,)), solutions).partition
+        new = nested_partition(partition, wanted, zone_cuts(partition, solution.zone_ends))
         levels.append(Level(bk.run(scene, mesh=new.mesh, start=solution), kept_share(partition, new)))
         partition = new
 

@@ -11,7 +11,7 @@ import pytest
 import bemkit as bk
 from bemkit.errors import InputError
 from bemkit.model.assembled.contacts import OverlapError
-from bemkit.runs.assembly_adaptive import run_assembly_adaptive
+from bemkit.runs.adaptive import run_assembly_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from tests.slow import slow_except
 

@@ -306,3 +306,125 @@ def test_a_mesh_that_cannot_be_made_loses_nothing(monkeypatch: pytest.MonkeyPatc
     solution = bk.run(dataclasses.replace(scene, discretisation=bk.HpGalerkin(), mesh=mesh))
     assert solution.status is bk.Status.ACCURACY_NOT_REACHED
     assert "no finer mesh can be made (no room)" in solution.message
+
+
+BLOCK = bk.Rectangle(width=2.0, height=0.5)
+
+
+def pushed(side: str, y: float) -> bk.Part:
+    middle = (0.9, 1.3)
+    condition = bk.PrescribedDisplacement(x=0.0, y=y)
+    return bk.Part("pushed", condition, sides=(side,), where=lambda x, _: (x > middle[0]) & (x < middle[1]))
+
+
+def two_blocks(accuracy: float, law: bk.FrictionLaw, discretisation: bk.Discretisation) -> bk.Assembly:
+    """Two mirrored blocks, pressed together in the middle: their ends lift off."""
+    material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
+    upper = bk.Body(
+        name="upper",
+        shape=BLOCK,
+        material=material,
+        parts=(pushed("top", -1e-3),),
+        placement=bk.Placement(shift=(0.0, 0.5)),
+    )
+    lower = bk.Body(name="lower", shape=BLOCK, material=material, parts=(pushed("bottom", 1e-3),))
+    return bk.Assembly(
+        title="Two mirrored blocks",
+        bodies=(upper, lower),
+        contacts=(bk.ContactPair(("upper.bottom", "lower.top")),),
+        law=law,
+        discretisation=discretisation,
+        mesh=bk.MeshOptions(accuracy=accuracy),
+    )
+
+
+def half_of_two_blocks(accuracy: float) -> bk.Scene:
+    """The upper block on the plane of symmetry."""
+    return bk.Scene(
+        title="One of two mirrored blocks",
+        shape=BLOCK,
+        material=bk.Material(youngs_modulus=1.0, poisson_ratio=0.3),
+        law=bk.Frictionless(),
+        parts=(bk.Part("base", bk.Contact(bk.HalfPlane()), sides=("bottom",)), pushed("top", -1e-3)),
+        discretisation=bk.HpGalerkin(),
+        mesh=bk.MeshOptions(accuracy=accuracy),
+    )
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "law"),
+    [
+        (1e-3, bk.Coulomb(0.3)),
+        pytest.param(1e-6, bk.Frictionless(), marks=pytest.mark.slow),
+        pytest.param(1e-6, bk.Coulomb(0.3), marks=pytest.mark.slow),
+    ],
+)
+def test_degrees_of_two_bodies_rise_together(accuracy: float, law: bk.FrictionLaw) -> None:
+    """Mirrored bodies do not rub, and each is one on a frictionless plane: places of change, energies, tractions."""
+    both, one = bk.run(two_blocks(accuracy, law, bk.HpGalerkin())), bk.run(half_of_two_blocks(0.1 * accuracy))
+    assert both.is_converged, both.message
+    assert both.certificate.worst <= 1e-9
+    assert both.estimated_traction_error is not None
+    assert both.estimated_traction_error <= accuracy
+    assert both.n_elements <= 300
+    assert both.energy == pytest.approx(2.0 * one.energy, rel=accuracy**2)
+    assert [each.x for each in both.transitions] == pytest.approx([each.x for each in one.transitions], abs=accuracy)
+    size = np.abs(one.contact.sigma_n).max()
+    inside = (both.contact.x > 0.7) & (both.contact.x < 1.5)  # away from where tractions have infinite slopes
+    order = np.argsort(one.contact.x)
+    exact = np.interp(both.contact.x[inside], one.contact.x[order], one.contact.sigma_n[order])
+    assert np.abs(both.contact.sigma_n[inside] - exact).max() <= 0.02 * size  # both between nodes
+
+
+@pytest.mark.slow
+def test_a_bolt_in_a_plate_needs_few_elements_for_five_digits() -> None:
+    """Curved sides with friction: places and energies settle faster than the accuracy asked for."""
+    plate = bk.load_scene("pin-in-plate")
+    rough, fine = (
+        bk.run(dataclasses.replace(plate, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=accuracy)))
+        for accuracy in (1e-4, 1e-5)
+    )
+    assert fine.is_converged
+    assert fine.n_elements <= 300
+    assert rough.energy == pytest.approx(fine.energy, rel=1e-8)
+    assert [each.s for each in rough.transitions] == pytest.approx([each.s for each in fine.transitions], abs=1e-6)
+
+
+def test_copies_have_one_mesh_as_fine_as_the_worst_needs() -> None:
+    """Two feet on a base that a wall holds at one end: the pressures of the feet differ, and their mesh is one."""
+    material = bk.Material(youngs_modulus=1.0, poisson_ratio=0.3)
+    base = bk.Body(
+        name="base",
+        shape=bk.Rectangle(width=3.0, height=0.5),
+        material=material,
+        parts=(bk.Part("wall", bk.Clamped(), sides=("left",)), bk.Part("ground", bk.Roller(), sides=("bottom",))),
+    )
+    foot = bk.Body(
+        name="foot",
+        shape=bk.Rectangle(width=0.5, height=0.5),
+        material=material,
+        parts=(bk.Part("load", bk.Pressure(1e-3), sides=("top",)),),
+        placement=bk.Placement(shift=(0.5, 0.5)),
+        copies=bk.GridCopies(2, 1, (1.2, 0.0)),
+    )
+    feet = bk.Assembly(
+        title="Two feet",
+        bodies=(base, foot),
+        touching=bk.Touching(within=1e-9),
+        law=bk.Coulomb(0.5),
+        discretisation=bk.HpGalerkin(),
+        mesh=bk.MeshOptions(accuracy=1e-2),
+    )
+    solution = bk.run(feet)
+    assert solution.is_converged, solution.message
+    _, one, two = solution.solved_bodies
+    np.testing.assert_allclose(one.mesh.lengths, two.mesh.lengths, rtol=1e-12)
+    assert one.energy != pytest.approx(two.energy, rel=1e-6)
+    quadratic = bk.run(dataclasses.replace(feet, discretisation=bk.QuadraticGalerkin()))
+    assert solution.energy == pytest.approx(quadratic.energy, rel=2e-4)  # the square of both accuracies
+
+
+def test_degrees_of_bodies_do_not_rise_in_histories() -> None:
+    history = dataclasses.replace(two_blocks(1e-3, bk.Frictionless(), bk.HpGalerkin()), load_factors=(0.5, 1.0))
+    with pytest.raises(InputError, match="discretisation is 'hp', and there are 2 load steps"):
+        bk.run(history)

@@ -16,7 +16,7 @@ from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.pictures import draw_deformation
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.tables import to_json
-from bemkit.runs.assembly_adaptive import run_assembly_adaptive
+from bemkit.runs.adaptive import run_assembly_adaptive
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.solvers.base import solve
 from tests.slow import slow_except

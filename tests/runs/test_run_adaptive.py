@@ -11,9 +11,11 @@ import pytest
 
 import bemkit as bk
 import bemkit.runs.adaptive
-from bemkit.geometry.meshing.partition import STEEPEST
+from bemkit.geometry.meshing.partition import STEEPEST, better_partition
 from bemkit.reference import DiscBetweenPlates
-from bemkit.runs.adaptive import _expected_seconds, run_adaptive
+from bemkit.runs.adaptive import _SceneRefinement, run_adaptive
+from bemkit.runs.density import DensityMeshes
+from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
@@ -157,13 +159,13 @@ def test_times_and_solves_are_those_of_all_meshes() -> None:
 def test_a_finer_mesh_that_fails_leaves_the_result_of_the_coarser_one(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = paper(1, mesh=bk.MeshOptions(accuracy=1e-3))
 
-    solved = bemkit.runs.adaptive._SceneRefinement.solved
+    solved = _SceneRefinement.solved
 
     def failing(refinement: Any, level: Level, start: bk.Solution | None) -> bk.Solution:
         solution = solved(refinement, level, start)
         return solution if level.n_elements < 100 else dataclasses.replace(solution, status=bk.Status.STALLED)
 
-    monkeypatch.setattr(bemkit.runs.adaptive._SceneRefinement, "solved", failing)
+    monkeypatch.setattr(_SceneRefinement, "solved", failing)
     failed, best = run_adaptive(scene)
     assert failed.status is bk.Status.STALLED
     assert best.status is bk.Status.ACCURACY_NOT_REACHED
@@ -238,8 +240,13 @@ def test_scene_files_hold_the_accuracy() -> None:
 
 def test_the_time_of_the_next_mesh_follows_from_the_plans() -> None:
     """Ten times the elements take longer, but not a thousand times: small meshes cost more than dense algebra."""
-    scene = paper(1, bk.LinearGalerkin(), bk.MeshOptions(elements=40))
-    solution = bk.run(scene)
-    finer = dataclasses.replace(scene, mesh=bk.MeshOptions(elements=400)).build_mesh()
-    assert _expected_seconds(solution, 1.0, scene, solution.mesh) == pytest.approx(1.0)
-    assert 2.0 < _expected_seconds(solution, 1.0, scene, finer) < 100.0
+    meshes = DensityMeshes(accuracy=1e-3)
+    refinement = _SceneRefinement(meshes, None, EarlierSteps())
+    level = Level.first(paper(1, bk.LinearGalerkin(), bk.MeshOptions(accuracy=1e-3)))
+    solution = bk.run(level.scene, mesh=level.partition.mesh)
+    assert refinement.expected_seconds(level, solution, 1.0) == pytest.approx(1.0)
+    finer = dataclasses.replace(
+        level,
+        partitions=(better_partition(level.partition, np.ones(solution.n_elements), 400, cuts={}, spread_over=()),),
+    )
+    assert 2.0 < refinement.expected_seconds(finer, solution, 1.0) < 200.0

@@ -19,6 +19,7 @@ from bemkit import (
     HalfPlane,
     HpGalerkin,
     InputError,
+    LinearGalerkin,
     ListedCopies,
     Material,
     MeshOptions,
@@ -156,7 +157,18 @@ def test_shipped_assemblies_survive_their_text(name: str) -> None:
         ({"rigid": (PUNCH,)}, "rigid body 'punch' touches nothing: list a contact with it, or leave it out"),
         ({"rigid": (replace(PUNCH, name="lower"),)}, "'lower' is the name of two bodies: give each its own name"),
         ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": ConstantCollocation()}, "has no error estimate"),
-        ({"mesh": MeshOptions(accuracy=1e-3), "discretisation": HpGalerkin()}, "degrees rise in scenes of one body"),
+        (
+            {"mesh": MeshOptions(accuracy=1e-3), "bodies": (replace(LOWER, discretisation=HpGalerkin()), SMALL)},
+            "body 'lower' has 'hp', the assembly a fixed degree: degrees rise for all bodies or for none",
+        ),
+        (
+            {
+                "mesh": MeshOptions(accuracy=1e-3),
+                "discretisation": HpGalerkin(),
+                "bodies": (replace(LOWER, discretisation=LinearGalerkin()), SMALL),
+            },
+            "body 'lower' has a fixed degree, the assembly 'hp': degrees rise for all bodies or for none",
+        ),
         (
             {"mesh": MeshOptions(accuracy=1e-3), "bodies": (replace(LOWER, mesh=MeshOptions(elements=8)), SMALL)},
             "body 'lower' has mesh options of its own: give one of them",

@@ -1,0 +1,125 @@
+"""Where zones of one contact status end, by the elements of the boundaries there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.vectors import norms
+from bemkit.results.contact_table import ContactTable, Transition, resolved_transitions
+from bemkit.solvers.active_sets import NodeStatus
+
+LYING_ON = 1e-2
+"""Distance, relative to the shorter of two sides, up to which one lies on the other."""
+LYING_AT = 1e-9
+"""Distance, relative to a side, within which an element ends at a point."""
+_MOST_STEPS = 20
+"""Of Newton's method for the place on a curved element: two or three are enough."""
+
+
+class ZoneEnd(NamedTuple):
+    """Where zones of one status end: in which element, and at which fraction of its length.
+
+    The zone length says what the element is short or long compared with [m].
+    """
+
+    mesh: BoundaryMesh
+    zone_length: float
+    element: int
+    fraction: float
+    body: str = ""
+
+    @property
+    def distance(self) -> float:
+        """From the nearer end of the element [m]."""
+        return float(min(self.fraction, 1.0 - self.fraction) * self.mesh.lengths[self.element])
+
+
+def zone_ends_on(mesh: BoundaryMesh, contact: ContactTable, transitions: tuple[Transition, ...]) -> Iterator[ZoneEnd]:
+    """Yield where zones end on a body alone, as far as they are resolved; see `resolved_transitions`.
+
+    Zones are as long as their part; on a half-plane, of which a part may be any strip, as half of what touches there.
+    """
+    for transition in resolved_transitions(contact, transitions):
+        elements = along_boundary(mesh, mesh.part(transition.part))
+        ends = np.cumsum(mesh.lengths[elements])
+        k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
+        fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
+        zone_length = float(ends[-1])
+        if mesh.surface is not None:
+            touches = contact.rows(transition.part) & (contact.status != NodeStatus.SEPARATED)
+            zone_length = 0.5 * float(contact.weight[touches].sum())
+        yield ZoneEnd(mesh, zone_length, int(elements[k]), fraction)
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A side of a body that meets another: a part of its mesh.
+
+    Parameters
+    ----------
+    body : str
+    mesh : BoundaryMesh
+    part : str
+    """
+
+    body: str
+    mesh: BoundaryMesh
+    part: str
+
+    @cached_property
+    def length(self) -> float:
+        """Length of boundary [m]."""
+        return float(self.mesh.lengths[self.mesh.part(self.part)].sum())
+
+    def near(self, point: FloatArray) -> ZoneEnd:
+        """Return the nearest place on the side, as the end of a zone."""
+        return ZoneEnd(self.mesh, self.length, *_nearest(self.mesh, self.mesh.part(self.part), point), self.body)
+
+    def ends(self) -> list[FloatArray]:
+        """Return the points (2,) where the side ends; none of a closed one."""
+        elements = along_boundary(self.mesh, self.mesh.part(self.part))
+        start, end = self.mesh.start[elements[0]], self.mesh.end[elements[-1]]
+        return [] if np.array_equal(start, end) else [start, end]
+
+    def edges(self, other: Side) -> Iterator[tuple[FloatArray, ZoneEnd]]:
+        """Yield the points where another side that lies on this one ends inside it, and where they are on this one."""
+        for point in other.ends():
+            place = self.near(point)
+            here = self.mesh.points(np.array([place.element]), np.array([2.0 * place.fraction - 1.0]))[0, 0]
+            near = LYING_ON * min(self.length, other.length)
+            is_inside = all(np.linalg.norm(end - here) > near for end in self.ends())
+            if is_inside and np.linalg.norm(point - here) <= near:
+                yield point, place
+
+    def elements_at(self, point: FloatArray) -> IntArray:
+        """Return the element nearest to a point, or those that end there."""
+        elements = self.mesh.part(self.part)
+        ends = (self.mesh.start[elements], self.mesh.end[elements])
+        is_end = np.min([norms(end - point) for end in ends], axis=0) <= LYING_AT * self.length
+        return np.union1d(elements[is_end], [self.near(point).element])
+
+
+def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple[int, float]:
+    """Return the element nearest to a point, and the fraction of its parameter there."""
+    start, end = mesh.start[elements], mesh.end[elements]
+    chord = end - start
+    along = np.clip(np.sum((point - start) * chord, axis=1) / np.sum(chord**2, axis=1), 0.0, 1.0)
+    k = int(np.argmin(norms(start + along[:, None] * chord - point)))
+    own, fraction = elements[k : k + 1], float(along[k])
+    if not mesh.is_straight[own[0]]:
+        for _ in range(_MOST_STEPS):
+            xi = np.array([2.0 * fraction - 1.0])
+            tangent = mesh.derivatives(own, xi)[0, 0]
+            step = 0.5 * float((point - mesh.points(own, xi)[0, 0]) @ tangent / (tangent @ tangent))
+            fraction = min(max(fraction + step, 0.0), 1.0)
+            if abs(step) <= np.finfo(float).eps:
+                break
+    return int(own[0]), fraction
