@@ -26,8 +26,9 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.compiled_sweep import sweep_over
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
-from bemkit.operators.integrals.sweep import FEW, PairSweep
+from bemkit.operators.integrals.sweep import FEW
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
@@ -231,7 +232,7 @@ def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequ
     images = range(0, mesh.whole.n_elements, mesh.n_elements)
     test = np.concatenate([elements for elements, _ in tests])
     trial = np.concatenate([image + elements for elements, _ in trials for image in images])
-    sweep = PairSweep(mesh.whole, degrees, test, trial)
+    sweep = sweep_over(mesh, degrees, test, trial)
     edges: list[int] = np.cumsum([0, *(elements.size for elements, _ in tests)]).tolist()
     half = 0.5 * mesh.whole.lengths
     lock = Lock()
