@@ -14,7 +14,7 @@ import bisect
 import enum
 import itertools
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
 from typing import TypeAlias
@@ -26,56 +26,76 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
 from bemkit.geometry.spaces import BoundarySpace
+from bemkit.operators.compiled_sweep import sweep_over
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
-from bemkit.operators.integrals.sweep import FEW, PairSweep
+from bemkit.operators.integrals.sweep import FEW
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
-
-Tensor: TypeAlias = tuple[FloatArray, FloatArray | None, FloatArray | None, FloatArray]
-"""The xx, xy, yx, yy entries, each (n_test_polynomials, n_trial_polynomials, n_rows, n_trial); None is zero."""
-
 
 _Kind: TypeAlias = tuple[IntArray, tuple[BoundarySpace, ...]]
 """Elements of one degree, and the spaces as they see them."""
 
 
-class Block:
-    """The integrals of some rows of elements, with what turns them into operator entries."""
-
-    def __init__(
-        self, integrals: PairIntegrals, test_half: FloatArray, trial_half: FloatArray, log_scale: float
-    ) -> None:
-        self.integrals = integrals
-        self.test_half = test_half[:, None]
-        self.trial_half = trial_half[None, :]
-        self.log_scale = log_scale
-
-    @property
-    def measure(self) -> FloatArray:
-        """The products of the lengths, (n_rows, n_trial): the integrals of P_0(xi) P_0(t) themselves."""
-        return (4.0 * self.test_half) * self.trial_half
-
-    def columns(self, chosen: slice) -> Block:
-        """Return those of some trial elements, not copied."""
-        trial_half = self.trial_half[0, chosen]
-        return Block(self.integrals.take(chosen), self.test_half[:, 0], trial_half, self.log_scale)
-
-
 @dataclass(frozen=True, eq=False)
 class TrialTerm:
-    """One part of an operator.
+    """One part of an operator: a 2 x 2 tensor of combinations of the scalar integrals of P_a (test) and P_b (trial).
 
     Parameters
     ----------
     coefficients : (n_local, n_polynomials) array
         Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
-    tensor : callable
-        (block, a, b) -> the 2 x 2 tensor of integrals of some P_a (test) and P_b (trial), slices of the degrees.
+    tensor : (4, 4) array
+        Its xx, xy, yx and yy entries by the integrals of the logarithm, of the real and of the imaginary part of the
+        quotient, and of the double layer.
+    of_slopes : (bool, bool)
+        Whether it acts on tangential derivatives of the test and of the trial functions.
+    shift : float
+        What is added to the logarithm.
     """
 
     coefficients: FloatArray
-    tensor: Callable[[Block, slice, slice], Tensor]
+    tensor: FloatArray
+    of_slopes: tuple[bool, bool] = (False, False)
+    shift: float = 0.0
+
+
+class Block:
+    """The integrals of some rows of elements, with what turns them into operator entries."""
+
+    def __init__(self, integrals: PairIntegrals, test_half: FloatArray, trial_half: FloatArray) -> None:
+        self.integrals = integrals
+        self.test_half = test_half[:, None]
+        self.trial_half = trial_half[None, :]
+
+    def columns(self, chosen: slice) -> Block:
+        """Return those of some trial elements, not copied."""
+        return Block(self.integrals.take(chosen), self.test_half[:, 0], self.trial_half[0, chosen])
+
+    def tensor(self, term: TrialTerm, n_test: int) -> list[FloatArray | None]:
+        """Return the xx, xy, yx and yy entries, (n_test, n_trial_polynomials, n_rows, n_trial) each; None is zero."""
+        own, quotient = (slice(n_test), slice(term.coefficients.shape[1])), self.integrals.quotient
+        integrals = self.integrals.log, quotient.real, quotient.imag, self.integrals.double
+        of_test, of_trial = term.of_slopes
+        scale = 1.0 / ((self.test_half if of_test else 1.0) * (self.trial_half if of_trial else 1.0))
+        products: dict[tuple[int, float], FloatArray] = {}
+        for k, factor in {(k, abs(factor)) for row in term.tensor for k, factor in enumerate(row.tolist()) if factor}:
+            products[k, factor] = (factor * scale) * integrals[k][own]
+            if k == 0 and term.shift:
+                measure = 4.0 * self.test_half * self.trial_half
+                products[k, factor][0, 0] += (factor * term.shift) * scale * measure
+        entries: list[FloatArray | None] = []
+        for row in term.tensor.tolist():
+            entry: FloatArray | None = None
+            for k, factor in enumerate(row):
+                if factor:
+                    product = products[k, abs(factor)]
+                    if entry is None:
+                        entry = product if factor > 0.0 else -product
+                    else:
+                        entry = entry + product if factor > 0.0 else entry - product
+            entries.append(entry)
+        return entries
 
 
 class Tag(enum.Enum):
@@ -212,13 +232,13 @@ def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequ
     images = range(0, mesh.whole.n_elements, mesh.n_elements)
     test = np.concatenate([elements for elements, _ in tests])
     trial = np.concatenate([image + elements for elements, _ in trials for image in images])
-    sweep = PairSweep(mesh.whole, degrees, test, trial)
+    sweep = sweep_over(mesh, degrees, test, trial)
     edges: list[int] = np.cumsum([0, *(elements.size for elements, _ in tests)]).tolist()
-    half, log_scale = 0.5 * mesh.whole.lengths, float(np.log(mesh.diameter))
+    half = 0.5 * mesh.whole.lengths
     lock = Lock()
 
     def fill(rows: slice) -> int:
-        pairs = Block(sweep.chunk(rows), half[test[rows]], half[trial], log_scale)
+        pairs = Block(sweep.chunk(rows), half[test[rows]], half[trial])
         kind = bisect.bisect_right(edges, rows.start) - 1
         for block in blocks[kind]:
             gathered = block.gather(pairs)
@@ -290,8 +310,7 @@ class _Rows:
         for columns, terms, images in self._parts:
             part = block.columns(columns)
             for term in terms:
-                degrees = slice(test.shape[1]), slice(term.coefficients.shape[1])
-                for index, values in enumerate(term.tensor(part, *degrees)):
+                for index, values in enumerate(part.tensor(term, test.shape[1])):
                     if values is None:
                         continue
                     component = index % 2

@@ -23,7 +23,7 @@ from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.operators.assembly import Block, PairForm, Tag, Tensor, TrialTerm, require_one_mesh
+from bemkit.operators.assembly import PairForm, Tag, TrialTerm, require_one_mesh
 from bemkit.operators.integrals.pairs import Degrees
 
 
@@ -54,16 +54,12 @@ class SingleLayerForm(PairForm):
 
     def trial_terms(self) -> list[TrialTerm]:
         """Return the one term of V."""
-        return [TrialTerm(local_coefficients(self.trial), self._tensor)]
-
-    def _tensor(self, block: Block, a: slice, b: slice) -> Tensor:
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
-        quotient = block.integrals.quotient[a, b]
-        diagonal = (-factor * (3.0 - 4.0 * nu)) * block.integrals.log[a, b]
-        diagonal[0, 0] += (factor * ((3.0 - 4.0 * nu) * block.log_scale + 0.5)) * block.measure
-        half_difference, off = (0.5 * factor) * quotient.real, (0.5 * factor) * quotient.imag
-        return diagonal + half_difference, off, off, diagonal - half_difference
+        log, half = -factor * (3.0 - 4.0 * nu), 0.5 * factor
+        tensor = np.array([[log, half, 0.0, 0.0], [0.0, 0.0, half, 0.0], [0.0, 0.0, half, 0.0], [log, -half, 0.0, 0.0]])
+        shift = -float(np.log(self.test.mesh.diameter)) - 0.5 / (3.0 - 4.0 * nu)
+        return [TrialTerm(local_coefficients(self.trial), tensor, shift=shift)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,19 +84,17 @@ class DoubleLayerForm(PairForm):
     def trial_terms(self) -> list[TrialTerm]:
         """Return the scalar double layer of u, and the kernels that act on du/ds."""
         coefficients = local_coefficients(self.trial)
-        return [TrialTerm(coefficients, self._scalar), TrialTerm(_derivative(coefficients), self._slope)]
-
-    def _scalar(self, block: Block, a: slice, b: slice) -> Tensor:
-        diagonal = block.integrals.double[a, b]
-        return diagonal, None, None, diagonal
-
-    def _slope(self, block: Block, a: slice, b: slice) -> Tensor:
         nu = self.material.effective_poisson_ratio
-        factor = 1.0 / (4.0 * np.pi * (1.0 - nu)) / block.trial_half
-        log = (factor * (1.0 - 2.0 * nu)) * block.integrals.log[a, b]
-        half_quotient = (0.5 * factor) * block.integrals.quotient[a, b]
-        real, imaginary = half_quotient.real, half_quotient.imag
-        return imaginary, log - real, -(log + real), -imaginary
+        factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
+        log, half = factor * (1.0 - 2.0 * nu), 0.5 * factor
+        slope = np.array(
+            [[0.0, 0.0, half, 0.0], [log, -half, 0.0, 0.0], [-log, -half, 0.0, 0.0], [0.0, 0.0, -half, 0.0]]
+        )
+        scalar = np.outer([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0])
+        return [
+            TrialTerm(coefficients, scalar),
+            TrialTerm(_derivative(coefficients), slope, of_slopes=(False, True)),
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,15 +126,12 @@ class HypersingularForm(PairForm):
 
     def trial_terms(self) -> list[TrialTerm]:
         """Return the one term of W, on du/ds and dv/ds."""
-        return [TrialTerm(_derivative(local_coefficients(self.trial)), self._tensor)]
-
-    def _tensor(self, block: Block, a: slice, b: slice) -> Tensor:
-        nu = self.material.effective_poisson_ratio
-        factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - nu)) / (block.test_half * block.trial_half)
-        log = -factor * block.integrals.log[a, b]
-        half_quotient = (0.5 * factor) * block.integrals.quotient[a, b]
-        real, imaginary = half_quotient.real, half_quotient.imag
-        return log + real, imaginary, imaginary, log - real
+        factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - self.material.effective_poisson_ratio))
+        half = 0.5 * factor
+        tensor = np.array(
+            [[-factor, half, 0.0, 0.0], [0.0, 0.0, half, 0.0], [0.0, 0.0, half, 0.0], [-factor, -half, 0.0, 0.0]]
+        )
+        return [TrialTerm(_derivative(local_coefficients(self.trial)), tensor, of_slopes=(True, True))]
 
 
 def definite(space: BoundarySpace, is_positive: bool = True) -> frozenset[Tag]:

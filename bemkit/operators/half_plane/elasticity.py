@@ -14,7 +14,7 @@ from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.flexibility import strip_flexibility
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.dense import Cholesky, SingularMatrixError
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 _ROUND_OFF = 1e-10
@@ -105,7 +105,7 @@ class _Condensation:
     @classmethod
     def of(cls, elastic: HalfPlaneElasticity, conditions: NodalConditions) -> _Condensation:
         frame = conditions.frame
-        flexibility = rotate_rows(rotate_columns(elastic.flexibility, frame), frame)
+        flexibility = rotated(elastic.flexibility, frame)
         motions = np.einsum("nkc,ncm->nkm", frame, elastic.drive.motions_at(dof_points(elastic.displacement_space)))
         acting = np.flatnonzero(~conditions.is_free)
         _check_resisted(motions.reshape(-1, 3)[acting], elastic.drive)

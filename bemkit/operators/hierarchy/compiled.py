@@ -51,7 +51,7 @@ def _loaded() -> tuple[ModuleType | None, str]:
     try:
         from bemkit.operators.hierarchy import compiled_fields
 
-        if not is_cached(compiled_fields):
+        if not is_cached(compiled_fields.__name__):
             announce("compile kernels, once for this installation")
         point, element = np.array([0.5 + 1.0j]), np.array([0.0j])
         values = compiled_fields.element_fields(
@@ -64,9 +64,10 @@ def _loaded() -> tuple[ModuleType | None, str]:
     return compiled_fields, "numba is installed"
 
 
-def is_cached(module: ModuleType) -> bool:
+def is_cached(module: str) -> bool:
     """Whether numba has kept what it compiled of a module, beside it or where its settings say."""
-    source = Path(str(module.__file__))
+    spec = importlib.util.find_spec(module)
+    source = Path(str(spec and spec.origin))
     folder = Path(os.environ.get("NUMBA_CACHE_DIR") or source.parent / "__pycache__")
     return any(folder.rglob(f"{source.stem}.*.nbi"))
 

@@ -51,7 +51,7 @@ def warm_up() -> Iterator[Compiled]:
         ("curved elements", disk, compiled_curved),
         ("Galerkin's method", square, compiled_pairs),
     ):
-        was_kept = compiled.is_cached(module)
+        was_kept = compiled.is_cached(module.__name__)
         if compiled.functions() is None:
             raise InputError(f"nothing to compile: {compiled.why()}")
         if module is compiled_pairs:

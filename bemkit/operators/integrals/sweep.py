@@ -82,13 +82,13 @@ class PairSweep:
         self.degrees = degrees
         self.test = everything if test_elements is None else test_elements
         self.trial = everything if trial_elements is None else trial_elements
-        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, 1)
+        self._n_rows = rows_per_chunk(degrees, self.trial.size, 1)
         level, is_close = self._classify()
         counts = np.bincount(level.ravel(), minlength=len(GAUSS_LEVELS) + 1)
         self.base = _cheapest_level(counts, degrees.extra_points)
         is_listed = is_close | (level > self.base)
         n_points = 1 if is_listed.all() else self._n_points(self.base)
-        self.rows_per_chunk = _rows_per_chunk(degrees, self.trial.size, n_points)
+        self._n_rows = rows_per_chunk(degrees, self.trial.size, n_points)
         self._rows, self._columns = np.nonzero(is_listed)
         self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
 
@@ -98,8 +98,7 @@ class PairSweep:
 
     def row_slices(self, edges: Sequence[int] = ()) -> Iterator[slice]:
         """Yield the chunks as slices of the test elements, cut at some edges, too."""
-        begins = range(0, self.test.size, self.rows_per_chunk)
-        yield from (slice(*ends) for ends in itertools.pairwise(sorted({*begins, *edges, self.test.size})))
+        return row_slices(self.test.size, self._n_rows, edges)
 
     def _classify(self) -> tuple[LevelArray, BoolArray]:
         """Find the Gauss level of every pair on its test element, and which pairs are too close for the dense sweep."""
@@ -183,7 +182,7 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
         min(LISTED_SHARE_OF_CURVED * n_trial, LISTED_PAIRS) if is_curved else n_trial if is_listed else LISTED_PAIRS
     )
     n_listed = int(n_test * n_near)
-    n_chunk = n_trial * min(n_test, n_threads * _rows_per_chunk(degrees, n_trial, 1 if is_listed else n_points))
+    n_chunk = n_trial * min(n_test, n_threads * rows_per_chunk(degrees, n_trial, 1 if is_listed else n_points))
     # while pairs are listed: what is kept of them, and the sums that serve both orders of two elements, four times
     listing = 8 * n_listed * (n_integrals + 2 * n_inner * n_outer)
     listing += int(min(CURVED_BATCH_MEMORY[0] * n_test, CURVED_BATCH_MEMORY[1]) if is_curved else BATCH_MEMORY)
@@ -194,7 +193,12 @@ def sweep_memory(degrees: Degrees, n_test: int, n_trial: int, n_threads: int, *,
     return max(listing, sweeping)
 
 
-def _rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:
+def row_slices(n: int, n_rows: int, edges: Sequence[int] = ()) -> Iterator[slice]:
+    """Cut n rows into chunks of so many, and at some edges, too."""
+    yield from (slice(*ends) for ends in itertools.pairwise(sorted({*range(0, n, n_rows), *edges, n})))
+
+
+def rows_per_chunk(degrees: Degrees, n_trial: int, n_points: int) -> int:
     """Return how many rows of pairs fit into the cache, where the inner integrals of all points are held at once."""
     n_rows = min(CHUNK_PAIRS, CHUNK_INTEGRALS // degrees.n_products) // max(1, n_trial)
     return max(1, 3 * n_rows // max(3, n_points))

@@ -22,6 +22,13 @@ def multiply(left: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(dgemm(1.0, a, b, trans_a=trans_a, trans_b=trans_b))
 
 
+def subtract_product(target: FloatArray, left: FloatArray, right: FloatArray) -> None:
+    """Subtract left @ right.T from a column-major array in its place."""
+    from scipy.linalg.blas import dgemm
+
+    dgemm(-1.0, left, right, beta=1.0, c=target, trans_b=1, overwrite_c=1)
+
+
 class SingularMatrixError(InputError):
     """A matrix that must be regular is not; the message names it."""
 
@@ -34,6 +41,8 @@ class Cholesky:
     matrix : (n, n) array
     name : str
         What the matrix stands for, for the message.
+    overwrite : bool
+        Whether the matrix is needed no longer: a row-major one is then factored in its place.
 
     Raises
     ------
@@ -41,13 +50,15 @@ class Cholesky:
         If the matrix is not positive definite to working precision.
     """
 
-    def __init__(self, matrix: FloatArray, name: str) -> None:
+    def __init__(self, matrix: FloatArray, name: str, *, overwrite: bool = False) -> None:
         from scipy.linalg.lapack import dpotrf
 
-        # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
-        self._factor, info = dpotrf(np.array(matrix.T, order="F"), lower=1, overwrite_a=1, clean=0)
         # each pivot by its own diagonal entry: on graded meshes these differ by the square of the grading
-        pivots, sizes = np.diag(self._factor), np.sqrt(np.abs(np.diag(matrix)))
+        sizes = np.sqrt(np.abs(np.diag(matrix)))
+        # the transpose of a row-major matrix is column-major: no copy beyond the one that is overwritten
+        own = np.asarray(matrix.T, order="F") if overwrite else np.array(matrix.T, order="F")
+        self._factor, info = dpotrf(own, lower=1, overwrite_a=1, clean=0)
+        pivots = np.diag(self._factor)
         if info or np.any(pivots <= 1e-14 * sizes):
             raise SingularMatrixError(
                 f"{name} is not positive definite: check for coincident elements and for supports that leave "

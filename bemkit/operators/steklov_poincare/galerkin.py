@@ -35,6 +35,8 @@ from bemkit.operators.steklov_poincare.schur import SchurCondensation
 from bemkit.operators.steklov_poincare.volume_constraint import Volume
 
 _DIRECT = DenseCholesky()
+_MIRRORED = 128
+"""Rows that are mirrored at a time, so that they stay in the cache."""
 _HELD_BODY = "the body held by its supports and its contact boundary"
 
 
@@ -237,12 +239,15 @@ class GalerkinElasticity:
 
 
 def _symmetric_sum(hyper: FloatArray, whitened_trace: FloatArray) -> FloatArray:
-    """Return the symmetric part of `hyper` plus whitened_trace^T whitened_trace, read-only."""
+    """Return `hyper`, symmetric, plus whitened_trace^T whitened_trace, read-only; `hyper` is overwritten."""
     from scipy.linalg.blas import dsyrk
 
-    half: FloatArray = dsyrk(1.0, whitened_trace.T, lower=1)  # column-major, zero above the diagonal
-    half[np.diag_indices_from(half)] *= 0.5
-    half += 0.5 * hyper.T
-    matrix = half + half.T
+    # one triangle, row-major that above the diagonal, which is then copied below it
+    column_major = hyper.T if hyper.flags.c_contiguous else hyper
+    matrix: FloatArray = dsyrk(1.0, whitened_trace.T, beta=1.0, c=column_major, lower=1, overwrite_c=1).T
+    for begin in range(0, len(matrix), _MIRRORED):
+        own, after = slice(begin, begin + _MIRRORED), slice(begin + _MIRRORED, None)
+        matrix[after, own] = matrix[own, after].T
+        matrix[own, own] = np.triu(matrix[own, own]) + np.triu(matrix[own, own], 1).T
     read_only(matrix)
     return matrix

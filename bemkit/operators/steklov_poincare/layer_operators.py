@@ -18,7 +18,7 @@ from bemkit.operators.forms import (
     mass_entries,
     mass_product,
 )
-from bemkit.operators.linear.dense import Cholesky, multiply
+from bemkit.operators.linear.dense import Cholesky, multiply, subtract_product
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import traction_free_modes
 
@@ -51,7 +51,7 @@ class Layers:
         """Return L^-1 B less its projection on `resultant`."""
         whitened = self.single_layer.solve_lower(self.trace_operator)
         if self.resultant.shape[1]:
-            whitened -= multiply(multiply(whitened.T, self.resultant), self.resultant.T).T
+            subtract_product(whitened.T, multiply(whitened.T, self.resultant), self.resultant)
         return whitened
 
 
@@ -84,7 +84,7 @@ def assemble_layers(
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
     annihilated = mass_product(t, t, pressures[:, : 0 if is_compressible else None])
     kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
-    factor = Cholesky(_without_kernel(v, kernel), "the single layer operator")
+    factor = Cholesky(_without_kernel(v, kernel), "the single layer operator", overwrite=True)
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     motions = traction_free_modes(mesh, dof_points(u))
     resultants = mass_product(u, t, motions)

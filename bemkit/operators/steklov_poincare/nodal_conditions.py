@@ -186,6 +186,20 @@ def rotate_rows(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     return rotate_columns(matrix.T, frame).T
 
 
+def rotated(matrix: FloatArray, frame: FloatArray) -> FloatArray:
+    """Express both the rows and the columns of a matrix in the frames (n_nodes, 2, 2) of the nodes."""
+    turned = np.flatnonzero(np.any(frame != np.eye(2), axis=(1, 2)))
+    if not turned.size:
+        return matrix
+    result = matrix.copy()
+    first, second = 2 * turned, 2 * turned + 1
+    along_x, along_y = (frame[turned, :, c, None] for c in range(2))
+    for own in (result, result.T):  # the rows, then the columns
+        x, y = own[first], own[second]
+        own[first], own[second] = along_x[:, 0] * x + along_y[:, 0] * y, along_x[:, 1] * x + along_y[:, 1] * y
+    return result
+
+
 def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditions:
     """Collect the supports at the nodes of a space; every other direction is free.
 

@@ -10,7 +10,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotate_columns, rotate_rows
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
 
@@ -45,7 +45,7 @@ class SchurCondensation:
 
     def __post_init__(self) -> None:
         conditions = self.conditions
-        matrix = rotate_rows(rotate_columns(self.matrix, conditions.frame), conditions.frame)
+        matrix = rotated(self.matrix, conditions.frame)
         self._free, self._retained, self._fixed = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_retained, conditions.is_fixed)
         )
