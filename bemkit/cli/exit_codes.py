@@ -6,4 +6,4 @@ BAD_INPUT = 2
 """One line on standard error says what is wrong."""
 INACCURATE = 3
 """Certified, but less accurate than asked for."""
-INTERRUPTED, PIPE_CLOSED = 130, 141
+INTERRUPTED, PIPE_CLOSED, TERMINATED = 130, 141, 143

@@ -1,17 +1,22 @@
 """The command line: the program ``bemkit`` and its commands.
 
 Exit codes: 0 solved, 1 solved but not converged, 2 bad input (one line on standard error), 3 accuracy not reached, 130
-interrupted.
+interrupted, 143 terminated by the system.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
-from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, NOT_CONVERGED, PIPE_CLOSED
+from bemkit.cli.exit_codes import BAD_INPUT, INTERRUPTED, NOT_CONVERGED, PIPE_CLOSED, TERMINATED
 from bemkit.errors import BemkitError, NoResultError, one_line, printable
 from bemkit.results.streams import PipeClosedError, guarded_streams
 from bemkit.version import __version__
@@ -44,7 +49,7 @@ def main(arguments: list[str] | None = None) -> None:
     arguments : list of str, optional
         By default those of the process.
     """
-    with guarded_streams():
+    with guarded_streams(), _terminable():
         code = _run_to_end(arguments)
     sys.exit(code)
 
@@ -67,13 +72,36 @@ def _run_to_end(arguments: list[str] | None) -> int:
     except BemkitError as error:
         _complain(one_line(error))
         code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
-    except (click.Abort, KeyboardInterrupt):
-        _complain("interrupted; no file is half written")
-        code = INTERRUPTED
+    except (click.Abort, KeyboardInterrupt) as error:
+        is_ctrl_c = not isinstance(error.__cause__ or error, _TerminatedError)
+        _complain(f"{'interrupted' if is_ctrl_c else 'terminated'}; no file is half written")
+        code = INTERRUPTED if is_ctrl_c else TERMINATED
     except MemoryError:
         _complain("not enough memory: use fewer elements (--elements N)")
         code = BAD_INPUT
     return code if isinstance(code, int) else 0
+
+
+class _TerminatedError(KeyboardInterrupt):
+    """The system asks the process to end (SIGTERM)."""
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """End like Ctrl-C when the system asks for it, as batch queues do: locks and temporary files are removed."""
+
+    def end(*_: object) -> NoReturn:
+        raise _TerminatedError
+
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:  # the program around has its own way
+        yield
+        return
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 class _Commands(click.Group):

@@ -366,6 +366,6 @@ def _check(n_elements: int, memory: int, is_compressed: bool) -> None:
     if memory > available:
         n_fitting = int((available / memory) ** (1.0 if is_compressed else 0.5) * n_elements)
         raise TooLargeError(
-            f"{n_elements} elements need about {memory / 1e9:.3g} GB, this computer has {available / 1e9:.3g} GB: "
+            f"{n_elements} elements need about {memory / 1e9:.3g} GB, there are {available / 1e9:.3g} GB: "
             f"use at most {n_fitting} elements"
         )

@@ -19,15 +19,18 @@ import click
 import pytest
 
 import bemkit.__main__
+import bemkit.operators.hierarchy.skeletons
 import bemkit.results.outcome_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import commands, main
+from bemkit.operators.linear.solvers import Hierarchical
 from bemkit.results.result_file import read_result
 from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
+from bemkit.solvers.ssn import SemismoothNewton
 from tests.slow import slow_except
 
 SMALL = ["--elements", "40"]
@@ -330,6 +333,46 @@ def test_a_real_ctrl_c_ends_with_130() -> None:
     assert process.returncode == 130
     assert errors.strip() == "bemkit: error: interrupted; no file is half written"
     assert os.listdir() == []
+
+
+STAGES = {
+    "compression": (bemkit.operators.hierarchy.skeletons.CollocationView, "skeleton"),
+    "contact step": (SemismoothNewton, "step"),
+    "writing": (bemkit.results.outcome_file, "_write_mesh"),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize(
+    ("sent", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_a_compressed_run_that_is_ended_says_so_and_leaves_no_file(
+    stage: str,
+    sent: signal.Signals,
+    code: int,
+    word: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    owner, name = STAGES[stage]
+    work = getattr(owner, name)
+
+    def ended(*arguments: object, **options: object) -> object:
+        os.kill(os.getpid(), sent)
+        return work(*arguments, **options)
+
+    Path("large.toml").write_text(
+        scene_to_toml(dataclasses.replace(load_scene("paper-1"), linear_solver=Hierarchical()))
+    )
+    monkeypatch.setattr(owner, name, ended)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job does not heed it
+    try:
+        assert call("run", "large.toml", "--discretisation", "constant", "--elements", "800", "-o", "r.h5") == code
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert os.listdir() == ["large.toml"]
+    assert capsys.readouterr().err.strip() == f"bemkit: error: {word}; no file is half written"
 
 
 def test_an_interrupt_while_the_command_line_loads_is_one_line(

@@ -15,6 +15,7 @@ from bemkit.contact.laws import Frictionless
 from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.shapes import Disk, Rectangle
 from bemkit.operators.material import Material
+from bemkit.operators.steklov_poincare.needs import physical_memory
 from bemkit.plan import Plan, TooLargeError, check_elements, check_memory, make_plan
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, PrescribedDisplacement, Roller
 from bemkit.scene.mesh_options import MeshOptions
@@ -200,10 +201,22 @@ def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.Mon
     plan = plan_of(load_scene("paper-1"))
     check_memory(plan)
     monkeypatch.setattr(bemkit.plan.plan, "physical_memory", lambda: 0.25 * plan.memory)
-    message = f"320 elements need about {plan.memory / 1e9:.3g} GB, this computer has .* GB: use at most 160 elements"
+    message = f"320 elements need about {plan.memory / 1e9:.3g} GB, there are .* GB: use at most 160 elements"
     with pytest.raises(TooLargeError, match=message):
         check_memory(plan)
     with pytest.raises(TooLargeError, match="use at most 160 elements"):
+        bk.run(load_scene("paper-1"))
+
+
+def test_a_limit_of_the_process_counts_as_its_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    resource = pytest.importorskip("resource")
+    whole = physical_memory()
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (resource.RLIM_INFINITY,) * 2)
+    assert physical_memory() == whole
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (1 << 30, 1 << 30))
+    assert physical_memory() < float(1 << 30)  # what the interpreter takes is off
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (1 << 20, 1 << 20))
+    with pytest.raises(TooLargeError, match=r"320 elements need about \S+ GB, there are 0 GB"):
         bk.run(load_scene("paper-1"))
 
 
@@ -221,7 +234,7 @@ def test_a_million_elements_are_refused_before_the_mesh_is_made(
     monkeypatch.setattr(bk.Scene, "build_mesh", watched)
     with pytest.raises(SystemExit, match="2"):
         main([command, "paper-1", "--elements", "1000000", "--degree", "3"])
-    message = r"1000000 elements need about \S+ GB, this computer has \S+ GB: use at most \d+ elements"
+    message = r"1000000 elements need about \S+ GB, there are \S+ GB: use at most \d+ elements"
     assert re.search(message, capsys.readouterr().err)
     assert max(filter(None, built)) <= 5000  # small ones, by which the large one is judged
 

@@ -17,7 +17,6 @@ from bemkit.contact.conditions import LinearConditions, stick
 from bemkit.geometry.spaces import dof_points
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imbalance
-from bemkit.operators.hierarchy.factor import ElementLaws
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import admissible_modes, without_motion
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -117,7 +116,7 @@ class HierarchicalBody(LinearBody):
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         state = self._solved(conditions)
-        self._responses.append(_Response(state, conditions, self._moving.system.answered))
+        self._responses.append(_Response(state, conditions, self._moving.system.n_answers))
         del self._responses[:-_KEPT]
         return state
 
@@ -187,7 +186,7 @@ class HierarchicalBody(LinearBody):
             if fields.state is state:
                 return fields
         response = next((each for each in self._responses if each.state is state), None)
-        if response is None or response.laws is not self._moving.system.answered:
+        if response is None or response.answer != self._moving.system.n_answers:
             self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
         loaded = self._moving
         strained, traction = loaded.everywhere()
@@ -258,11 +257,11 @@ class HierarchicalBody(LinearBody):
 
 @dataclass(frozen=True, eq=False)
 class _Response:
-    """A state, the conditions that have led to it, and what the equations made of these."""
+    """A state, the conditions that have led to it, and the number of the answer of the equations to these."""
 
     state: ContactState
     conditions: LinearConditions
-    laws: ElementLaws | None
+    answer: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ def collocation_system(
     *,
     may_be_traction: BoolArray,
     may_be_displacement: BoolArray,
+    may_change: BoolArray,
     slopes: bool,
     tolerance: float,
 ) -> HierarchicalSystem:
@@ -39,6 +40,8 @@ def collocation_system(
         Rows are the directions of the conditions of each element.
     may_be_traction, may_be_displacement : (n_elements,) bool arrays
         Elements whose traction, and whose displacement, may ever differ from zero.
+    may_change : (n_elements,) bool array
+        Elements whose conditions change by themselves; see `HierarchicalFactor`.
     slopes : bool
         Whether the double layer takes slopes.
     tolerance : float
@@ -57,7 +60,8 @@ def collocation_system(
     may_differ = np.concatenate([may_differ, np.tile([True, True, False, False], (len(holes), 1))])
     compression = Compression.of(columns, tree, may_differ[tree.order], tolerance)
     border = boundary_border(mesh, material, tree.order, slopes, has_holes=not holes)
-    return HierarchicalSystem(compression, border, frame, mesh.diameter / n / material.plane_modulus)
+    unit = mesh.diameter / n / material.plane_modulus
+    return HierarchicalSystem(compression, border, frame, unit, may_change)
 
 
 def _holes(mesh: BoundaryMesh) -> list[IntArray]:

@@ -130,6 +130,9 @@ class HierarchicalFactor:
     ----------
     compression : Compression
     border : Border
+    may_change : frozenset of int
+        Leaves whose conditions change by themselves. Clusters without any are merged once, and keep no scattering
+        matrices: if something changes there all the same, the whole cluster is factored again.
 
     Notes
     -----
@@ -138,15 +141,19 @@ class HierarchicalFactor:
 
     compression: Compression
     border: Border
+    may_change: frozenset[int]
     laws: ElementLaws | None = None
+    n_updates: int = 0
     n_factored: int = 0
     _levels: list[list[_Cluster | None]] = field(default_factory=list)
     _stale: set[int] = field(default_factory=set)
+    _changing: list[set[int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         n_levels = self.compression.tree.n_levels
         self._levels = [[None] * 2 ** (n_levels - level) for level in range(n_levels + 1)]
         self._stale = set(range(self.compression.tree.n_leaves))
+        self._changing = [{leaf >> level for leaf in self.may_change} for level in range(n_levels + 1)]
 
     def update(self, laws: ElementLaws) -> None:
         """Take over the conditions on all elements, and factor every leaf where they have changed, and what is above.
@@ -162,23 +169,39 @@ class HierarchicalFactor:
                 laws.given != self.laws.given, axis=1
             )
             self._stale |= set(tree.leaves_of(np.flatnonzero(differs)).tolist())
-        self.laws = laws
-        changed = sorted(self._stale)
+        self.laws, self.n_updates = laws, self.n_updates + 1
+        changed = sorted(self._merged_with(self._stale))
+        self.n_factored = len(changed)
+        for level, factored in enumerate(self._levels):  # their memory is for the new ones
+            for cluster in {leaf >> level for leaf in changed}:
+                factored[cluster] = None
         n_integrals = len(changed) * tree.bounds[1] ** 2
 
         def factor_leaf(leaf: int) -> _Cluster:
             places = tree.places(0, leaf)
             return self._leaf(leaf, laws.factors[places], laws.given[places].reshape(-1, 1))
 
-        for leaf, factored in zip(changed, for_each_chunk(factor_leaf, changed, n_integrals=n_integrals), strict=True):
-            self._levels[0][leaf] = factored
+        for leaf, factors in zip(changed, for_each_chunk(factor_leaf, changed, n_integrals=n_integrals), strict=True):
+            self._levels[0][leaf] = factors
         for level in range(1, tree.n_levels + 1):
             changed = sorted({cluster // 2 for cluster in changed})
             merge = partial(self._parent, level)
             for cluster, merged in zip(changed, for_each_chunk(merge, changed, n_integrals=n_integrals), strict=True):
                 self._levels[level][cluster] = merged
-        self.n_factored = len(self._stale)
         self._stale = set()
+
+    def _merged_with(self, leaves: set[int]) -> set[int]:
+        """Return some leaves, and those in one cluster with them that has been merged for good."""
+        found: set[int] = set()
+        for leaf in leaves:
+            if leaf in found:
+                continue
+            level = 0
+            while level < self.compression.tree.n_levels and leaf >> (level + 1) not in self._changing[level + 1]:
+                level += 1
+            begin = leaf >> level << level
+            found.update(range(begin, begin + 2**level))
+        return found
 
     def unknowns(self, leaves: IntArray) -> FloatArray:
         """Return the unknowns z (n, 2) of the elements of some leaves, in their order.
@@ -269,9 +292,12 @@ class HierarchicalFactor:
         return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
-        return self._merged(
-            level, cluster, self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
-        )
+        pair = self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
+        merged = self._merged(level, cluster, *pair)
+        if cluster not in self._changing[level]:
+            for each in pair:
+                each.scattering = np.zeros((0, 0))
+        return merged
 
     def _merged(self, level: int, cluster: int, one: _Cluster, two: _Cluster) -> _Cluster:
         """Merge two clusters under the same loads.

@@ -107,13 +107,14 @@ class MatrixFreeSystem(HierarchicalSystem):
         self._state, self._errors = np.zeros((self._order.size, 4)), np.zeros(self._whole.errors.shape[1])
         self._laws: ElementLaws | None = None
         self._inverse: Preconditioner | None = None
+        self._n_answers = 0
         self.steps: list[int] = []
         """Steps of all responses so far."""
 
     @property
-    def answered(self) -> ElementLaws | None:
-        """What the last `state` was asked."""
-        return self._laws
+    def n_answers(self) -> int:
+        """How often conditions were asked for."""
+        return self._n_answers
 
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements; see `HierarchicalSystem.state`.
@@ -125,6 +126,7 @@ class MatrixFreeSystem(HierarchicalSystem):
         NotConvergedError
             If the steps do not suffice.
         """
+        self._n_answers += 1
         places, turned = self._place[elements], self.turned(elements, self.local_laws(conditions))
         laws = ElementLaws(known.factors.copy(), known.given.copy())
         laws.factors[places], laws.given[places] = turned.factors, turned.given

@@ -60,18 +60,28 @@ class HierarchicalSystem:
         Rows are the directions of the conditions of each element; those of Galerkin's method stand at nodes.
     displacement_unit : float [m/Pa]
         Displacement by traction of a single element.
+    may_change : (n_elements,) bool array
+        Elements whose conditions change by themselves; see `HierarchicalFactor`.
 
     Notes
     -----
     Places of the tree beyond the elements, holes or tractions that no condition binds, have a traction alone.
     """
 
-    def __init__(self, compression: Compression, border: Border, frame: FloatArray, displacement_unit: float) -> None:
+    def __init__(
+        self,
+        compression: Compression,
+        border: Border,
+        frame: FloatArray,
+        displacement_unit: float,
+        may_change: BoolArray,
+    ) -> None:
         self.compression, self._tree, self._columns = compression, compression.tree, compression.columns
         self._order, self._n_elements, self._unit = self._tree.order, len(frame), displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
-        self.factor = HierarchicalFactor(compression, border)
+        changing = self._tree.leaves_of(self._place[np.flatnonzero(may_change)])
+        self.factor = HierarchicalFactor(compression, border, frozenset(changing.tolist()))
         self._frame = np.concatenate([frame, np.tile(np.eye(2), (self._order.size - len(frame), 1, 1))])
 
     @property
@@ -80,9 +90,9 @@ class HierarchicalSystem:
         return self._n_elements
 
     @property
-    def answered(self) -> ElementLaws | None:
-        """What the last `state` was asked; another object after every further one."""
-        return self.factor.laws
+    def n_answers(self) -> int:
+        """How often conditions were asked for; what is known everywhere belongs to the last ones."""
+        return self.factor.n_updates
 
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.

@@ -129,6 +129,7 @@ class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
             conditions.frame,
             may_be_traction=may_be_loaded,
             may_be_displacement=may_move,
+            may_change=np.any(conditions.is_retained, axis=1),
             slopes=self.slopes,
             tolerance=self.options.tolerance,
         )

@@ -115,11 +115,13 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
     def system(self, conditions: NodalConditions, may_be_loaded: BoolArray, may_move: BoolArray) -> HierarchicalSystem:
         """Return the compressed equations of nodes and tractions."""
         volume = self._volume
-        return self._system(conditions.frame, volume.change, volume.yields)
+        return self._system(conditions.frame, volume.change, volume.yields, np.any(conditions.is_retained, axis=1))
 
-    def _system(self, frame: FloatArray, change: FloatArray, yields: float) -> HierarchicalSystem:
+    def _system(
+        self, frame: FloatArray, change: FloatArray, yields: float, may_change: BoolArray
+    ) -> HierarchicalSystem:
         unit = self.mesh.diameter / self.mesh.n_elements / self.material.plane_modulus
-        return HierarchicalSystem(self.compression, self._border(change, yields), frame, unit)
+        return HierarchicalSystem(self.compression, self._border(change, yields), frame, unit, may_change)
 
     def _without_pressure(self, displacement: FloatArray) -> FloatArray:
         """Return S u of the dilatation, whose tractions are the uniform pressure alone, without that pressure."""
@@ -127,7 +129,7 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
 
     def _tractions_without_pressures(self, displacement: FloatArray) -> FloatArray:
         n = self.displacement_space.n_dofs // 2
-        system = self._system(np.tile(np.eye(2), (n, 1, 1)), np.zeros((2 * n, 0)), 0.0)
+        system = self._system(np.tile(np.eye(2), (n, 1, 1)), np.zeros((2 * n, 0)), 0.0, np.zeros(n, bool))
         held = NodeConditions.given(np.ones((n, 2), bool), np.zeros((n, 2)), displacement.reshape(-1, 2))
         none = np.zeros(0, np.intp)
         system.state(

@@ -176,7 +176,7 @@ def _gain(
     if share < _SHARE:
         return ChosenLinearSolver(_DIRECT, f"about {share:.2g} of the time of dense equations", options)
     if compressed.memory < memory < dense.memory:
-        reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, this computer has {memory / 1e9:.3g} GB"
+        reason = f"dense ones need about {dense.memory / 1e9:.3g} GB, there are {memory / 1e9:.3g} GB"
         return ChosenLinearSolver(_DIRECT, reason, options)
     return f"compressed over a tree they would take {share:.2g} times as long"
 

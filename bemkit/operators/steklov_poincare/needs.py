@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -282,8 +283,20 @@ def _evaluations(case: BodyCase, straight: tuple[float, float], curved: tuple[fl
 
 
 def physical_memory() -> float:
-    """Return the memory of this computer [bytes], infinite on systems that do not tell."""
+    """Return the memory of this computer, or what `ulimit -v` leaves to this process, if that is less [bytes].
+
+    It is infinite on systems that do not tell.
+    """
     try:
-        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+        page = float(os.sysconf("SC_PAGE_SIZE"))
+        memory = page * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return float("inf")
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        taken = page * int(Path("/proc/self/statm").read_text().split()[0])
+    except (ImportError, OSError):  # not a system of the Linux family
+        return memory
+    return memory if limit == resource.RLIM_INFINITY else min(memory, max(limit - taken, 0.0))

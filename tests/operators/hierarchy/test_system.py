@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.operators.hierarchy.collocation_system import collocation_system
 from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor, SingularClusterError
@@ -54,7 +54,9 @@ def conditions_of(mesh: BoundaryMesh, seed: int) -> tuple[NodalConditions, Float
     return conditions, np.einsum("nkc,nk->nc", frame, local), kept
 
 
-def system_of(mesh: BoundaryMesh, frame: FloatArray, slopes: bool, tolerance: float) -> HierarchicalSystem:
+def system_of(
+    mesh: BoundaryMesh, frame: FloatArray, slopes: bool, tolerance: float, may_change: BoolArray | None = None
+) -> HierarchicalSystem:
     everywhere = np.ones(mesh.n_elements, bool)
     return collocation_system(
         mesh,
@@ -62,6 +64,7 @@ def system_of(mesh: BoundaryMesh, frame: FloatArray, slopes: bool, tolerance: fl
         frame,
         may_be_traction=everywhere,
         may_be_displacement=everywhere,
+        may_change=everywhere if may_change is None else may_change,
         slopes=slopes,
         tolerance=tolerance,
     )
@@ -195,3 +198,26 @@ def test_an_interrupted_factorisation_loses_nothing(monkeypatch: pytest.MonkeyPa
         fresh.state(conditions_now, NOWHERE, NOTHING)
         for found, expected in zip(system.everywhere(), fresh.everywhere(), strict=True):
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
+
+
+def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_all_the_same() -> None:
+    mesh = mesh_of("rectangle", 700)
+    conditions, force, kept = conditions_of(mesh, 3)
+    in_contact = np.arange(mesh.n_elements) < 80
+    system = system_of(mesh, conditions.frame, True, 1e-9, in_contact)
+    every = system_of(mesh, conditions.frame, True, 1e-9)
+    laws = laws_of(system, mesh, conditions, force, kept)
+    n_leaves = system.factor.compression.tree.n_leaves
+    nowhere_else = []
+    for place in (0, 699, 350):
+        elements, one = (
+            np.array([place]),
+            NodeConditions.given(np.ones((1, 2), bool), np.zeros((1, 2)), np.ones((1, 2))),
+        )
+        states = [each.state(laws, elements, one) for each in (system, every)]
+        np.testing.assert_array_equal(*states)
+        for found, expected in zip(system.everywhere(), every.everywhere(), strict=True):
+            np.testing.assert_array_equal(found, expected)
+        nowhere_else.append(system.factor.n_factored)
+    assert system.factor.n_bytes < 0.9 * every.factor.n_bytes
+    assert every.factor.n_factored <= 2 < nowhere_else[-1] < n_leaves
