@@ -49,15 +49,15 @@ class Clusters:
         return cls(tree, tuple(_discs(tree, points, level) for level in range(tree.n_levels + 1)))
 
     def divided(
-        self, x: ComplexArray, is_far: Callable[[IntArray, FloatArray, FloatArray], BoolArray]
+        self, n_points: int, is_far: Callable[[int, IntArray, IntArray], BoolArray]
     ) -> tuple[list[Pairs], Pairs]:
         """Divide the elements into clusters far from points and elements near them, each element in one of the two.
 
         Parameters
         ----------
-        x : (n_points,) complex array [m]
-        is_far : callable (points, distances, radii) -> (n_pairs,) mask
-            Of points (n_pairs,) and clusters: distances of the points from the centres, and radii.
+        n_points : int
+        is_far : callable (level, points, clusters) -> (n_pairs,) mask
+            Of a level and arrays (n_pairs,) of points and clusters.
 
         Returns
         -------
@@ -66,12 +66,12 @@ class Clusters:
         near : pair of arrays
             Points, ascending, and numbers of elements.
         """
-        point, cluster = np.arange(x.size), np.zeros(x.size, np.intp)
+        point, cluster = np.arange(n_points), np.zeros(n_points, np.intp)
         far: list[Pairs] = []
-        for discs in self.levels[::-1]:
+        for level in range(self.tree.n_levels, -1, -1):
             if far:
-                point, cluster = np.repeat(point, 2), (2 * cluster[:, None] + [0, 1]).ravel()
-            away = is_far(point, np.abs(x[point] - discs.centre[cluster]), discs.radius[cluster])
+                point, cluster = np.repeat(point, 2), (2 * cluster[:, None] + np.array([0, 1])).ravel()
+            away = is_far(level, point, cluster)
             far.append((point[away], cluster[away]))
             point, cluster = point[~away], cluster[~away]
         begins, counts = self.tree.bounds[cluster], np.diff(self.tree.bounds)[cluster]
@@ -81,7 +81,8 @@ class Clusters:
 def consecutive(begins: IntArray, counts: IntArray) -> IntArray:
     """Return begins[0], begins[0] + 1, ... (counts[0] numbers), begins[1], ..."""
     ends = np.cumsum(counts)
-    return np.arange(counts.sum()) + np.repeat(begins - (ends - counts), counts)
+    numbers: IntArray = np.arange(counts.sum()) + np.repeat(begins - (ends - counts), counts)
+    return numbers
 
 
 def _discs(tree: ClusterTree, points: ComplexArray, level: int) -> Discs:

@@ -188,7 +188,8 @@ class FastMultipole(_LinearOperator):
 
 def _interactions(clusters: Clusters) -> tuple[list[_Level], _Near]:
     """Return the levels from the leaves up to the last one with pairs, and the leaves near each leaf."""
-    pairs, levels = np.zeros((1, 2), np.intp), []
+    pairs = np.zeros((1, 2), np.intp)
+    levels: list[_Level] = []
     for discs in clusters.levels[::-1]:
         if levels:
             children = 2 * pairs[:, None, :] + np.array([[0, 0], [0, 1], [1, 0], [1, 1]])

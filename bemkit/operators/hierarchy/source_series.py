@@ -84,7 +84,7 @@ class SourceSeries:
             sources = sources_of(places[chosen], n_points)
             n_sources = sources.place.shape[1]
             own = np.repeat(leaf[chosen], n_sources)
-            place, f, g, e = (np.ravel(each) for each in sources)
+            place, f, g, e = sources.place.ravel(), sources.f.ravel(), sources.g.ravel(), sources.e.ravel()
             result[present - some.start] += self.expansions.of_sources(
                 Sources(place - leaves.centre[own], f, g, e), leaves.radius[own], n_sources * first
             )
