@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
@@ -73,11 +72,11 @@ class Locator:
             self._on_elements(at) for at in (self._low, 0.5 * (self._low + self._high), self._high)
         )
         self._bulge = _BULGE * np.abs(middle - 0.5 * (self._start + self._end))
-        self._nodes = KDTree(np.column_stack([self._start.real, self._start.imag]))
         tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
         # one column for each element, its chords in rows, the last one repeated
         chord = self._first + np.minimum(np.arange(n_chords.max())[:, None], n_chords - 1)
         ends = np.concatenate([self._start[self._first][None], self._end[chord]])[:, tree.order]
+        self._node = ends[0]
         self.clusters = Clusters.around(tree, ends)
         self._boxes = [_boxes(self.clusters, ends, level) for level in range(tree.n_levels + 1)]
         self._largest_bulge = float(self._bulge.max())
@@ -104,8 +103,7 @@ class Locator:
     def _chunk(self, x: ComplexArray, resolution: float) -> tuple[BoolArray, FloatArray, IntArray, FloatArray]:
         """Return whether points are left of the boundary, their distance from it, nearest element and place there."""
         point, element, xi, distance, across = self._candidates(x)
-        begins = np.searchsorted(point, np.arange(x.size))
-        nearest = np.minimum.reduceat(distance, begins) if x.size else distance
+        nearest = _smallest(distance, point, x.size)
         # of two elements that meet in the nearest point, the one more across the way there knows the side
         is_nearest = np.flatnonzero(distance <= nearest[point] + resolution)
         order = is_nearest[np.lexsort((-np.abs(across[is_nearest]), point[is_nearest]))]
@@ -117,10 +115,12 @@ class Locator:
 
         And the sine of the angle from the element to the way from there to the point.
         """
-        to_node = np.asarray(self._nodes.query(np.column_stack([x.real, x.imag]))[0])
-        reach = to_node * (1.0 + 1e-9) + self._largest_bulge
+        reach = np.full(x.size, np.inf)
 
         def is_far(level: int, point: IntArray, cluster: IntArray) -> BoolArray:
+            places = self.clusters.tree.bounds[: -1 : 2**level]
+            to_node = np.abs(x[point] - self._node[places[cluster]]) * (1.0 + 1e-9) + self._largest_bulge
+            np.minimum(reach, _smallest(to_node, point, x.size), out=reach)
             (along, half), centre = self._boxes[level], self.clusters.levels[level].centre
             way = (x[point] - centre[cluster]) * along[cluster].conj()
             beside, across = np.abs(way.real) - half.real[cluster], np.abs(way.imag) - half.imag[cluster]
@@ -130,8 +130,7 @@ class Locator:
         counts = np.diff(np.append(self._first, self._owner.size))[element]
         point, chord = np.repeat(point, counts), consecutive(self._first[element], counts)
         xi, distance = self._on_chords(x[point], chord)
-        begins = np.searchsorted(point, np.arange(x.size))
-        farthest = np.minimum.reduceat(distance + self._bulge[chord], begins) if x.size else distance
+        farthest = _smallest(distance + self._bulge[chord], point, x.size)
         near = np.flatnonzero(distance - self._bulge[chord] <= farthest[point] * (1.0 + 1e-9))
         point, element, xi, distance = point[near], self._owner[chord[near]], xi[near], distance[near]
         start, end = self._start[chord[near]], self._end[chord[near]]
@@ -156,18 +155,26 @@ class Locator:
     def _refine(
         self, x: ComplexArray, element: IntArray, xi: FloatArray
     ) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-        """Move to the nearest point of a curved element by Gauss-Newton steps.
+        """Move to the nearest point of a curved element by Newton's steps, with one second derivative for the element.
 
         Return its local coordinate, the way from there to the point, and the tangent there.
         """
+        _, ends = self._curved.place(element, np.tile([-1.0, 1.0], (element.size, 1)))
+        bend = 0.5 * (ends[:, 1] - ends[:, 0])
         for _ in range(N_REFINEMENTS):
             y, slope = self._curved.place(element, xi[:, None])
-            step = ((x - y[:, 0]) * slope[:, 0].conj()).real / np.abs(slope[:, 0]) ** 2
+            way, square = x - y[:, 0], np.abs(slope[:, 0]) ** 2
+            step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend.conj()).real, 0.5 * square)
             before, xi = xi, np.clip(xi + step, -1.0, 1.0)
             if np.abs(xi - before).max() <= _STANDS:
                 break
         y, slope = self._curved.place(element, xi[:, None])
         return xi, x - y[:, 0], slope[:, 0]
+
+
+def _smallest(values: FloatArray, point: IntArray, n_points: int) -> FloatArray:
+    """Return the smallest of the values of each point; points ascend, and each of them is there."""
+    return np.minimum.reduceat(values, np.searchsorted(point, np.arange(n_points))) if n_points else values
 
 
 def _boxes(clusters: Clusters, points: ComplexArray, level: int) -> tuple[ComplexArray, ComplexArray]:
