@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""
-MOST_ELEMENTS = 5000
-"""Elements up to which stresses inside are drawn where no picture is named: each point sees all of them."""
 
 
 @dataclass(frozen=True)
@@ -133,10 +131,6 @@ def _has_few_contacts(result: Result) -> bool:
     return len(result.contact.parts) <= MOST_CONTACTS
 
 
-def _has_few_elements(result: Result) -> bool:
-    return sum(body.mesh.n_elements for body in result.solved_bodies) <= MOST_ELEMENTS
-
-
 def _once(draw: Callable[[Result], Axes]) -> Callable[[Result], Mapping[str, Axes]]:
     return lambda result: {"": draw(result)}
 
@@ -194,7 +188,7 @@ _ALL = (
             f"{measure.symbol.replace('$', '').replace(chr(92), '')} inside the bodies",
             _once(partial(draw_stress, measure=name)),
             _without_inside,
-            _has_few_elements if name == "von-mises" else _never,
+            _always if name == "von-mises" else _never,
         )
         for name, measure in STRESSES.items()
     ),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
@@ -70,17 +70,29 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray, *, moved:
     inner = _inner_points(on_boundary, normals, lengths, spacing, frame, mesh.is_exterior)
     inner = inner[fields.is_inside(inner)]
     corners, at_corners = _at_nodes(mesh, stresses.reshape(mesh.n_elements, n, 2, 2))
-    points = np.concatenate([on_boundary, corners, inner])
+    points, at_points = np.concatenate([on_boundary, corners]), np.concatenate([stresses, at_corners])
+    seen = _seen(points, at_points, _SMALLEST * spacing)
     if moved:
         own = values_on_elements(space, displacement)
-        at_points, at_ends = (
+        inside, at_ends = (
             np.einsum("pq,epc->eqc", space.basis(at), own).reshape(-1, 2) for at in (xi, np.array([-1.0]))
         )
-        known = np.concatenate([at_points, at_ends[np.maximum(mesh.node_elements[:, 1], 0)]])
+        known = np.concatenate([inside, at_ends[np.maximum(mesh.node_elements[:, 1], 0)]])
         if body.particular is not None:
-            known = known + body.particular.displacement(points[: len(known)])
-        points = points + np.concatenate([known, fields.displacement(inner)])
-    return StressPoints(points, np.concatenate([stresses, at_corners, fields.stress(inner)]))
+            known = known + body.particular.displacement(points)
+        points, at_inner = points + known, inner + fields.displacement(inner)
+    else:
+        at_inner = inner
+    return StressPoints(
+        np.concatenate([points[seen], at_inner]), np.concatenate([at_points[seen], fields.stress(inner)])
+    )
+
+
+def _seen(points: FloatArray, stresses: FloatArray, distance: float) -> IntArray:
+    """Return of points (n, 2) that are closer to each other than a distance the one with the largest stress."""
+    largest = np.argsort(-np.abs(stresses).max(axis=(1, 2)), kind="stable")
+    _, first = np.unique(np.round(points[largest] / distance), axis=0, return_index=True)
+    return np.sort(largest[first])
 
 
 def _on_boundary(

@@ -12,7 +12,7 @@ import pytest
 import bemkit as bk
 from bemkit.atomic_files import OutputFileError
 from bemkit.cli.main import main
-from bemkit.pictures import catalogue, figures, save_pictures
+from bemkit.pictures import figures, save_pictures
 from bemkit.pictures.catalogue import PICTURES, default_pictures
 from bemkit.results.solution import Solution
 from bemkit.scene.toml import scene_to_toml, with_overrides
@@ -65,16 +65,6 @@ def test_what_suits_a_result_is_drawn_where_nothing_is_named(solution: Solution)
     several = bk.run(with_overrides(bk.load_scene("two-cylinders"), elements=60))
     names = [picture.name for picture in default_pictures(several)]
     assert names == ["deformation", "zoom", "contacts", *DEFAULT[1:]]
-
-
-def test_stresses_of_many_elements_are_drawn_where_they_are_named_alone(
-    solution: Solution, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(catalogue, "MOST_ELEMENTS", solution.n_elements)
-    assert "von-mises" in [picture.name for picture in default_pictures(solution)]
-    monkeypatch.setattr(catalogue, "MOST_ELEMENTS", solution.n_elements - 1)
-    assert "von-mises" not in [picture.name for picture in default_pictures(solution)]
-    assert PICTURES["von-mises"].why_not(solution) == ""
 
 
 def test_pictures_of_several_contacts_are_numbered(solution: Solution) -> None:

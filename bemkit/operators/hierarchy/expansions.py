@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy.special import comb
@@ -28,6 +28,15 @@ from scipy.special import comb
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 
 Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
+
+
+class Sources(NamedTuple):
+    """Places w from a centre [m] and strengths f, g (complex) and e of sources, arrays of one shape."""
+
+    place: ComplexArray
+    f: ComplexArray
+    g: ComplexArray
+    e: FloatArray
 
 
 @dataclass(frozen=True)
@@ -58,23 +67,19 @@ class Expansions:
         m, k = np.meshgrid(self._powers, self._powers, indexing="ij")
         return np.asarray(np.where(k > 0, comb(m + k - 1, m), 0.0))
 
-    def of_sources(
-        self, arm: ComplexArray, radius: FloatArray, f: ComplexArray, g: ComplexArray, e: FloatArray, first: IntArray
-    ) -> ComplexArray:
+    def of_sources(self, sources: Sources, radius: FloatArray, first: IntArray) -> ComplexArray:
         """Return the series of clusters of sources.
 
         Parameters
         ----------
-        arm : (n_sources,) complex array [m]
-            From the centre of the cluster of each source.
+        sources : Sources of (n_sources,) arrays
+            Placed from the centre of the cluster of each.
         radius : (n_sources,) array [m]
             Of that cluster.
-        f, g : (n_sources,) complex arrays
-        e : (n_sources,) array
         first : (n_clusters,) int array
             The first source of each cluster.
         """
-        x, g, e = arm / radius, g / radius, e / radius
+        f, x, g, e = sources.f, sources.place / radius, sources.g / radius, sources.e / radius
         on_psi, powers = -self.kappa * f.conj(), self._powers_of(x)
         columns = np.stack([f, on_psi, g, e - x.conj() * f, x.conj() * g], axis=1)
         ends = np.append(first[1:], x.size)
@@ -179,10 +184,41 @@ class Expansions:
         displacements: ComplexArray = self.kappa * phi - x * gradient.conj() - psi.conj()
         return displacements
 
+    def outer_displacements(self, series: ComplexArray, arm: ComplexArray, radius: float) -> ComplexArray:
+        """Return 2 mu u (n_points, n_series) at points outside of a disc.
+
+        Parameters
+        ----------
+        series : (n_series, 2, order + 1) complex array
+            Of the sources in the disc.
+        arm : (n_points,) complex array [m]
+            From the centre of the disc to the points.
+        radius : float [m]
+        """
+        powers = self._powers_of(radius / arm)
+        along = radius / arm[:, None] * powers * self._of_slope
+        powers[:, 0] = np.log(arm / self.log_length)
+        phi, psi, gradient = powers @ series[:, 0].T, powers @ series[:, 1].T, along @ series[:, 0].T
+        return np.asarray(self.kappa * phi - series[:, 0, 0] - (arm / radius)[:, None] * gradient.conj() - psi.conj())
+
+    def outer_gradients(
+        self, series: ComplexArray, arm: ComplexArray, radius: float
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Return Phi = phi' and D = 2 mu du/dzbar, each (n_points, n_series); parameters as `outer_displacements`."""
+        y = radius / arm[:, None]
+        first = y * self._powers_of(y[:, 0]) * (self._of_slope / radius)
+        second = y * first * (-(self._powers + 1.0) / radius)
+        phi, psi = series[:, 0].T, series[:, 1].T
+        return first @ phi, -arm[:, None] * (second @ phi).conj() - (first @ psi).conj()
+
+    @cached_property
+    def _of_slope(self) -> FloatArray:
+        """(order + 1,): r times the derivative of (r / z)^k is this times (r / z)^(k + 1), of the logarithm r / z."""
+        return np.concatenate([[1.0], -self._powers[1:]])
+
     def _of_gradient(self, phi: ComplexArray) -> ComplexArray:
         """Return r phi' (n, order), from the power 1 on, of phi (n, order + 1) outside of discs of the radius r."""
-        factors = np.concatenate([[1.0], -self._powers[1:-1]])
-        return np.asarray(phi[:, :-1] * factors)
+        return np.asarray(phi[:, :-1] * self._of_slope[:-1])
 
     def _powers_of(self, x: Numbers) -> Numbers:
         """Return the powers (n, order + 1) of numbers (n,)."""

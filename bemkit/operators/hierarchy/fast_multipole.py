@@ -8,7 +8,6 @@ three times the larger radius and the smaller one together; then every power of 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -19,7 +18,9 @@ from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns, Densities
-from bemkit.operators.hierarchy.expansions import Expansions
+from bemkit.operators.hierarchy.clusters import Clusters, Discs
+from bemkit.operators.hierarchy.expansions import Expansions, Sources
+from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries, order_for
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -32,25 +33,20 @@ LEAF_SIZE = 40
 """Elements of a leaf: integrals nearby and series from afar then take about the same time."""
 _CHUNK, _FEW = 256, 32
 """Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""
-_SEPARATION = 3.0
-_FEW_POINTS, _SHORT = 4, 0.08
-"""Gauss points of an element that is so short by the radius of its leaf; a rule that is exact for all powers else."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """Discs around the clusters of a level, and pairs that are far from each other but whose parents are not.
+    """Discs of a level, and pairs that are far from each other but whose parents are not.
 
     Parameters
     ----------
-    centre : (n_clusters,) complex array [m]
-    radius : (n_clusters,) array [m]
+    discs : Discs
     target, source : (n_pairs,) arrays
         Sorted by target.
     """
 
-    centre: ComplexArray
-    radius: FloatArray
+    discs: Discs
     target: IntArray
     source: IntArray
 
@@ -90,9 +86,10 @@ class FastMultipole(_LinearOperator):
         LinearOperator.__init__(self, np.dtype(float), (2 * n, 4 * n))  # type: ignore[call-arg]  # the stubs lack it
         constants = columns.constants
         self.columns, self.tree = columns, tree
-        order = math.ceil(math.log(1.0 / tolerance) / math.log(_SEPARATION)) + 1
-        self._expansions = Expansions(order, 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
-        self._levels, self._near = _interactions(columns, tree)
+        self._expansions = Expansions(order_for(tolerance), 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
+        clusters = Clusters.around(tree, np.stack([columns.start, columns.end]))
+        self._levels, self._near = _interactions(clusters)
+        self._sources = SourceSeries(self._expansions, clusters, 0.5 * columns.lengths)
 
     def _matvec(self, x: FloatArray) -> FloatArray:
         state = np.reshape(x, (-1, 4))
@@ -126,56 +123,21 @@ class FastMultipole(_LinearOperator):
         chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
         return np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2))
 
-    def _series(self, densities: tuple[ComplexArray, ComplexArray, ComplexArray]) -> list[ComplexArray]:
+    def _series(self, densities: Densities) -> list[ComplexArray]:
         """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
-        bounds, n_leaves = self.tree.bounds, self.tree.n_leaves
-        chunks = [slice(i, min(i + _FEW, n_leaves)) for i in range(0, n_leaves, _FEW)]
+        columns, b, mu = self.columns, self.columns.constants.double, self._shear_modulus
 
-        def of_leaves(some: slice) -> ComplexArray:
-            places = slice(int(bounds[some.start]), int(bounds[some.stop]))
-            leaf = np.repeat(np.arange(some.start, some.stop), np.diff(bounds[some.start : some.stop + 1]))
-            return self._of_elements(places, leaf, tuple(each[places] for each in densities))
-
-        found = [np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=50 * self.columns.n_elements))]
-        for level, coarse in zip(self._levels[:-1], self._levels[1:], strict=True):
-            n = coarse.centre.size
-            parents = np.empty((n, 2, self._expansions.order + 1), complex)
-            for begin in range(0, n, _CHUNK):
-                own = np.arange(begin, min(begin + _CHUNK, n))
-                children, above = np.arange(2 * begin, 2 * begin + 2 * own.size), np.repeat(own, 2)
-                arm = level.centre[children] - coarse.centre[above]
-                moved = self._expansions.of_parents(
-                    found[-1][children], arm, level.radius[children], coarse.radius[above]
-                )
-                parents[own] = moved[::2] + moved[1::2]
-            found.append(parents)
-        return found
-
-    def _of_elements(self, places: slice, leaf: IntArray, densities: tuple[ComplexArray, ...]) -> ComplexArray:
-        """Return the series of consecutive leaves from the densities of their elements."""
-        columns, leaves = self.columns, self._levels[0]
-        start, end, (t, u, s) = columns.start[places], columns.end[places], densities
-        half, middle = 0.5 * (end - start), 0.5 * (end + start) - leaves.centre[leaf]
-        radius, size = leaves.radius[leaf], np.abs(half)
-        is_short = size < _SHORT * radius
-        result = np.zeros((leaf[-1] + 1 - leaf[0], 2, self._expansions.order + 1), complex)
-        b, mu = columns.constants.double, self._shear_modulus
-        for n_points, chosen in ((_FEW_POINTS, is_short), (self._expansions.order // 2 + 2, ~is_short)):
-            some = np.flatnonzero(chosen)
-            if not some.size:
-                continue
-            present, first = np.unique(leaf[some], return_index=True)
+        def sources_of(places: IntArray, n_points: int) -> Sources:
             xi, weights = gauss_legendre(n_points)
-            number = np.repeat(some, n_points)
-            x, w = np.tile(xi, some.size), np.tile(weights, some.size) * size[number]
-            density = u[number] + s[number] * x
-            normal = -1j * half[number] / size[number]
-            f = (0.5 * b) * w * t[number]  # of -t: the single layer is subtracted
+            start, end, t, u, s = (each[places, None] for each in (columns.start, columns.end, *densities))
+            half = 0.5 * (end - start)
+            w, density = np.abs(half) * weights, u + s * xi
+            normal = -1j * half / np.abs(half)
+            f = (0.5 * b) * w * t  # of -t: the single layer is subtracted
             g, e = (b * mu * w) * normal * density, (-2.0 * b * mu * w) * (normal.conj() * density).real
-            result[present - leaf[0]] += self._expansions.of_sources(
-                middle[number] + half[number] * x, radius[number], f, g, e, n_points * first
-            )
-        return result
+            return Sources(0.5 * (start + end) + half * xi, f, g, e)
+
+        return self._sources.of(sources_of, len(self._levels))
 
     @property
     def _shear_modulus(self) -> float:
@@ -186,15 +148,16 @@ class FastMultipole(_LinearOperator):
         """Return the series in the discs of all leaves of what comes from afar."""
         inherited: ComplexArray | None = None
         for number in range(len(self._levels) - 1, -1, -1):
-            level, n = self._levels[number], self._levels[number].centre.size
+            level, discs = self._levels[number], self._levels[number].discs
+            n = discs.centre.size
             own = np.zeros((n, 2, self._expansions.order + 1), complex)
             if inherited is not None:
-                above = self._levels[number + 1]
+                above = self._levels[number + 1].discs
                 for begin in range(0, n, _CHUNK):
                     some = np.arange(begin, min(begin + _CHUNK, n))
-                    arm = level.centre[some] - above.centre[some // 2]
+                    arm = discs.centre[some] - above.centre[some // 2]
                     own[some] = self._expansions.of_children(
-                        inherited[some // 2], arm, above.radius[some // 2], level.radius[some]
+                        inherited[some // 2], arm, above.radius[some // 2], discs.radius[some]
                     )
             self._add_far(own, level, series[number])
             inherited = own
@@ -205,15 +168,14 @@ class FastMultipole(_LinearOperator):
         """Add to the series in discs what the clusters far from them cause."""
         for begin in range(0, level.target.size, _CHUNK):
             target, source = level.target[begin : begin + _CHUNK], level.source[begin : begin + _CHUNK]
-            fields = self._expansions.of_fields(
-                series[source], level.centre[source] - level.centre[target], level.radius[source], level.radius[target]
-            )
+            arm, radius = level.discs.centre[source] - level.discs.centre[target], level.discs.radius
+            fields = self._expansions.of_fields(series[source], arm, radius[source], radius[target])
             present, first = np.unique(target, return_index=True)
             own[present] += np.add.reduceat(fields, first)
 
     def _from_afar(self, series: ComplexArray) -> ComplexArray:
         """Return complex displacements (n,) in the middle of the elements from the series in their leaves."""
-        leaves, bounds, n_leaves = self._levels[0], self.tree.bounds, self.tree.n_leaves
+        leaves, bounds, n_leaves = self._levels[0].discs, self.tree.bounds, self.tree.n_leaves
         result = np.empty(self.columns.n_elements, complex)
         for begin in range(0, n_leaves, _FEW):
             end = min(begin + _FEW, n_leaves)
@@ -224,37 +186,22 @@ class FastMultipole(_LinearOperator):
         return np.asarray(result / (2.0 * self._shear_modulus))
 
 
-def _interactions(columns: BoundaryColumns, tree: ClusterTree) -> tuple[list[_Level], _Near]:
+def _interactions(clusters: Clusters) -> tuple[list[_Level], _Near]:
     """Return the levels from the leaves up to the last one with pairs, and the leaves near each leaf."""
-    discs = [_discs(columns, tree, level) for level in range(tree.n_levels + 1)]
-    pairs, levels = np.zeros((1, 2), np.intp), []
-    for number in range(tree.n_levels, -1, -1):
-        centre, radius = discs[number]
-        if number < tree.n_levels:
+    pairs = np.zeros((1, 2), np.intp)
+    levels: list[_Level] = []
+    for discs in clusters.levels[::-1]:
+        if levels:
             children = 2 * pairs[:, None, :] + np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
             pairs = children.reshape(-1, 2)
-        of_pair = radius[pairs]
-        distance = np.abs(centre[pairs[:, 0]] - centre[pairs[:, 1]])
-        is_far = _SEPARATION * of_pair.max(axis=1) + of_pair.min(axis=1) < distance
+        of_pair = discs.radius[pairs]
+        distance = np.abs(discs.centre[pairs[:, 0]] - discs.centre[pairs[:, 1]])
+        is_far = SEPARATION * of_pair.max(axis=1) + of_pair.min(axis=1) < distance
         far, pairs = pairs[is_far], pairs[~is_far]
         far = far[np.argsort(far[:, 0], kind="stable")]
-        levels.append(_Level(centre, radius, far[:, 0], far[:, 1]))
+        levels.append(_Level(discs, far[:, 0], far[:, 1]))
     while len(levels) > 1 and not levels[0].target.size:
         del levels[0]
     pairs = pairs[np.lexsort(pairs.T[::-1])]
-    near = _Near(np.searchsorted(pairs[:, 0], np.arange(tree.n_leaves + 1)), np.ascontiguousarray(pairs[:, 1]))
-    return levels[::-1], near
-
-
-def _discs(columns: BoundaryColumns, tree: ClusterTree, level: int) -> tuple[ComplexArray, FloatArray]:
-    """Return centres and radii of discs around the clusters of a level, from the boxes around their end nodes."""
-    begins = tree.bounds[: -1 : 2**level]
-    counts = np.diff(np.append(begins, columns.n_elements))
-    ends = np.stack([columns.start, columns.end])
-    low, high = (
-        of.reduceat(of.reduce(ends.real), begins) + 1j * of.reduceat(of.reduce(ends.imag), begins)
-        for of in (np.minimum, np.maximum)
-    )
-    centre = 0.5 * (low + high)
-    farthest = np.abs(ends - np.repeat(centre, counts)).max(axis=0)
-    return centre, np.maximum.reduceat(farthest, begins)
+    first = np.searchsorted(pairs[:, 0], np.arange(clusters.tree.n_leaves + 1))
+    return levels[::-1], _Near(first, np.ascontiguousarray(pairs[:, 1]))

@@ -12,9 +12,10 @@ With complex displacements u = u_x + i u_y and z = x + i y, the formula is diffe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
+from functools import cached_property
 from math import comb
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -24,22 +25,33 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
+from bemkit.operators.hierarchy.clusters import Pairs
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_of_monomials, legendre_values
+from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
+from bemkit.operators.somigliana.far_fields import FarFields
 from bemkit.operators.somigliana.locate import Location, Locator, PointNotInsideError
 from bemkit.operators.somigliana.moments import (
     CENTRE,
     END,
     START,
     CurvedElements,
-    DisplacementMoments,
-    GradientMoments,
     straight_displacement_moments,
     straight_gradient_moments,
 )
 
 CHUNK_PAIRS = 8192
+"""Points and elements near them that are integrated at a time."""
+CHUNK_POINTS = 8192
+_INTEGRALS = 400
+"""Of a point, by the time that it takes."""
+MOST_ELEMENTS, FEW_POINTS = 300, 30
+"""Elements, and points on more elements, up to which all pairs are integrated: no series are made then."""
+
+Terms: TypeAlias = Callable[[ComplexArray, IntArray, ComplexArray, bool], ComplexArray]
+"""What elements add at points: from points, elements, displacements subtracted, and whether these are curved."""
+OfClusters: TypeAlias = Callable[[FarFields, ComplexArray, ComplexArray, list[Pairs]], ComplexArray]
 
 
 class Background(Protocol):
@@ -136,15 +148,12 @@ class InteriorFields:
         PointNotInsideError
             Naming the first point that is not inside.
         """
-        points = _as_points(points)
-        result = np.empty(len(points), complex)
-        for rows, x, reference in self._chunks(points):
-            # a constant displacement c is represented as c inside a bounded body, and as zero inside an exterior one
-            result[rows] = 0.0 if self.mesh.is_exterior else reference
-            for pair, element, is_curved in self._pairs(x.size):
-                moments = self._displacement_moments(x[pair], element, is_curved)
-                terms = self._displacement_terms(moments, element, reference[pair])
-                result[rows] += terms.reshape(x.size, -1).sum(axis=1)
+        points, location = self._located(points)
+        reference = self._at_nearest(location)
+        # a constant displacement c is represented as c inside a bounded body, and as zero inside an exterior one
+        result = self._summed(points, reference, 1, self._displacement_terms, FarFields.displacements)[0]
+        if not self.mesh.is_exterior:
+            result += reference
         own = np.column_stack([result.real, result.imag])
         return own if self.background is None else own + self.background.displacement(points)
 
@@ -175,56 +184,80 @@ class InteriorFields:
 
     def _potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Return Phi and D (n,) [Pa]."""
-        points = _as_points(points)
-        potential, shear = np.zeros(len(points), complex), np.zeros(len(points), complex)
-        for rows, x, reference in self._chunks(points):
-            for pair, element, is_curved in self._pairs(x.size):
-                moments = self._gradient_moments(x[pair], element, is_curved)
-                phi, d = self._gradient_terms(moments, element, reference[pair])
-                potential[rows] += phi.reshape(x.size, -1).sum(axis=1)
-                shear[rows] += d.reshape(x.size, -1).sum(axis=1)
+        points, location = self._located(points)
+        potential, shear = self._summed(
+            points, self._at_nearest(location), 2, self._gradient_terms, FarFields.gradients
+        )
         return potential, shear
 
-    def _chunks(self, points: FloatArray) -> Iterator[tuple[slice, ComplexArray, ComplexArray]]:
-        """Yield slices of the points, their coordinates, and the displacements of the nearest boundary points."""
+    def _located(self, points: FloatArray) -> tuple[FloatArray, Location]:
+        points = _as_points(points)
         location = self._locator.locate(points)
         _require_inside(location, points)
-        relative = points - self.mesh.centre
-        polynomials = legendre_values(self._displacement.shape[2] - 1, location.xi)
-        reference = np.einsum("nk,kn->n", self._displacement[CENTRE, location.element], polynomials)
-        step = max(1, CHUNK_PAIRS // self.mesh.n_elements)
-        for first in range(0, len(points), step):
-            rows = slice(first, min(first + step, len(points)))
-            yield rows, relative[rows, 0] + 1j * relative[rows, 1], reference[rows]
+        return points, location
 
-    def _pairs(self, n_points: int) -> Iterator[tuple[IntArray, IntArray, bool]]:
-        """Yield all pairs of a point and an element: first those with straight, then those with curved elements."""
-        for is_curved in (False, True):
-            elements = np.flatnonzero(self.mesh.is_straight != is_curved)
-            if elements.size:
-                yield np.repeat(np.arange(n_points), elements.size), np.tile(elements, n_points), is_curved
+    def _at_nearest(self, location: Location) -> ComplexArray:
+        """Return the displacements (n,) of the nearest boundary points."""
+        polynomials = legendre_values(self._displacement.shape[2] - 1, location.xi)
+        return np.asarray(np.einsum("nk,kn->n", self._displacement[CENTRE, location.element], polynomials))
+
+    @cached_property
+    def _far(self) -> FarFields:
+        displacement, traction = self._displacement[CENTRE], self._traction[CENTRE]
+        clusters, length = self._locator.clusters, self.mesh.diameter
+        return FarFields(clusters, self._panels, self._curved, self.material, displacement, traction, length)
+
+    def _summed(
+        self, points: FloatArray, reference: ComplexArray, n_fields: int, terms: Terms, of_clusters: OfClusters
+    ) -> ComplexArray:
+        """Sum what all elements cause at points: (n_fields, n_points)."""
+        relative = points - self.mesh.centre
+        x = relative[:, 0] + 1j * relative[:, 1]
+        n = self.mesh.n_elements
+        is_dense = n <= MOST_ELEMENTS or x.size <= FEW_POINTS
+        far = None if is_dense else self._far
+
+        def of_points(rows: slice) -> ComplexArray:
+            own, at = x[rows], reference[rows]
+            if far is None:
+                pairs = np.repeat(np.arange(own.size), n), np.tile(np.arange(n), own.size)
+                return self._of_pairs(own, at, pairs, n_fields, terms)
+            afar, pairs = far.divided(own)
+            return self._of_pairs(own, at, pairs, n_fields, terms) + of_clusters(far, own, at, afar)
+
+        step = max(1, CHUNK_PAIRS // n) if is_dense else CHUNK_POINTS
+        chunks = [slice(first, first + step) for first in range(0, max(1, x.size), step)]
+        return np.concatenate(for_each_chunk(of_points, chunks, n_integrals=_INTEGRALS * x.size), axis=1)
+
+    def _of_pairs(
+        self, x: ComplexArray, reference: ComplexArray, pairs: Pairs, n_fields: int, terms: Terms
+    ) -> ComplexArray:
+        """Sum what elements cause at points near them, from all pairs of both, ascending by point."""
+        points, elements = pairs
+        is_curved = ~self.mesh.is_straight[elements]
+        result: ComplexArray = np.zeros((n_fields, x.size), complex)
+        for kind in (False, True):
+            chosen = np.flatnonzero(is_curved == kind)
+            for begin in range(0, chosen.size, CHUNK_PAIRS):
+                some = chosen[begin : begin + CHUNK_PAIRS]
+                point, element = points[some], elements[some]
+                result = result + _at_points(terms(x[point], element, reference[point], kind), point, x.size)
+        return result
 
     @property
     def _highest(self) -> int:
         """Highest power of the local coordinate in the densities."""
         return int(max(self._displacement.shape[2], self._traction.shape[2])) - 1
 
-    def _displacement_moments(self, x: ComplexArray, element: IntArray, is_curved: bool) -> DisplacementMoments:
-        """Evaluate the inner integrals of displacements."""
-        if is_curved:
-            return self._curved.displacement_moments(x, element, self._highest, self.mesh.diameter)
-        return straight_displacement_moments(self._panels, x, element, self._highest, self.mesh.diameter)
-
-    def _gradient_moments(self, x: ComplexArray, element: IntArray, is_curved: bool) -> GradientMoments:
-        """Evaluate the inner integrals of gradients."""
-        if is_curved:
-            return self._curved.gradient_moments(x, element, self._highest)
-        return straight_gradient_moments(self._panels, x, element, self._highest)
-
     def _displacement_terms(
-        self, moments: DisplacementMoments, element: IntArray, reference: ComplexArray
+        self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
     ) -> ComplexArray:
-        """Return what each element adds to the displacement."""
+        """Return what each element adds to the displacement, (1, n_pairs)."""
+        highest, length = self._highest, self.mesh.diameter
+        if is_curved:
+            moments = self._curved.displacement_moments(x, element, highest, length)
+        else:
+            moments = straight_displacement_moments(self._panels, x, element, highest, length)
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         result = np.zeros(element.size, complex)
@@ -236,12 +269,16 @@ class InteriorFields:
             v = v - reference if k == 0 else v
             own = kappa * moments.cauchy[k] - moments.cauchy[k].conj()
             result += (0.5j * factor) * (own * v - moments.turn[k] * v.conj())
-        return result
+        return result[None]
 
     def _gradient_terms(
-        self, moments: GradientMoments, element: IntArray, reference: ComplexArray
-    ) -> tuple[ComplexArray, ComplexArray]:
-        """Return what each element adds to Phi and to D."""
+        self, x: ComplexArray, element: IntArray, reference: ComplexArray, is_curved: bool
+    ) -> ComplexArray:
+        """Return what each element adds to Phi and to D, (2, n_pairs)."""
+        if is_curved:
+            moments = self._curved.gradient_moments(x, element, self._highest)
+        else:
+            moments = straight_gradient_moments(self._panels, x, element, self._highest)
         kappa = self.material.kappa
         factor = 1.0 / (np.pi * (kappa + 1.0))
         potential, shear = np.zeros(element.size, complex), np.zeros(element.size, complex)
@@ -253,7 +290,15 @@ class InteriorFields:
             v = v - reference if k == 0 else v
             potential -= double * moments.hyper[k] * v
             shear += double * (moments.hyper[k].conj() * v - moments.twist[k] * v.conj())
-        return potential, shear
+        return np.stack([potential, shear])
+
+
+def _at_points(terms: ComplexArray, point: IntArray, n_points: int) -> ComplexArray:
+    """Sum the terms (n_fields, n_pairs) of each point."""
+    result = np.empty((len(terms), n_points), complex)
+    for own, each in zip(result, terms, strict=True):
+        own.real, own.imag = (np.bincount(point, part, n_points) for part in (each.real, each.imag))
+    return result
 
 
 def _as_points(points: FloatArray) -> FloatArray:

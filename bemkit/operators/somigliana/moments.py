@@ -223,12 +223,6 @@ class CurvedElements:
 
         return GradientMoments(np.full(x.size, CENTRE), *self._integrate(x, elements, highest, integrands))
 
-    def angles(self, x: ComplexArray, elements: IntArray) -> FloatArray:
-        """Return the angles (n,) [rad] under which the elements are seen, anticlockwise positive."""
-        (cauchy,) = self._integrate(x, elements, 0, lambda rho, tau: [tau / rho])
-        angles: FloatArray = -cauchy[0].imag
-        return angles
-
     def _integrate(
         self,
         x: ComplexArray,

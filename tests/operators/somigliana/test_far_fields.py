@@ -1,0 +1,113 @@
+"""Fields from series of clusters of elements: those of all pairs of points and elements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bemkit.arrays import FloatArray
+from bemkit.geometry import BoundaryMesh, Disk, ExteriorOf, Polygon, Rectangle, Ring, discretise
+from bemkit.geometry.spaces import ConstantSpace, LinearSpace, QuadraticSpace, dof_points
+from bemkit.operators.material import Material
+from bemkit.operators.somigliana import fields as inner_fields
+from bemkit.operators.somigliana.fields import InteriorFields
+from bemkit.operators.somigliana.locate import Locator
+
+SHAPES = {
+    "rectangle": Rectangle(2.0, 1.0),
+    "notched": Polygon(((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.01, 0.02), (1.0, 2.0), (0.0, 2.0))),
+    "disk": Disk(1.0, (3.0, 1.0)),
+    "ring": Ring(0.9, 1.0),
+    "exterior": ExteriorOf(Disk(1.0)),
+}
+SPACES = (ConstantSpace, LinearSpace, QuadraticSpace)
+
+
+def fields_of(mesh: BoundaryMesh, degree: int, poisson_ratio: float) -> InteriorFields:
+    """Data that vary smoothly, with a rigid motion three times as large."""
+    space, tractions = SPACES[degree](mesh), ConstantSpace(mesh)
+    x, y = dof_points(space), dof_points(tractions)
+    u = np.column_stack([np.sin(x[:, 0] + 2.0 * x[:, 1]) + 3.0, np.cos(1.0 - 2.0 * x[:, 0] * x[:, 1])])
+    t = np.column_stack([np.sin(3.0 * y[:, 0]), y[:, 1]])
+    return InteriorFields(mesh, Material(2.0, poisson_ratio), space, u, tractions, t)
+
+
+def points_of(fields: InteriorFields, seed: int, n: int) -> FloatArray:
+    """Points all over the body and in distances of ten to a hundredth of an element length from its boundary."""
+    rng, mesh = np.random.default_rng(seed), fields.mesh
+    low, size = mesh.nodes.min(axis=0) - 1.0 * mesh.is_exterior, np.ptp(mesh.nodes, axis=0) + 2.0 * mesh.is_exterior
+    elements, xi = rng.integers(0, mesh.n_elements, n), np.array([rng.uniform(-0.8, 0.8)])
+    depth = 10.0 ** rng.uniform(-2.0, 1.0, (n, 1)) * mesh.lengths[elements, None]
+    beside = mesh.points(elements, xi)[:, 0] - depth * mesh.normals_at(elements, xi)[:, 0]
+    points = np.concatenate([low + size * rng.random((n, 2)), beside])
+    return points[fields.is_inside(points)]
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    name=st.sampled_from(sorted(SHAPES)),
+    degree=st.integers(0, 2),
+    poisson_ratio=st.sampled_from([-0.5, 0.3, 0.5]),
+    n_elements=st.integers(200, 500),
+    seed=st.integers(0, 1000),
+)
+def test_fields_are_those_of_all_pairs(
+    name: str, degree: int, poisson_ratio: float, n_elements: int, seed: int
+) -> None:
+    fields = fields_of(discretise(SHAPES[name].outline(), n_elements=n_elements), degree, poisson_ratio)
+    points = points_of(fields, seed, 20)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(inner_fields, "MOST_ELEMENTS", 10**9)
+        exact = fields.displacement(points), fields.displacement_gradient(points), fields.stress(points)
+        assert "_far" not in vars(fields)
+        patch.setattr(inner_fields, "MOST_ELEMENTS", 0)
+        patch.setattr(inner_fields, "FEW_POINTS", 0)
+        found = fields.displacement(points), fields.displacement_gradient(points), fields.stress(points)
+        assert "_far" in vars(fields)
+    for one, other in zip(found, exact, strict=True):
+        size = np.abs(other).reshape(len(points), -1).max(axis=1)
+        # 1e-13 of each cluster, and the round-off of displacements over the shortest element
+        assert (np.abs(one - other).reshape(len(points), -1).max(axis=1) < 1e-11 * (size + size.mean())).all()
+
+
+def test_many_points_of_many_elements_take_series_and_few_do_not() -> None:
+    fields = fields_of(discretise(Rectangle(2.0, 1.0).outline(), n_elements=600), 1, 0.3)
+    points = np.random.default_rng(0).uniform(0.1, 0.9, (100, 2))
+    fields.stress(points[:20])
+    assert "_far" not in vars(fields)
+    fields.stress(points)
+    assert "_far" in vars(fields)
+
+
+def winding(mesh: BoundaryMesh, points: FloatArray) -> FloatArray:
+    """Return winding numbers about polygons of 100 chords for each element, and distances from these."""
+    xi = np.linspace(-1.0, 1.0, 101)
+    z = mesh.points(np.arange(mesh.n_elements), xi) @ np.array([1.0, 1j])
+    arms = z[None] - (points @ np.array([1.0, 1j]))[:, None, None]
+    return np.asarray(np.angle(arms[..., 1:] / arms[..., :-1]).sum(axis=(1, 2)) / (2.0 * np.pi)), np.abs(arms).min(
+        (1, 2)
+    )
+
+
+@pytest.mark.parametrize("n_elements", [12, 100])
+@pytest.mark.parametrize("name", sorted(SHAPES))
+def test_points_are_inside_as_winding_numbers_say(name: str, n_elements: int) -> None:
+    mesh = discretise(SHAPES[name].outline(), n_elements=n_elements)
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(0.0, 2.0 * np.pi, len(mesh.nodes))
+    # all around, and close to nodes, where the elements that meet there must tell the side
+    around = mesh.nodes + 0.01 * mesh.lengths.min() * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([mesh.centre + mesh.diameter * rng.uniform(-0.6, 0.6, (100, 2)), around])
+    numbers, distance = winding(mesh, points)
+    is_clear = distance > 1e-4 * mesh.lengths.max()  # of the polygon's bulges
+    location = Locator(mesh).locate(points)
+    assert (location.is_inside == (np.rint(numbers) == (0 if mesh.is_exterior else 1)))[is_clear].all()
+    nearest = np.array(
+        [mesh.points(np.array([e]), np.array([xi]))[0, 0] for e, xi in zip(location.element, location.xi, strict=True)]
+    )
+    # the polygon's points are as far apart as a fiftieth of an element
+    own = np.hypot(*(points - nearest).T)
+    assert (own <= distance * (1.0 + 1e-9)).all()
+    assert (own >= distance - 0.01 * mesh.lengths.max()).all()
