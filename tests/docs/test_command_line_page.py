@@ -72,6 +72,7 @@ def test_exit_codes() -> None:
         exit_codes.INACCURATE,
         exit_codes.INTERRUPTED,
         exit_codes.PIPE_CLOSED,
+        exit_codes.TERMINATED,
     ]
     assert [int(row[0]) for row in table(section(PAGE, "Exit codes"))] == codes
 

@@ -63,6 +63,17 @@ def test_what_cannot_be_compressed_is_dense_and_the_plan_says_why(words: str) ->
     assert any(words in item.reason for item in plan.items if item.name == "linear solver of the body")
 
 
+def test_quadratic_elements_of_incompressible_bodies_with_holes_are_dense() -> None:
+    ring, material = bk.Ring(0.5, 1.0), bk.Material(1.0, 0.5)
+    scene = squeezed(ring, mesh=bk.MeshOptions(elements=480), material=material, linear_solver=ASKED)
+    choices = [chosen(replace(scene, discretisation=bk.Galerkin(degree))) for degree in (1, 2)]
+    assert choices[0].hierarchical == ASKED
+    assert choices[1].hierarchical is None
+    assert (
+        "because the material is incompressible, and the elements of a body with holes quadratic" in choices[1].reason
+    )
+
+
 def test_galerkin_asked_to_compress_takes_what_automatic_takes() -> None:
     choice = choose_linear_solver(ASKED)
     assert choice.solver == choose_linear_solver(bk.Automatic()).solver

@@ -184,9 +184,12 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n_elements", [3000, 10_000])
-def test_the_largest_memory_of_compressed_equations_is_foreseen(n_elements: int) -> None:
-    scene = dataclasses.replace(load_scene("paper-1"), linear_solver=bk.Hierarchical())
+@pytest.mark.parametrize(("degree", "n_elements"), [(0, 3000), (0, 10_000), (1, 3000), (2, 1500)])
+def test_the_largest_memory_of_compressed_equations_is_foreseen(degree: int, n_elements: int) -> None:
+    """With and without compiled kernels; degree 0 are the constant elements of collocation."""
+    discretisation = bk.Galerkin(degree) if degree else bk.ConstantCollocation()
+    scene = load_scene("paper-1")
+    scene = dataclasses.replace(scene, discretisation=discretisation, linear_solver=bk.Hierarchical())
     bk.run(with_overrides(scene, elements=400))  # loads what is loaded on first use
     tracemalloc.start()
     try:

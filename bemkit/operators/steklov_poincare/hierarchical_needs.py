@@ -56,6 +56,8 @@ class _Costs:
     flops : float
     n_bytes, of_contact : float
         Memory, and that of an element in contact besides, where both tractions and displacements are.
+    in_numpy : float
+        Both relative to this, where integrals are arrays of several times their size.
     """
 
     evaluations: float
@@ -63,10 +65,11 @@ class _Costs:
     flops: float
     n_bytes: float
     of_contact: float
+    in_numpy: float
 
 
-_COLLOCATION = _Costs(40e3, 6e3, 1.6e6, 8.8e3, 3.5e3)
-_GALERKIN = {1: _Costs(250e3, 100e3, 4e6, 77e3, 0.0), 2: _Costs(500e3, 190e3, 8e6, 150e3, 0.0)}
+_COLLOCATION = _Costs(40e3, 6e3, 1.6e6, 8.8e3, 3.5e3, 1.33)
+_GALERKIN = {1: _Costs(250e3, 100e3, 4e6, 38e3, 0.0, 1.1), 2: _Costs(500e3, 190e3, 8e6, 69e3, 0.0, 1.1)}
 """By the degree of the displacements. Tractions on the elements take a second factorisation in the end."""
 _BYTES_OF_TOP = 16e6
 """Working memory for the largest clusters, whose ranks hardly depend on the number of elements."""
@@ -84,13 +87,14 @@ def why_dense(case: BodyCase) -> str:
         return f"{mesh.n_elements} elements are few"
     if mesh.symmetry is not None and len(mesh.loops) > _MOST_LOOPS:
         return f"the boundary of half the body has {len(mesh.loops)} closed curves"
-    if (
-        mesh.symmetry is not None
-        and len(mesh.loops) > 1
-        and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
-    ):
+    if mesh.symmetry is not None and _is_incompressible_with_holes(case):
         return "the material is incompressible, and the body symmetric and with holes"
     return ""
+
+
+def _is_incompressible_with_holes(case: BodyCase) -> bool:
+    """Whether the pressure in each hole is all but free, which leaves a cluster with a hole nearly singular."""
+    return len(case.mesh.loops) > 1 and case.material.effective_poisson_ratio > 0.5 - _LEAST_COMPRESSIBILITY
 
 
 def choose_collocation_solver(
@@ -155,6 +159,8 @@ def choose_galerkin_solver(
     """
     if case.mesh.n_elements < _FEWEST_ELEMENTS:
         hindrance = hindrance or f"{case.mesh.n_elements} elements are few"
+    if degree == 2 and _is_incompressible_with_holes(case):
+        hindrance = hindrance or "the material is incompressible, and the elements of a body with holes quadratic"
     if hindrance:
         reason = f"{otherwise.reason}; the equations are not compressed, because {hindrance}"
         return replace(otherwise, reason=reason) if isinstance(requested, Hierarchical) else otherwise
@@ -232,9 +238,10 @@ def _seconds(needs: BodyNeeds) -> float:
 def _needs(case: BodyCase, options: Hierarchical, costs: _Costs, *, is_compiled: bool | None = None) -> BodyNeeds:
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
-    memory = int(digits * (_BYTES_OF_TOP + costs.n_bytes * n + costs.of_contact * n_both))
     if is_compiled is None:
         is_compiled = compiled.is_installed()  # whether it works takes a while to find out
+    of_elements = (1.0 if is_compiled else costs.in_numpy) * (costs.n_bytes * n + costs.of_contact * n_both)
+    memory = int(digits * (_BYTES_OF_TOP + of_elements))
     evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
     flops = digits * costs.flops * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
     if case.is_condensed:
