@@ -73,7 +73,7 @@ def _run_to_end(arguments: list[str] | None) -> int:
         _complain(one_line(error))
         code = NOT_CONVERGED if isinstance(error, NoResultError) else BAD_INPUT
     except (click.Abort, KeyboardInterrupt) as error:
-        is_ctrl_c = not isinstance(error.__cause__ or error, _TerminatedError)
+        is_ctrl_c = (error.__cause__ or error) is not _TERMINATION
         _complain(f"{'interrupted' if is_ctrl_c else 'terminated'}; no file is half written")
         code = INTERRUPTED if is_ctrl_c else TERMINATED
     except MemoryError:
@@ -82,8 +82,8 @@ def _run_to_end(arguments: list[str] | None) -> int:
     return code if isinstance(code, int) else 0
 
 
-class _TerminatedError(KeyboardInterrupt):
-    """The system asks the process to end (SIGTERM)."""
+_TERMINATION = KeyboardInterrupt("SIGTERM")
+"""The system asks the process to end: whatever Ctrl-C does not lose, this does not."""
 
 
 @contextmanager
@@ -91,7 +91,7 @@ def _terminable() -> Iterator[None]:
     """End like Ctrl-C when the system asks for it, as batch queues do: locks and temporary files are removed."""
 
     def end(*_: object) -> NoReturn:
-        raise _TerminatedError
+        raise _TERMINATION
 
     is_main = threading.current_thread() is threading.main_thread()
     if not is_main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:  # the program around has its own way
