@@ -24,6 +24,9 @@ from bemkit.scene.unit_names import UnitNames, with_unit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+MOST_DOTS = 300
+"""Contact nodes of a part that are seen one by one: more would only thicken lines."""
+
 
 def draw_contact_displacement(
     solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
@@ -48,7 +51,8 @@ def draw_contact_displacement(
     axes, units = contact_axes(axes, solution, part, units, "Displacements on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
-    axes.plot(s, contact.u_n[chosen], label="normal $u_n$", marker="o", markersize=2.0, **FIRST)
+    marker = "o" if s.size <= MOST_DOTS else ""
+    axes.plot(s, contact.u_n[chosen], label="normal $u_n$", marker=marker, markersize=2.0, **FIRST)
     axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **SECOND)
     if np.any(np.isfinite(gap) & (gap != 0.0)):
         axes.plot(s, near(gap, solution, chosen), label="gap $g$", **LIMIT)
@@ -62,16 +66,17 @@ def draw_contact_traction(
     """Draw normal and tangential traction and the friction bound; see `draw_contact_displacement`.
 
     Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
-    where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold. Peaks
-    that would flatten all else are cut, and the picture says so.
+    where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold, if
+    there are no more than `MOST_DOTS`. Peaks that would flatten all else are cut, and the picture says so.
     """
     axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, curve = contact.s[chosen], traction_curve(solution, part)
     axes.plot(curve.s, curve.normal, label=r"normal $\sigma_n$", **FIRST)
     axes.plot(curve.s, curve.tangential, label=r"tangential $\sigma_t$", **SECOND)
-    axes.plot(s, contact.sigma_n[chosen], linestyle="", marker="o", markersize=2.5, color=BLUE)
-    axes.plot(s, contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
+    if s.size <= MOST_DOTS:
+        axes.plot(s, contact.sigma_n[chosen], linestyle="", marker="o", markersize=2.5, color=BLUE)
+        axes.plot(s, contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
     if solution.friction_bound is not None:
         axes.plot(s, solution.friction_bound[chosen], label="friction bound", **LIMIT)
         axes.plot(s, -solution.friction_bound[chosen], **LIMIT)

@@ -145,3 +145,13 @@ def test_the_convergence_ends_where_the_certificate_is(solution: Solution) -> No
     worst = axes.lines[0].get_ydata()
     assert len(worst) == len(solution.history)
     assert worst[-1] == pytest.approx(max(solution.history[-1].certificate.worst, 1e-300))
+
+
+@pytest.mark.parametrize("draw", [draw_contact_displacement, draw_contact_traction])
+def test_many_nodes_have_no_dots(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    solution = run(with_overrides(load_scene("paper-1"), elements=40))
+    few = draw(solution, "foundation")
+    monkeypatch.setattr("bemkit.pictures.contact_curves.MOST_DOTS", solution.contact.n_contact - 1)
+    many = draw(solution, "foundation")
+    assert any(line.get_marker() == "o" for line in few.lines)
+    assert all(line.get_marker() != "o" for line in many.lines)
