@@ -162,8 +162,8 @@ def _inner_points(
     depth = np.maximum(_STEP * lengths, _SMALLEST * spacing)
     while (going := depth < 1.5 * spacing).any():
         points = on_boundary[going] - depth[going, None] * normals[going]
-        distance, _ = tree.query(points)
-        is_kept = distance > _STEP * depth[going]
+        apart, _ = tree.query(points)
+        is_kept = apart > _STEP * depth[going]
         layers.append(_thinned(points[is_kept], depth[going][is_kept]))
         depth = np.where(going, _GROWTH * depth, np.inf)
     inner = np.concatenate([np.zeros((0, 2)), *layers])
