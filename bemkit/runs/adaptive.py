@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any, Generic
 
@@ -10,7 +11,7 @@ from bemkit.errors import InputError
 from bemkit.plan import make_plan
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
-from bemkit.runs.assembly import SEVERAL_BODIES
+from bemkit.runs.assembly import several_bodies
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.history import ONE_BODY, run_on_mesh
@@ -74,6 +75,7 @@ def run_assembly_adaptive(
     callback: Callable[[StepRecord], None] | None = None,
     done: AssemblySolution | None = None,
     finished: Callable[[AssemblySolution], None] | None = None,
+    executor: Executor | None = None,
 ) -> tuple[AssemblySolution, ...]:
     """Solve an assembly on a sequence of meshes until the estimated error is below its accuracy.
 
@@ -88,6 +90,8 @@ def run_assembly_adaptive(
         Receives a record of every step on every mesh.
     done, finished : optional
         Of a load history; see `EarlierSteps`.
+    executor : Executor, optional
+        As for `run_assembly`.
 
     Returns
     -------
@@ -99,7 +103,8 @@ def run_assembly_adaptive(
     ValueError
         If the assembly has no accuracy, or for the reasons of `bemkit.run`.
     """
-    refinement = _AssemblyRefinement(_rule(assembly), callback, EarlierSteps(done, finished))
+    rule, earlier = _rule(assembly), EarlierSteps(done, finished)
+    refinement = _AssemblyRefinement(rule, callback, earlier, several_bodies(executor))
     return refined(Level.first(assembly), refinement, assembly.mesh)
 
 
@@ -174,10 +179,13 @@ class _SceneRefinement(_Refinement[Scene, Solution]):
         return spent * make_plan(level.scene, level.partition.mesh).seconds / solution.plan.seconds
 
 
+@dataclass(frozen=True)
 class _AssemblyRefinement(_Refinement[Assembly, AssemblySolution]):
+    kind: Kind[Any, AssemblySolution]
+
     def solved(self, level: Level[Assembly], start: AssemblySolution | None) -> AssemblySolution:
         """Solve from the beginning: contact nodes of several bodies are not carried from mesh to mesh."""
-        return self._solved(SEVERAL_BODIES, level, level.meshes)
+        return self._solved(self.kind, level, level.meshes)
 
     def expected_seconds(self, level: Level[Assembly], solution: AssemblySolution, spent: float) -> float:
         """Return how long the next meshes will take."""

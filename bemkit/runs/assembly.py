@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -38,6 +40,7 @@ def run_assembly(
     *,
     meshes: Mapping[str, BoundaryMesh] | None = None,
     callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
 ) -> AssemblySolution:
     """Solve an assembly on one mesh of each body.
 
@@ -48,6 +51,9 @@ def run_assembly(
         Meshes of bodies by name, in the coordinates of their shapes; by default those the assembly describes.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
+    executor : Executor, optional
+        Where bodies are assembled and factored, copies once: a `ProcessPoolExecutor`, say, or that of a `distributed`
+        client. By default here, in turn.
 
     Returns
     -------
@@ -61,7 +67,7 @@ def run_assembly(
     ValueError
         If the assembly is not well posed; the message names the body or the contact.
     """
-    return joined(*solved_history(SEVERAL_BODIES, [assembly], meshes, callback))
+    return joined(*solved_history(several_bodies(executor), [assembly], meshes, callback))
 
 
 def run_assembly_history(
@@ -69,6 +75,7 @@ def run_assembly_history(
     *,
     meshes: Mapping[str, BoundaryMesh] | None = None,
     callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
 ) -> SolvedSteps[AssemblySolution]:
     """Solve assemblies that follow each other in time, slip counting from the end of the step before.
 
@@ -80,7 +87,7 @@ def run_assembly_history(
     assemblies : sequence of Assembly
         The same bodies and contacts under changing loads, motions, gaps or laws; one with several steps or load factors
         stands for as many.
-    meshes, callback : optional
+    meshes, callback, executor : optional
         As for `run_assembly`.
 
     Returns
@@ -97,7 +104,7 @@ def run_assembly_history(
     """
     if not assemblies:
         raise InputError("assemblies is empty: give at least one assembly")
-    return SolvedSteps(solved_history(SEVERAL_BODIES, assemblies, meshes, callback)[1])
+    return SolvedSteps(solved_history(several_bodies(executor), assemblies, meshes, callback)[1])
 
 
 def _prepared(
@@ -199,6 +206,10 @@ def _contact_table(model: AssembledModel, state: ContactState, node_status: IntA
     )
 
 
-SEVERAL_BODIES: Kind[AssembledModel, AssemblySolution] = Kind(
-    _prepared, build_assembled_model, with_energies_checked, assembly_solution, _explained
-)
+def several_bodies(executor: Executor | None = None) -> Kind[AssembledModel, AssemblySolution]:
+    """Return how several bodies are solved, assembled and factored on an executor if one is given."""
+    build = partial(build_assembled_model, executor=executor)
+    return Kind(_prepared, build, with_energies_checked, assembly_solution, _explained)
+
+
+SEVERAL_BODIES = several_bodies()

@@ -48,13 +48,16 @@ def run(
     callback: Callable[[StepRecord], None] | None = None,
 ) -> Solution: ...
 @overload
-def run(scene: Assembly, *, callback: Callable[[StepRecord], None] | None = None) -> AssemblySolution: ...
+def run(
+    scene: Assembly, *, callback: Callable[[StepRecord], None] | None = None, executor: Executor | None = None
+) -> AssemblySolution: ...
 def run(
     scene: Scene | Assembly,
     *,
     mesh: BoundaryMesh | None = None,
     start: Solution | None = None,
     callback: Callable[[StepRecord], None] | None = None,
+    executor: Executor | None = None,
 ) -> Solution | AssemblySolution:
     """Solve a scene, or an assembly of several bodies.
 
@@ -70,6 +73,9 @@ def run(
         several solutions the start chooses among them. Refused without contact, where there is only one.
     callback : callable, optional
         Receives a record of every step as soon as it exists.
+    executor : Executor, optional
+        Of several bodies: where these are assembled and factored, copies once. Any of `concurrent.futures`, or that of
+        a `distributed` client; by default here, in turn.
 
     Returns
     -------
@@ -87,7 +93,11 @@ def run(
         If the scene is not well posed; the message names the part and the remedy.
     """
     if isinstance(scene, Assembly):
-        return _run_assembly(scene, mesh, start, callback)
+        return _run_assembly(scene, mesh, start, callback, executor)
+    if executor is not None:
+        raise InputError(
+            "executor is given with one body, which is a single piece of work: leave it out, or give several"
+        )
     if scene.mesh.accuracy is not None and mesh is None:
         from bemkit.runs.adaptive import run_adaptive  # only where it is asked for
 
@@ -123,6 +133,7 @@ def _run_assembly(
     mesh: BoundaryMesh | None,
     start: Solution | None,
     callback: Callable[[StepRecord], None] | None,
+    executor: Executor | None,
 ) -> AssemblySolution:
     for name, given in (("mesh", mesh), ("start", start)):
         if given is not None:
@@ -130,10 +141,10 @@ def _run_assembly(
     if assembly.mesh.accuracy is not None:
         from bemkit.runs.adaptive import run_assembly_adaptive
 
-        return run_assembly_adaptive(assembly, callback=callback)[-1]
+        return run_assembly_adaptive(assembly, callback=callback, executor=executor)[-1]
     from bemkit.runs.assembly import run_assembly
 
-    return run_assembly(assembly, callback=callback)
+    return run_assembly(assembly, callback=callback, executor=executor)
 
 
 def run_steps(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +16,12 @@ from bemkit.contact.joined.member import Member, diagonal_blocks
 from bemkit.contact.problem import ContactProblem
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody, groups
-from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
+from bemkit.model.assembled.prepared import PreparedAssembly
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
+from bemkit.model.assembled.shapes import condensed_shapes
 from bemkit.model.boundary_tractions import insert_loads
 from bemkit.model.units import Units
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity, condensed_under
@@ -198,29 +199,27 @@ def _energy(body: PlacedBody, elastic: SteklovPoincare, displacement: FloatArray
     return 0.5 * float(np.sum(strained * force)) + beyond
 
 
-def build_assembled_model(prepared: PreparedAssembly) -> AssembledModel:
+def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None = None) -> AssembledModel:
     """Assemble the operators of all bodies, and condense each onto its nodes in contact.
+
+    Parameters
+    ----------
+    prepared : PreparedAssembly
+    executor : Executor, optional
+        Where to do so, copies once; its results, factors among them, come back whole. By default here, in turn.
 
     Raises
     ------
     SingularMatrixError
         If supports and contacts, all sticking, do not hold a body; the message names it.
+    NotSentError
+        If a body cannot be sent to the executor, or this breaks down.
     """
-    bodies = prepared.bodies
+    bodies, alike = prepared.bodies, groups(prepared.bodies)
     elastic: list[SteklovPoincare | None] = [None] * len(bodies)
     condensed: list[CondensedMap | None] = [None] * len(bodies)
     work = OperationCounts()
-    for group in groups(bodies):
-        first = bodies[group[0]]
-        material = first.material.scaled(prepared.units.modulus)
-        chosen = linear_solver(prepared, int(group[0]))
-        first_inside = prepared.insides[group[0]]
-        try:
-            map_ = first.scene.discretisation.chosen_map(first.own_mesh.unit, material, chosen)
-            loaded = map_ if first_inside is None else HeavyElasticity(map_, first_inside)
-            base = loaded.condense(prepared.conditions[group[0]], prepared.forces[group[0]])
-        except SingularMatrixError as error:
-            raise type(error)(f"body {first.name!r}: {error}") from error
+    for group, (map_, base) in zip(alike, condensed_shapes(prepared, executor), strict=True):
         work += base.work
         for number in group.tolist():
             elastic[number] = map_

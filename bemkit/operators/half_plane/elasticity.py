@@ -149,45 +149,81 @@ class _Condensation:
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under nodal forces (n_nodes, 2) in x and y and fixed displacements in the frames."""
-        conditions, acting, retained = self.conditions, self.acting, self.retained
+        conditions, drive, retained = self.conditions, self.drive, self.retained
         given = np.where(conditions.is_free, np.einsum("nkc,nc->nk", conditions.frame, force), 0.0).ravel()
-        held = np.where(conditions.is_fixed, displacement, 0.0).ravel()[acting]
-        drive = self.drive
-        rest = self.flexibility @ given + self.motions @ np.array(drive.motion)
-        load = np.array(drive.load)[list(drive.driven)] + self.driven.T @ given
-
-        def acting_forces(held: FloatArray) -> tuple[FloatArray, FloatArray]:
-            """Return the forces on acting directions displaced by `held`, and the driven motions."""
-            motion = self._per_load @ (self.yields.T @ (held - rest[acting]) + load)
-            return self.stiffness @ (held - rest[acting]) - self.yields @ motion, motion
-
-        def response(held: FloatArray) -> tuple[FloatArray, FloatArray]:
-            """Return displacements and forces (n_dofs,) of all directions, in the frames."""
-            forces, motion = acting_forces(held)
-            displaced = rest + self.flexibility[:, acting] @ forces + self.driven @ motion
-            displaced[acting] = held
-            total = given.copy()
-            total[acting] = forces
-            return displaced, total
-
-        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            at = held.copy()
-            at[retained] = retained_displacement
-            back = conditions.frame.transpose(0, 2, 1)
-            displaced, total = (np.einsum("nck,nk->nc", back, each.reshape(-1, 2)) for each in response(at))
-            return displaced, total
-
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            by_motion = self._per_load @ self.yields[retained].T
-            follows = self.flexibility[np.ix_(directions, acting)] @ self.released[:, retained]
-            return follows + self.driven[directions] @ by_motion, response(held)[0][directions]
-
+        loaded = _Loaded(
+            body=self,
+            given=given,
+            held=np.where(conditions.is_fixed, displacement, 0.0).ravel()[self.acting],
+            rest=self.flexibility @ given + self.motions @ np.array(drive.motion),
+            load=np.array(drive.load)[list(drive.driven)] + self.driven.T @ given,
+        )
         return CondensedMap(
             stiffness=self.released[np.ix_(retained, retained)],
-            load=-acting_forces(held)[0][retained],
-            recover=recover,
+            load=-loaded.acting_forces(loaded.held)[0][retained],
+            recover=loaded.recover,
             under=self.under,
-            follow=follow,
+            follow=loaded.follow,
             volume_force=np.array(drive.load),
             inner_force=abs(drive.load[2]),  # lengths are measured by that of the strip
         )
+
+    def forces(self, held: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the forces on acting directions displaced by `held` beside what they do at rest, and the motions."""
+        motion = self._per_load @ (self.yields.T @ held + load)
+        return self.stiffness @ held - self.yields @ motion, motion
+
+    def responses(self, directions: IntArray) -> FloatArray:
+        """Return the displacements (k, n_retained) of directions under those of the retained ones."""
+        follows = self.flexibility[np.ix_(directions, self.acting)] @ self.released[:, self.retained]
+        return np.asarray(follows + self.driven[directions] @ (self._per_load @ self.yields[self.retained].T))
+
+
+@dataclass(frozen=True, eq=False)
+class _Loaded:
+    """A half-plane under one load.
+
+    Parameters
+    ----------
+    body : _Condensation
+    given : (n_dofs,) array [N/m]
+        Forces in the frames.
+    held : (n_acting,) array [m]
+        Displacements of acting directions, the retained ones at rest.
+    rest : (n_dofs,) array [m]
+        Displacements that forces cause where nothing holds, and far motions.
+    load : (n_driven,) array [N/m]
+        On the driven motions.
+    """
+
+    body: _Condensation
+    given: FloatArray
+    held: FloatArray
+    rest: FloatArray
+    load: FloatArray
+
+    def acting_forces(self, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the forces on acting directions displaced by `held`, and the driven motions."""
+        return self.body.forces(held - self.rest[self.body.acting], self.load)
+
+    def response(self, held: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return displacements and forces (n_dofs,) of all directions, in the frames."""
+        body = self.body
+        forces, motion = self.acting_forces(held)
+        displaced = self.rest + body.flexibility[:, body.acting] @ forces + body.driven @ motion
+        displaced[body.acting] = held
+        total = self.given.copy()
+        total[body.acting] = forces
+        return displaced, total
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        at = self.held.copy()
+        at[self.body.retained] = retained_displacement
+        back = self.body.conditions.frame.transpose(0, 2, 1)
+        displaced, total = (np.einsum("nck,nk->nc", back, each.reshape(-1, 2)) for each in self.response(at))
+        return displaced, total
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        return self.body.responses(directions), self.response(self.held)[0][directions]

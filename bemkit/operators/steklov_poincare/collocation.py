@@ -148,7 +148,7 @@ class MixedSystem:
 
     def condensed(self) -> CondensedMap:
         """Return the condensed map under the first load."""
-        return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
+        return self.condensed_under(self._force, self._base.data, self._base, self._work)
 
     def _find_balances(self, motions: FloatArray, reciprocity: Reciprocity) -> None:
         """Find on_traction @ t == on_displacement @ u for resultants and reciprocities, (n_balances, n_dofs) each.
@@ -226,38 +226,75 @@ class MixedSystem:
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
 
-    def _condensed(
-        self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
+    def condensed_under(
+        self, force: FloatArray, data: GivenData, base: _Solved | None = None, work: OperationCounts | None = None
     ) -> CondensedMap:
-        """Return the condensed map under data that are a multiple of others, for which the equations are solved."""
-        at_rest = factor * base.at_rest
-        conditions, weights, response = self._conditions, self._weights, self._response
-        traction = np.einsum("nkc,nc->nk", conditions.frame, force).ravel() / weights
-        is_free, given = conditions.is_free.ravel(), data.displacement.ravel()
+        """Return the condensed map under data, solved for unless they are a multiple of others."""
+        factor = None if base is None else data.factor_of(base.data)
+        if base is None or factor is None:
+            known, of_sweep = self._sweep(data)
+            base, factor = _Solved(data, self._solution(data, known)), 1.0
+            work = of_sweep + OperationCounts(right_hand_sides=1)
+        traction = np.einsum("nkc,nc->nk", self._conditions.frame, force).ravel() / self._weights
+        loaded = _Loaded(self, base, factor * base.at_rest, traction, data.displacement.ravel())
+        own, retained = self._weights[self._retained], self._retained
+        load = own * (traction[retained] - loaded.at_rest[retained])
+        stiffness = own[:, None] * self._response[retained]
+        return CondensedMap(
+            stiffness, load, loaded.recover, loaded.under, loaded.follow, work=work or OperationCounts()
+        )
 
-        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            unknowns = at_rest + response @ retained_displacement
-            local = np.where(is_free, unknowns, given)
-            local[self._retained] = retained_displacement
-            local_force = weights * np.where(is_free, traction, unknowns)
-            displacement = np.einsum("nkc,nk->nc", conditions.frame, local.reshape(-1, 2))
-            return displacement, np.einsum("nkc,nk->nc", conditions.frame, local_force.reshape(-1, 2))
+    def displaced(self, retained: FloatArray, loaded: _Loaded) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force (n_elements, 2) in x and y of all elements."""
+        frame, is_free = self._conditions.frame, self._conditions.is_free.ravel()
+        unknowns = loaded.at_rest + self._response @ retained
+        local = np.where(is_free, unknowns, loaded.given)
+        local[self._retained] = retained
+        force = self._weights * np.where(is_free, loaded.traction, unknowns)
+        displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
+        return displacement, np.einsum("nkc,nk->nc", frame, force.reshape(-1, 2))
 
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            return response[directions], at_rest[directions]
+    def response(self, directions: IntArray) -> FloatArray:
+        """Return the displacements (k, n_retained) of free directions under those of the retained ones."""
+        return self._response[directions]
 
-        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
-            other = GivenData.of(conditions, force, displacement)
-            factor = other.factor_of(base.data)
-            if factor is not None:  # the usual case of load factors
-                return self._condensed(force, other, base, factor, OperationCounts())
-            known, work = self._sweep(other)
-            solved = _Solved(other, self._solution(other, known))
-            return self._condensed(force, other, solved, 1.0, work + OperationCounts(right_hand_sides=1))
+    def under(self, force: FloatArray, displacement: FloatArray, base: _Solved) -> CondensedMap:
+        """Return the condensed map under other data; load factors, the usual case, take no other solution."""
+        return self.condensed_under(force, GivenData.of(self._conditions, force, displacement), base)
 
-        own = weights[self._retained]
-        load = own * (traction[self._retained] - at_rest[self._retained])
-        return CondensedMap(own[:, None] * response[self._retained], load, recover, under, follow, work=work)
+
+@dataclass(frozen=True, eq=False)
+class _Loaded:
+    """A body under one load.
+
+    Parameters
+    ----------
+    body : MixedSystem
+    base : _Solved
+        What this load is a multiple of.
+    at_rest : (n_dofs,) array
+        The unknowns with the retained displacements at rest.
+    traction, given : (n_dofs,) arrays [Pa], [m]
+        Given tractions and displacements in the frames.
+    """
+
+    body: MixedSystem
+    base: _Solved
+    at_rest: FloatArray
+    traction: FloatArray
+    given: FloatArray
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        return self.body.displaced(retained_displacement, self)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        return self.body.response(directions), self.at_rest[directions]
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """See `CondensedMap`."""
+        return self.body.under(force, displacement, self.base)
 
 
 def _dofs(elements: IntArray) -> IntArray:

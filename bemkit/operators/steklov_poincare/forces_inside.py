@@ -80,26 +80,13 @@ class ForcesInside:
             Under what is left of the given data: see `left_of`.
         conditions : NodalConditions
         """
-        own = np.einsum("nkc,nc->nk", conditions.frame, self.displacement)
-        shift = own[conditions.is_retained]
-
-        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            displacement, force = weightless.recover(retained_displacement - shift)
-            return displacement + self.displacement, force + self.force
-
-        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
-            return self.under(weightless, replace(conditions, displacement=displacement), force)
-
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            response, at_rest = weightless.follow(directions)
-            return response, at_rest + own.ravel()[directions] - response @ shift
-
+        heavy = _Heavy(self, weightless, conditions)
         return replace(
             weightless,
-            load=weightless.load + weightless.stiffness @ shift,
-            recover=recover,
-            under=under,
-            follow=follow,
+            load=weightless.load + weightless.stiffness @ heavy.shift,
+            recover=heavy.recover,
+            under=heavy.under,
+            follow=heavy.follow,
             volume_force=self.volume_force,
             inner_force=self.inner_force,
             weightless=weightless,
@@ -115,6 +102,39 @@ class ForcesInside:
         """Return a condensed body without forces inside under other data and these."""
         left, left_force = self.left_of(conditions, force)
         return self.add_to(weightless.under(left_force, left.displacement), conditions)
+
+
+@dataclass(frozen=True, eq=False)
+class _Heavy:
+    """A condensed map under forces inside; see `ForcesInside.add_to`."""
+
+    inside: ForcesInside
+    weightless: CondensedMap
+    conditions: NodalConditions
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """(n_nodes, 2) array [m]: the particular solution in the frames."""
+        return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, self.inside.displacement))
+
+    @property
+    def shift(self) -> FloatArray:
+        """(n_retained,) array [m]: it along the retained directions."""
+        return np.asarray(self.own[self.conditions.is_retained])
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        displacement, force = self.weightless.recover(retained_displacement - self.shift)
+        return displacement + self.inside.displacement, force + self.inside.force
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """See `CondensedMap`."""
+        return self.inside.under(self.weightless, replace(self.conditions, displacement=displacement), force)
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        response, at_rest = self.weightless.follow(directions)
+        return response, at_rest + self.own.ravel()[directions] - response @ self.shift
 
 
 def condensed_under(

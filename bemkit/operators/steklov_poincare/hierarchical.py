@@ -61,7 +61,7 @@ class HierarchicalMap(ABC):
             of the solutions.
         """
         loaded = self.loaded(conditions, force)
-        condensed = self._condensed(loaded, loaded.stiffness())
+        condensed = _Condensed(self, loaded, loaded.stiffness()).map()
         residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
         if residual > _LARGEST_RESIDUAL * self.options.tolerance:
             raise InexactEquationsError(
@@ -74,24 +74,44 @@ class HierarchicalMap(ABC):
         """Return the compressed equations of the body under supports and given nodal forces (n_elements, 2)."""
         return LoadedSystem.of(self, conditions, force)
 
-    def _condensed(self, loaded: LoadedSystem, stiffness: FloatArray) -> CondensedMap:
-        def recover(retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-            displacement, traction = loaded.recovered(retained_displacement)
-            return displacement, traction * self.weights[:, None]
 
-        def follow(directions: IntArray) -> tuple[FloatArray, FloatArray]:
-            displacement, _ = recover(np.zeros(loaded.retained.size))
-            local = np.einsum("nkc,nc->nk", loaded.conditions.frame, displacement)
-            return loaded.responses(directions)[1], local.ravel()[directions]
+@dataclass(frozen=True, eq=False)
+class _Condensed:
+    """A body under one load, solved for a unit displacement of each retained direction.
 
-        def under(force: FloatArray, displacement: FloatArray) -> CondensedMap:
-            return self._condensed(loaded.under(displacement, force), stiffness)
+    Parameters
+    ----------
+    body : HierarchicalMap
+    loaded : LoadedSystem
+    stiffness : (n_retained, n_retained) array [Pa]
+    """
 
-        _, forces = recover(np.zeros(loaded.retained.size)) if loaded.retained.size else (None, np.zeros((0, 2)))
-        load = np.zeros(0)
+    body: HierarchicalMap
+    loaded: LoadedSystem
+    stiffness: FloatArray
+
+    def map(self) -> CondensedMap:
+        """Return the condensed map."""
+        loaded, load = self.loaded, np.zeros(0)
         if loaded.retained.size:
+            _, forces = self.recover(np.zeros(loaded.retained.size))
             load = -np.einsum("nkc,nc->nk", loaded.conditions.frame, forces - loaded.force).ravel()[loaded.retained]
-        return CondensedMap(stiffness, load, recover, under, follow)
+        return CondensedMap(self.stiffness, load, self.recover, self.under, self.follow)
+
+    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        displacement, traction = self.loaded.recovered(retained_displacement)
+        return displacement, traction * self.body.weights[:, None]
+
+    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """See `CondensedMap`."""
+        displacement, _ = self.recover(np.zeros(self.loaded.retained.size))
+        local = np.einsum("nkc,nc->nk", self.loaded.conditions.frame, displacement)
+        return self.loaded.responses(directions)[1], local.ravel()[directions]
+
+    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """See `CondensedMap`."""
+        return _Condensed(self.body, self.loaded.under(displacement, force), self.stiffness).map()
 
 
 class HierarchicalCollocation(HierarchicalMap, CollocationElasticity):
