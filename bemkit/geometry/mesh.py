@@ -12,12 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.curves import Curve, MovedCurve, as_point, require_positive
 from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
-from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.surface import Surface
-from bemkit.geometry.symmetry import Symmetry, check_half, unfold
-from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
-from bemkit.geometry.validity.loops import swept_areas
-from bemkit.geometry.validity.mesh_checks import (
+from bemkit.geometry.loops import (
     as_index,
     check_chains,
     check_curves,
@@ -25,7 +20,12 @@ from bemkit.geometry.validity.mesh_checks import (
     check_parts,
     follow_loops,
     restrict_loops,
+    swept_areas,
 )
+from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.surface import Surface
+from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.vectors import norms, turned_right
 
 _N_LENGTH_POINTS = 16

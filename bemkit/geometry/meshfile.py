@@ -10,8 +10,8 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.meshio_files import read_with_meshio, require_meshio
 from bemkit.geometry.files.plane_mesh import PlaneMesh, boundary_chains
+from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.validity.loops import following_in_loops
 from bemkit.geometry.vectors import cross
 
 _SURFACES = (".ply", ".stl", ".off", ".obj")

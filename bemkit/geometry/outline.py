@@ -8,9 +8,9 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.loops import check_loops
+from bemkit.geometry.pieces import RESOLUTION, make_pieces, resolution
 from bemkit.geometry.surface import Surface
-from bemkit.geometry.validity.chords import RESOLUTION, make_pieces, resolution
-from bemkit.geometry.validity.loops import check_loops
 from bemkit.geometry.vectors import check_magnitude, norms
 
 _JOINT_TOLERANCE = 64 * RESOLUTION  # times the coordinates: trigonometry and splines lose a few more digits
