@@ -50,8 +50,8 @@ if TYPE_CHECKING:
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
     from bemkit.geometry.meshing.discretise import discretise as discretise
     from bemkit.geometry.neighbours import corner_nodes as corner_nodes
+    from bemkit.geometry.outline import Selection as Selection
     from bemkit.geometry.placement import Placement as Placement
-    from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
     from bemkit.geometry.shapes import HalfPlaneBody as HalfPlaneBody
@@ -163,7 +163,7 @@ _HOME = {
     "geometry.mesh": ("BoundaryMesh",),
     "geometry.meshing.discretise": ("discretise",),
     "geometry.placement": ("Placement",),
-    "geometry.selection": ("Selection",),
+    "geometry.outline": ("Selection",),
     "geometry.shapes": (
         *("Disk", "ExteriorOf", "HalfPlaneBody", "PeriodicHalfPlaneBody", "PlateWithHole", "Polygon", "Rectangle"),
         *("Ring", "Sector"),

@@ -15,9 +15,9 @@ from bemkit.geometry.meshfile import read_mesh as read_mesh
 from bemkit.geometry.meshfile import write_mesh as write_mesh
 from bemkit.geometry.meshing.discretise import discretise as discretise
 from bemkit.geometry.outline import Outline as Outline
+from bemkit.geometry.outline import Selection as Selection
 from bemkit.geometry.outline import Side as Side
-from bemkit.geometry.selection import Selection as Selection
-from bemkit.geometry.selection import breakpoints as breakpoints
+from bemkit.geometry.outline import breakpoints as breakpoints
 from bemkit.geometry.shapes import Disk as Disk
 from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
 from bemkit.geometry.shapes import PlateWithHole as PlateWithHole

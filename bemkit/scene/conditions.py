@@ -13,7 +13,7 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, ScalarField, check_field, evaluate_field
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 
 Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
 """A condition on the coordinates, such as ``Expression("x > 0.5")``."""

@@ -10,8 +10,7 @@ from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.meshing.partition import Partition, first_partition
-from bemkit.geometry.outline import Outline
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
 
 DEFAULT_ELEMENTS = 320

@@ -20,7 +20,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks

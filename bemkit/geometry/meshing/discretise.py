@@ -10,8 +10,7 @@ from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, divide
 from bemkit.geometry.meshing.transition import gradual_positions
-from bemkit.geometry.outline import Outline
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
 
 
