@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from bemkit.geometry.drawn import SplineTo as SplineTo
     from bemkit.geometry.files.shape_file import DrawingFile as DrawingFile
     from bemkit.geometry.files.shape_file import MeshFile as MeshFile
-    from bemkit.geometry.grading import Algebraic as Algebraic
-    from bemkit.geometry.grading import Geometric as Geometric
-    from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+    from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
+    from bemkit.geometry.meshing.discretise import Geometric as Geometric
+    from bemkit.geometry.meshing.discretise import Uniform as Uniform
     from bemkit.geometry.meshing.discretise import discretise as discretise
     from bemkit.geometry.neighbours import corner_nodes as corner_nodes
     from bemkit.geometry.outline import Selection as Selection
@@ -159,9 +159,8 @@ _HOME = {
     "formulas": ("Expression",),
     "geometry.drawn": ("ArcTo", "LineTo", "Loop", "NurbsTo", "OutlineShape", "SplineTo"),
     "geometry.files.shape_file": ("DrawingFile", "MeshFile"),
-    "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
-    "geometry.meshing.discretise": ("discretise",),
+    "geometry.meshing.discretise": ("Algebraic", "Geometric", "Uniform", "discretise"),
     "geometry.placement": ("Placement",),
     "geometry.outline": ("Selection",),
     "geometry.shapes": (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.conditions import RigidMotions, as_rows, largest_components
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 from bemkit.contact.solvability import contact_forces, friction_envelopes, met, outermost
 
 _WITHOUT_BOUND = 1e6

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.conditions import RigidMotions, as_rows, largest_components
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array, csr_array

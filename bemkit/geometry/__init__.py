@@ -6,13 +6,13 @@ from bemkit.geometry.curves import ParametricCurve as ParametricCurve
 from bemkit.geometry.curves import Segment as Segment
 from bemkit.geometry.errors import GeometryError as GeometryError
 from bemkit.geometry.errors import UnknownPartError as UnknownPartError
-from bemkit.geometry.grading import Algebraic as Algebraic
-from bemkit.geometry.grading import Geometric as Geometric
-from bemkit.geometry.grading import Grading as Grading
-from bemkit.geometry.grading import Uniform as Uniform
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
 from bemkit.geometry.meshfile import read_mesh as read_mesh
 from bemkit.geometry.meshfile import write_mesh as write_mesh
+from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
+from bemkit.geometry.meshing.discretise import Geometric as Geometric
+from bemkit.geometry.meshing.discretise import Grading as Grading
+from bemkit.geometry.meshing.discretise import Uniform as Uniform
 from bemkit.geometry.meshing.discretise import discretise as discretise
 from bemkit.geometry.outline import Outline as Outline
 from bemkit.geometry.outline import Selection as Selection

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh

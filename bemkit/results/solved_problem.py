@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
 from bemkit.hdf5 import Reader, rows_of, write_table
 from bemkit.results.assembly_solution import AssemblySolution

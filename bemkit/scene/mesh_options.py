@@ -6,9 +6,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from bemkit.errors import InputError
-from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.discretise import discretise
+from bemkit.geometry.meshing.discretise import Grading, Uniform, discretise
 from bemkit.geometry.meshing.partition import Partition, first_partition
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry

@@ -144,9 +144,9 @@ SIDES = Registry(
 GRADINGS = Registry(
     "grading",
     {
-        "uniform": "bemkit.geometry.grading:Uniform",
-        "algebraic": "bemkit.geometry.grading:Algebraic",
-        "geometric": "bemkit.geometry.grading:Geometric",
+        "uniform": "bemkit.geometry.meshing.discretise:Uniform",
+        "algebraic": "bemkit.geometry.meshing.discretise:Algebraic",
+        "geometric": "bemkit.geometry.meshing.discretise:Geometric",
     },
 )
 

@@ -28,7 +28,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.drawn import DrawnSide
 from bemkit.geometry.files.shape_file import ShapeFile
-from bemkit.geometry.grading import Grading
+from bemkit.geometry.meshing.discretise import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
 from bemkit.scene.body import Body

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.conditions import stick
+from bemkit.contact.conditions import as_dense, stick
 from bemkit.contact.piecewise_law import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
-from bemkit.contact.rigid_motions import as_dense
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 

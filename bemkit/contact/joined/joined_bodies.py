@@ -11,13 +11,12 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents, with_given_tractions
-from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.conditions import LinearConditions, RigidMotions
 from bemkit.contact.joined.balance import LIGHTEST, imbalance_of
 from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
 from bemkit.contact.joined.sparse_form import sparse_response
-from bemkit.contact.rigid_motions import RigidMotions
 from bemkit.operators.equilibrium import Imbalance
 
 MOST_DENSE = 2500

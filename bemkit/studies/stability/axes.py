@@ -14,8 +14,8 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap, HalfPlane
 from bemkit.errors import InputError
-from bemkit.geometry.grading import Uniform
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import Uniform
 from bemkit.geometry.shapes import Rectangle
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer

@@ -12,7 +12,7 @@ from bemkit.contact.obstacle import Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.contact.rough_profile import SelfAffineProfile
 from bemkit.formulas import Expression
-from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody, Shape
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import (
