@@ -16,8 +16,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
 from bemkit.model.boundary_tractions import mean_tractions
-from bemkit.model.energy import with_energies_checked
-from bemkit.model.solved_contact import SLIP_TOLERANCE
+from bemkit.model.solved_contact import SLIP_TOLERANCE, with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
