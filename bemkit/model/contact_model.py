@@ -7,6 +7,7 @@ it is. A scene without contact is a contact problem without nodes.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -18,11 +19,10 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
-from bemkit.geometry.local_values import element_degrees, from_own_nodes
+from bemkit.geometry.local_values import element_degrees, from_own_nodes, projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_tractions import insert_loads, projector
+from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
 from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared
@@ -35,7 +35,7 @@ from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
-from bemkit.scene.conditions import Contact
+from bemkit.scene.conditions import Contact, Free, Pressure, Traction
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
     from bemkit.contact.periodic_body import PeriodicBody
 
+_MORE_POINTS = 4
+"""Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
@@ -300,3 +302,32 @@ def _law(prepared: Prepared, body: ContactBody) -> FrictionLaw:
     contact = prepared.contact
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return law.scaled(prepared.units.stress)
+
+
+def insert_loads(
+    traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
+) -> None:
+    """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero.
+
+    Parameters
+    ----------
+    traction : (n_elements, n_local, 2) array [Pa]
+        At the local nodes of their space; changed in place, but for elements in contact and those that supports hold.
+    scene : Scene
+    mesh : BoundaryMesh
+        In physical units.
+    space : BoundarySpace
+        Of the tractions.
+    touching : collection of str
+        Free parts that other bodies touch: they are left as they are.
+    """
+    xi, weights = gauss_legendre(space.degree + 1 + _MORE_POINTS)
+    projection = projector(space, xi, weights)
+    is_free = np.ones(mesh.n_elements, bool)
+    for part, elements in scene.parts_on(mesh):
+        is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
+        if isinstance(part.condition, Traction | Pressure):
+            points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
+            values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+            traction[elements] = np.einsum("lq,eqc->elc", projection, values)
+    traction[is_free] = 0.0

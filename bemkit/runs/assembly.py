@@ -11,11 +11,11 @@ from bemkit.arrays import IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
-from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.model.solved_contact import SLIP_TOLERANCE, with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan

@@ -11,9 +11,9 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps

@@ -17,7 +17,7 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
-from bemkit.model.boundary_tractions import insert_loads
+from bemkit.model.contact_model import insert_loads
 from bemkit.model.units import Units
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import SingularMatrixError
