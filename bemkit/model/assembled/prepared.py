@@ -18,8 +18,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contact_tractions import ContactSpread
-from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
-from bemkit.model.assembled.obstacles import obstacle_rows
+from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import linear_solver_of, nodal_forces, supports_on
