@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.problem import Certificate
 from bemkit.notebook import ShownInNotebooks
@@ -70,11 +72,7 @@ class SolvedProblem(ShownInNotebooks):
     warnings: tuple[str, ...] = ()
     loading: LoadHistory | None = None
 
-    if TYPE_CHECKING:  # fields of the one kind, properties of the other
-
-        @property
-        def n_elements(self) -> int:
-            """Number of elements."""
+    if TYPE_CHECKING:  # a field of the one kind, a property of the other
 
         @property
         def energy(self) -> float:
@@ -93,6 +91,10 @@ class SolvedProblem(ShownInNotebooks):
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         """Return what is measured between the nodes of each contact, with their slip for laws that depend on it."""
         raise NotImplementedError
+
+    def _n_sides(self, contact: str) -> int:
+        """Return how many elastic bodies carry the tractions of a contact."""
+        return 1
 
     def _sizes(self) -> dict[str, int]:
         """Return what the summary counts besides elements and contact nodes."""
@@ -115,6 +117,33 @@ class SolvedProblem(ShownInNotebooks):
     def at_step(self, number: int) -> Self:
         """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
         return at_step(self, number)
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements of all bodies."""
+        return sum(body.mesh.n_elements for body in self.solved_bodies)
+
+    @cached_property
+    def estimated_error(self) -> float | None:
+        """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
+
+        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
+        zero of bodies at rest.
+        """
+        errors = [float(np.sum(body.element_errors)) for body in self.solved_bodies if body.element_errors is not None]
+        unit = sum(body.error_unit for body in self.solved_bodies)
+        if len(errors) < len(self.solved_bodies):
+            return None
+        if not any(errors):
+            return 0.0
+        return float(np.sqrt(sum(errors) / unit)) if unit > 0.0 else None
+
+    @property
+    def contact_traction_size(self) -> float:
+        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]: those between two bodies count on either."""
+        table = self.contact
+        squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
+        return float(np.sqrt(sum(self._n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
 
     @property
     def units(self) -> UnitNames | None:

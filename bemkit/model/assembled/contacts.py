@@ -216,8 +216,7 @@ _NamedSide = tuple[int, str, ContactSide]
 def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str, int]) -> tuple[_NamedSide, _NamedSide]:
     """Return the sides of a contact, the one with the multipliers first."""
     sides = []
-    for name in pair.sides:
-        body, part = name.split(".", 1)
+    for body, part in pair.elastic_parts:
         number = numbers[body]
         sides.append((number, part, ContactSide(bodies[number].space, bodies[number].part_elements(part))))
     one, two = sides
@@ -274,7 +273,7 @@ def obstacle_rows(
     rigid = {body.name: number for number, body in enumerate(assembly.rigid)}
     pairs = {pair.name: pair for pair in assembly.contacts if pair.rigid_body is not None}
     for number, body in enumerate(bodies):
-        own = [pair for pair in pairs.values() if pair.elastic_sides[0].split(".", 1)[0] == body.name]
+        own = [pair for pair in pairs.values() if pair.elastic_parts[0][0] == body.name]
         if not own and not body.scene.contact_parts:
             continue
         facing = [_facing(pair, assembly) for pair in own]
@@ -323,4 +322,4 @@ def _facing(pair: ContactPair, assembly: Assembly) -> FacingPart:
 
 
 def _part(pair: ContactPair) -> str:
-    return pair.elastic_sides[0].split(".", 1)[1]
+    return pair.elastic_parts[0][1]

@@ -218,7 +218,7 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     numbers = {body.name: body for body in bodies}
     length = max(body.mesh.diameter for body in bodies)
     moduli = [
-        1.0 / sum(1.0 / numbers[side.split(".", 1)[0]].material.plane_modulus for side in pair.elastic_sides)
+        1.0 / sum(1.0 / numbers[body].material.plane_modulus for body, _ in pair.elastic_parts)
         for pair in assembly.contacts
     ]
     modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))
