@@ -20,7 +20,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
-from bemkit.hdf5 import Reader, rows_of, write_table, write_text
+from bemkit.hdf5 import Reader, columns_of, rows_of, write_table, write_text
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, LoadStep, StepWork
@@ -47,7 +48,9 @@ if TYPE_CHECKING:
 
 _Row = TypeVar("_Row", ContactForce, RigidResult)
 _FIELDS = ("displacement", "traction", "traction_dofs")
-_PLACES = ("part", "x", "y", "s", "from", "to")
+TRANSITION_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
+    {"texts": ("part", "from", "to"), "floats": ("x", "y", "s")}
+)
 _OF_ASSEMBLIES = ("friction_bound", "directions", "contacts", "rigid")
 _WORK = ("external_work", "dissipation", "increment_work", "friction_gain")
 _FLOATS = ("time", "elastic_energy", *_WORK)
@@ -58,13 +61,9 @@ _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
     """Write the ends of steps, which are all solutions or all solutions of assemblies, into a group."""
     certificates = [end.certificate.as_dict() for end in ends]
-    columns = {name: np.array([row[name] for row in certificates], dtype=float) for name in CERTIFICATE_ENTRIES}
-    write_table(group.create_group("certificate"), columns)
+    write_table(group.create_group("certificate"), columns_of(certificates, floats=CERTIFICATE_ENTRIES))
     rows = [{"step": k, **each.as_dict()} for k, end in enumerate(ends) for each in end.transitions]
-    texts: dict[str, Any] = {name: [row[name] for row in rows] for name in ("part", "from", "to")}
-    places = {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
-    step = np.array([row["step"] for row in rows], dtype=np.int64)
-    write_table(group.create_group("transitions"), texts | places | {"step": step})
+    write_table(group.create_group("transitions"), columns_of(rows, **TRANSITION_COLUMNS, integers=("step",)))
     for number, body in enumerate(zip(*(end.solved_bodies for end in ends), strict=True)):
         for name in _FIELDS:
             group[f"bodies/{number}/{name}"] = np.stack([getattr(own.boundary, name).ravel() for own in body])
@@ -105,7 +104,7 @@ def read_ends(
         raise InputError(f"{len(rows)} certificates for {n} steps")
     if isinstance(asked, Assembly) != isinstance(last, AssemblySolution):
         raise InputError("the steps are not those of the result")
-    scenes: Sequence[Any] = _loads(asked)
+    scenes: Sequence[Any] = load_steps(cast(Any, asked))
     names = _OF_ASSEMBLIES if isinstance(last, AssemblySolution) else ()
     columns = {name: reader.floats(f"steps/{name}") for name in names}
     ends: list[Solution | AssemblySolution] = []
@@ -157,9 +156,8 @@ def _assembly_end(
 
 def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ...]]:
     """Return the places of change of each step."""
-    table = reader.table("steps/transitions", texts=("part", "from", "to"), floats=("x", "y", "s"), integers=("step",))
-    rows = [(row["step"], Transition(*(row[name] for name in _PLACES))) for row in rows_of(table)]
-    return [tuple(each for step, each in rows if step == k) for k in range(n_steps)]
+    rows = rows_of(reader.table("steps/transitions", **TRANSITION_COLUMNS, integers=("step",)))
+    return [tuple(Transition.of(row) for row in rows if row["step"] == k) for k in range(n_steps)]
 
 
 def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> list[tuple[BoundaryFields, float]]:
@@ -167,25 +165,11 @@ def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> li
     columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS}
     if any(len(column) != n_steps for column in (energies, *columns.values())):
         raise InputError(f"the fields of {n_steps} steps differ in number")
+    shaped = {name: column.reshape(-1, *getattr(body.boundary, name).shape) for name, column in columns.items()}
     return [
-        (
-            replace(
-                body.boundary,
-                **{
-                    name: column[k].reshape(getattr(body.boundary, name).shape).copy()
-                    for name, column in columns.items()
-                },
-            ),
-            float(energies[k]),
-        )
+        (replace(body.boundary, **{name: column[k].copy() for name, column in shaped.items()}), float(energies[k]))
         for k in range(n_steps)
     ]
-
-
-def _loads(asked: Scene | Assembly) -> Sequence[Scene | Assembly]:
-    if isinstance(asked, Assembly):
-        return load_steps(asked)
-    return load_steps(asked)
 
 
 def _numbers(steps: Sequence[Sequence[object]], kind: type) -> FloatArray:
@@ -212,17 +196,13 @@ def write_history(file: h5py.File, loading: LoadHistory) -> None:
     group, rows = file.create_group("steps"), [step.as_dict() for step in loading.steps]
     motions, states = [step.motion for step in loading.steps], [step.state for step in loading.steps]
     group.attrs["n_steps"] = loading.n_steps
-    floats = {name: np.array([row[name] for row in rows], dtype=float) for name in _FLOATS}
-    write_table(group, floats | {name: np.array([row[name] for row in rows], dtype=np.int64) for name in _COUNTS})
+    write_table(group, columns_of(rows, floats=_FLOATS, integers=_COUNTS))
     for name in (*_CONTACT, "status"):
         column = np.stack([getattr(step.contact, name) for step in loading.steps])
         group[f"contact/{name}"] = column.astype(np.int64) if name == "status" else column
-    group["time_step"] = np.array([motion.time_step for motion in motions])
-    group["slip"] = np.stack([motion.slip for motion in motions])
-    group["last_slip"] = np.stack([motion.last_slip for motion in motions])
-    group["state"] = np.stack(
-        [np.concatenate([state.displacement, state.traction], axis=1).ravel() for state in states]
-    )
+    for name in ("time_step", "slip", "last_slip"):
+        group[name] = np.array([getattr(motion, name) for motion in motions])
+    group["state"] = np.stack([np.hstack([state.displacement, state.traction]).ravel() for state in states])
     write_ends(group, [step.end for step in loading.steps])
 
 

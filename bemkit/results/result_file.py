@@ -47,13 +47,13 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, columns_of, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.file_meanings import annotate
-from bemkit.results.history_file import read_history, write_history
+from bemkit.results.history_file import TRANSITION_COLUMNS, read_history, write_history
 from bemkit.results.outputs import STDOUT
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
@@ -110,9 +110,7 @@ def write_outcome(
     contact = {"part": list(solution.contact.part), **solution.contact.columns(), **columns}
     write_table(file.create_group("contact"), contact)
     rows = [transition.as_dict() for transition in solution.transitions]
-    texts: dict[str, Any] = {name: [row[name] for row in rows] for name in ("part", "from", "to")}
-    places = {name: np.array([row[name] for row in rows], dtype=float) for name in ("x", "y", "s")}
-    write_table(file.create_group("transitions"), texts | places)
+    write_table(file.create_group("transitions"), columns_of(rows, **TRANSITION_COLUMNS))
     write_table(file.create_group("history"), history_columns(solution.history))
     for name in ("plan", "work"):
         write_text(file, name, json.dumps(unstructure(getattr(solution, name))))
@@ -153,9 +151,8 @@ def read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[st
 def write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> None:
     """Write resultants of parts or contacts as a table with their entries as columns."""
     rows = [force.as_dict() for force in forces]
-    columns = {key: [row[key] for row in rows] for key in (rows[0] if rows else ("name",))}
-    numbers = {key: np.array(column, dtype=float) for key, column in columns.items() if key != "name"}
-    write_table(file.create_group(name), {"name": columns["name"], **numbers})
+    numbers = list(rows[0])[1:] if rows else ()
+    write_table(file.create_group(name), columns_of(rows, texts=("name",), floats=numbers))
 
 
 def write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
@@ -213,8 +210,7 @@ def _read_mesh(reader: Reader, place: str, curves: Callable[[], tuple[Curve, ...
 
 
 def _read_transitions(reader: Reader) -> tuple[Transition, ...]:
-    rows = rows_of(reader.table("transitions", texts=("part", "from", "to"), floats=("x", "y", "s")))
-    return tuple(Transition(row["part"], row["x"], row["y"], row["s"], row["from"], row["to"]) for row in rows)
+    return tuple(Transition.of(row) for row in rows_of(reader.table("transitions", **TRANSITION_COLUMNS)))
 
 
 def _read_history(reader: Reader) -> tuple[StepRecord, ...]:

@@ -25,7 +25,7 @@ from bemkit.results.contact_table import ContactTable, bound_at, find_transition
 from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
 from bemkit.results.solution import BoundaryFields
 from bemkit.results.solved_problem import SolvedSteps
-from bemkit.results.warnings import find_assembly_warnings
+from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.solvers.active_sets import NodeStatus
@@ -163,7 +163,7 @@ def assembly_solution(
         message=result.message,
         rigid=rigid,
     )
-    return solution.with_warnings(find_assembly_warnings(solution))
+    return solution.with_warnings(find_warnings(solution))
 
 
 def _at_rest(model: AssembledModel, result: ContactSolution, furthest: float) -> IntArray:
