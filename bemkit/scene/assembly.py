@@ -15,10 +15,9 @@ from bemkit.formulas import closest
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
-from bemkit.scene.body import Body
+from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
-from bemkit.scene.halved_bodies import check_place, lines_across
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.rigid_body import RigidBody
 from bemkit.scene.scene import Scene

@@ -1,10 +1,12 @@
-"""Strokes: the lines and curves of a file, in any order and sense, joined to closed loops."""
+"""Strokes: the lines and curves of a file, free-form ones exactly, in any order and sense, joined to closed loops."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -12,6 +14,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.nurbs import conic_arc
 from bemkit.geometry.vectors import cross, norms
 
 StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
@@ -19,6 +22,8 @@ StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
 _SEEN = np.linspace(0.0, 1.0, 17)
 _ROUND_OFF = 1e-12
 """Gaps, relative to the coordinates, that are not worth a word."""
+_STRAIGHT = 1e-9
+"""Distance of control points from the chord of what is a line, relative to the chord."""
 
 
 @dataclass(frozen=True)
@@ -265,3 +270,78 @@ def _from_lower_left(loop: list[Stroke]) -> list[Stroke]:
     low = np.round((starts.sum(axis=1) - starts.sum(axis=1).min()) / size, 9)
     first = int(np.lexsort((starts[:, 1], low))[0])
     return [*loop[first:], *loop[:first]]
+
+
+def ellipse_strokes(
+    centre: FloatArray, first: FloatArray, second: FloatArray, start: float, end: float, group: str
+) -> list[Stroke]:
+    """Return the arc centre + cos(t) first + sin(t) second, t = start ... end [rad], a quarter at a time."""
+    n = max(1, math.ceil(abs(end - start) / (0.5 * math.pi) - 1e-9))
+    ends = np.linspace(start, end, n + 1)
+    strokes = []
+    for k in range(n):
+        arc = conic_arc(centre, first, second, float(ends[k]), float(ends[k + 1]))
+        begin, middle, finish = map(_pair, arc.points)
+        weights = tuple(float(weight) for weight in arc.weights)
+        strokes.append(Stroke(begin, NurbsTo(finish, (middle,), weights=weights, group=group)))
+    return strokes
+
+
+def bezier_stroke(points: FloatArray, group: str) -> Stroke:
+    """Return a Bezier curve of control points (n, 2) [m], as a line if it is one."""
+    start, *inner, end = map(_pair, points)
+    chord, arms = points[-1] - points[0], points[1:] - points[0]
+    along, length = np.append(0.0, arms @ chord), float(norms(chord))
+    is_line = (np.diff(along) >= 0.0).all() and np.abs(cross(chord, arms)).max() <= _STRAIGHT * length * length
+    return Stroke(start, LineTo(end, group=group) if is_line else NurbsTo(end, tuple(inner), group=group))
+
+
+def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: FloatArray, group: str) -> list[Stroke]:
+    """Return a rational B-spline as smooth strokes: cut where its knots let it have a kink.
+
+    Knots need not be repeated at the ends, as those of closed curves are not.
+    """
+    if len(knots) != len(points) + degree + 1 or (np.diff(knots) < 0.0).any() or not (weights > 0.0).all():
+        raise GeometryError(
+            f"a spline has {len(knots)} knots for {len(points)} control points and degree {degree}: draw it anew"
+        )
+    values = np.column_stack([points * weights[:, None], weights])
+    low, high = knots[degree], knots[-degree - 1]
+    inner = knots[(knots > low) & (knots < high)]
+    kinks = sorted({float(knot) for knot in inner if np.count_nonzero(inner == knot) >= degree})
+    for knot in (low, *kinks, high):
+        knots, values = _inserted(knots, values, degree, float(knot))
+    strokes = []
+    cuts = [float(low), *kinks, float(high)]
+    for begin, end in pairwise(cuts):
+        # the first control point that counts from a knot repeated as often as the degree lies on the curve
+        first = int(np.searchsorted(knots, begin, side="right")) - degree - 1
+        last = int(np.searchsorted(knots, end, side="left")) - 1
+        own = values[first : last + 1]
+        between = knots[(knots > begin) & (knots < end)]
+        own_knots = (begin,) * (degree + 1) + tuple(map(float, between)) + (end,) * (degree + 1)
+        own_points, own_weights = own[:, :2] / own[:, 2:], own[:, 2]
+        is_plain = bool(np.ptp(own_weights) == 0.0)
+        if len(own) == degree + 1 and is_plain:
+            strokes.append(bezier_stroke(own_points, group))
+            continue
+        start, *middle, to = map(_pair, own_points)
+        kept = None if is_plain else tuple(map(float, own_weights))
+        strokes.append(Stroke(start, NurbsTo(to, tuple(middle), degree, own_knots, kept, group=group)))
+    return strokes
+
+
+def _inserted(knots: FloatArray, values: FloatArray, degree: int, knot: float) -> tuple[FloatArray, FloatArray]:
+    """Repeat a knot until its multiplicity is the degree, by Boehm's algorithm; the curve stays the same."""
+    while (multiplicity := int(np.count_nonzero(knots == knot))) < degree:
+        last = int(np.searchsorted(knots, knot, side="right")) - 1
+        changed = np.arange(last - degree + 1, last - multiplicity + 1)
+        ratio = ((knot - knots[changed]) / (knots[changed + degree] - knots[changed]))[:, None]
+        inner = ratio * values[changed] + (1.0 - ratio) * values[changed - 1]
+        values = np.concatenate([values[: changed[0]], inner, values[last - multiplicity :]])
+        knots = np.insert(knots, last + 1, knot)
+    return knots, values
+
+
+def _pair(point: FloatArray) -> Point:
+    return float(point[0]), float(point[1])
