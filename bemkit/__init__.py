@@ -127,9 +127,9 @@ if TYPE_CHECKING:
     from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
     from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
     from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
-    from bemkit.scene.far_field import FarField as FarField
     from bemkit.scene.mesh_options import MeshOptions as MeshOptions
-    from bemkit.scene.rigid_body import RigidBody as RigidBody
+    from bemkit.scene.plane_motion import FarField as FarField
+    from bemkit.scene.plane_motion import RigidBody as RigidBody
     from bemkit.scene.scene import Scene as Scene
     from bemkit.scene.steps import Step as Step
     from bemkit.scene.toml import load_scene as load_scene
@@ -200,9 +200,8 @@ _HOME = {
     ),
     "scene.copies": ("CircleCopies", "GridCopies", "ListedCopies"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
-    "scene.far_field": ("FarField",),
     "scene.mesh_options": ("MeshOptions",),
-    "scene.rigid_body": ("RigidBody",),
+    "scene.plane_motion": ("FarField", "RigidBody"),
     "scene.scene": ("Scene",),
     "scene.steps": ("Step",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),

@@ -19,7 +19,7 @@ from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.unit_names import UnitNames

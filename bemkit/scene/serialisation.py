@@ -37,6 +37,7 @@ from bemkit.scene.conditions import Condition, Part
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.explanations import explain
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.registry import (
     BODY_FORCES,
     CONDITIONS,
@@ -51,7 +52,6 @@ from bemkit.scene.registry import (
     SOLVERS,
     Registry,
 )
-from bemkit.scene.rigid_body import RigidBody
 from bemkit.solvers.base import ContactSolver
 
 T = TypeVar("T")

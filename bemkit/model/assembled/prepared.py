@@ -29,7 +29,7 @@ from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.transform import AffineMap, TransformedRegion
 
 

@@ -25,9 +25,9 @@ from bemkit.scene.conditions import (
     Roller,
     Traction,
 )
-from bemkit.scene.far_field import FarField
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step
 from bemkit.solvers.base import ContactSolver
