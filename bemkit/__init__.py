@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from bemkit.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from bemkit.contact.history_laws import RateStrengthening as RateStrengthening
-    from bemkit.contact.history_laws import SlipWeakening as SlipWeakening
-    from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
+    from bemkit.contact.further_laws import CohesiveCoulomb as CohesiveCoulomb
+    from bemkit.contact.further_laws import RateStrengthening as RateStrengthening
+    from bemkit.contact.further_laws import SlipWeakening as SlipWeakening
     from bemkit.contact.laws import Coulomb as Coulomb
     from bemkit.contact.laws import FrictionLaw as FrictionLaw
     from bemkit.contact.laws import Frictionless as Frictionless
@@ -148,8 +148,8 @@ if TYPE_CHECKING:
     from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
-    "contact.history_laws": ("RateStrengthening", "SlipWeakening"),
-    "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
+    "contact.further_laws": ("CohesiveCoulomb", "RateStrengthening", "SlipWeakening"),
+    "contact.laws": ("Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
     "contact.rough_profile": ("Profile", "SelfAffineProfile"),

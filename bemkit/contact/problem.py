@@ -10,8 +10,8 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import DenseBody
 from bemkit.contact.conditions import LinearConditions, separated, stick
+from bemkit.contact.further_laws import law_name
 from bemkit.contact.laws import FrictionLaw, LawError
-from bemkit.contact.piecewise_law import law_name
 from bemkit.errors import InputError
 
 __all__ = [

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.formulas import closest

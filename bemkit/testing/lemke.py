@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.conditions import as_dense, stick
-from bemkit.contact.piecewise_law import law_name
+from bemkit.contact.further_laws import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, LawError, Tresca
-from bemkit.contact.piecewise_law import PiecewiseLaw
+from bemkit.contact.further_laws import CohesiveCoulomb, PiecewiseLaw
+from bemkit.contact.laws import Coulomb, Frictionless, LawError, Tresca
 from bemkit.contact.problem import ContactProblem, certify
 from bemkit.formulas import Expression
 from bemkit.solvers.alm import AugmentedLagrangian

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 import bemkit as bk
 from bemkit.cli.main import commands
-from bemkit.contact.history_laws import SlipWeakening
+from bemkit.contact.further_laws import SlipWeakening
 from bemkit.results.citations import DRIVERS, LAW_WORKS, PACKAGE, Citations, Method, Work, cite, works
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.toml import shipped_files, with_overrides

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
 from bemkit.formulas import Expression
 from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Uniform

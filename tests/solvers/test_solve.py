@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, certify
 from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.alm import AugmentedLagrangian, BoundUpdate

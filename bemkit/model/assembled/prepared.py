@@ -11,8 +11,8 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb, RateStrengthening, SlipWeakening
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.contact.spline import SplineObstacle
