@@ -175,6 +175,28 @@ class LinearConditions:
             np.where(rows, other.value, self.value),
         )
 
+    def with_given_displacements(self, displacement: FloatArray) -> FloatArray:
+        """Return displacements (n_contact, 2) with those that conditions prescribe met to the last digit."""
+        met = displacement.copy()
+        for row in (0, 1):
+            factor, other = self.on_displacement[:, row, row], self.on_displacement[:, row, 1 - row]
+            is_given = (factor != 0.0) & (other == 0.0) & ~self.on_traction[:, row].any(axis=1)
+            np.divide(self.value[:, row], factor, out=met[:, row], where=is_given)
+        return met
+
+    def with_given_tractions(self, traction: FloatArray) -> FloatArray:
+        """Return tractions (n_contact, 2) with those that conditions give, or tie to the other component, met exactly.
+
+        Ties such as ``|sigma_t| = s |sigma_n|`` are then decided alike in all units.
+        """
+        met = traction.copy()
+        for row in (0, 1):
+            factor = self.on_traction[:, row, row]
+            is_given = (factor != 0.0) & ~self.on_displacement[:, row].any(axis=1)
+            rest = self.value[:, row] - self.on_traction[:, row, 1 - row] * met[:, 1 - row]
+            np.divide(rest, factor, out=met[:, row], where=is_given)
+        return met
+
     def free_motions(self, motions: RigidMotions) -> RigidMotions:
         """Return the rigid motions that change no condition: nothing but tractions are prescribed along them.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents, with_given_tractions
+from bemkit.contact.condensation.dense_body import DenseBody, refuse_other_tangents
 from bemkit.contact.conditions import LinearConditions, RigidMotions
 from bemkit.contact.joined.coupled_members import CoupledMembers
 from bemkit.contact.joined.dense_form import RelativeStiffness
@@ -168,7 +168,7 @@ class JoinedBodies(CoupledMembers, LinearBody):
         nothing = [np.zeros_like(member.load) for member in self.members]
         homogeneous = replace(conditions, value=np.zeros_like(conditions.value))
         correction = self.under(nothing, -missed)._dense.respond(homogeneous)
-        traction = with_given_tractions(conditions, state.traction + correction.traction)
+        traction = conditions.with_given_tractions(state.traction + correction.traction)
         return ContactState(state.displacement + correction.displacement, traction)
 
     def rigid_motions(self) -> RigidMotions:

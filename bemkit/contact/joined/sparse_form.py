@@ -200,7 +200,8 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     force = given.by_kept @ (row * solution[: kept.size])
     displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[kept.size :])
     traction = (force + given.at_rest).reshape(n, 2) / joined.weights[:, None]
-    return _exact(conditions, displacement.reshape(n, 2), traction)
+    displacement, traction = displacement.reshape(n, 2), conditions.with_given_tractions(traction)
+    return ContactState(conditions.with_given_displacements(displacement), traction)
 
 
 class _Given:
@@ -287,18 +288,3 @@ def _refined(
     except SingularMatrixError as error:
         raise SingularResponse(f"the contact conditions do not hold the bodies ({error})") from error
     return solutions, before
-
-
-def _exact(conditions: LinearConditions, displacement: FloatArray, traction: FloatArray) -> ContactState:
-    """Return the state with prescribed displacements and tractions met exactly, so that ties are decided alike."""
-    on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
-    for row in (0, 1):
-        own, other = on_displacement[:, row, row], on_displacement[:, row, 1 - row]
-        is_met = (own != 0.0) & (other == 0.0) & ~np.any(on_traction[:, row] != 0.0, axis=1)
-        displacement[is_met, row] = conditions.value[is_met, row] / own[is_met]
-    for row in (0, 1):
-        own = on_traction[:, row, row]
-        is_met = (own != 0.0) & ~np.any(on_displacement[:, row] != 0.0, axis=1)
-        rest = conditions.value[:, row] - on_traction[:, row, 1 - row] * traction[:, 1 - row]
-        traction[is_met, row] = rest[is_met] / own[is_met]
-    return ContactState(displacement, traction)
