@@ -38,6 +38,12 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
     return [(slice(i, j), slice(int(indices[i]), int(indices[i]) + j - i)) for i, j in itertools.pairwise(edges)]
 
 
+def spread_fractions(n: int) -> FloatArray:
+    """Return n fractions without any pattern, as far from each other as can be: multiples of the golden ratio."""
+    fractions: FloatArray = np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]
+    return fractions
+
+
 def blended(one: FloatArray, two: FloatArray, share: float) -> FloatArray:
     """Return values a share of the way from one to another; equal ones, infinite ones among them, stay."""
     with np.errstate(invalid="ignore"):

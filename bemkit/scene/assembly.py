@@ -11,7 +11,7 @@ import numpy as np
 
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
-from bemkit.formulas import closest
+from bemkit.formulas import choices, closest
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
@@ -280,9 +280,7 @@ class Assembly(ShownInNotebooks):
     def _check_side(self, side: str) -> None:
         body, part = body_and_part(side)
         if body not in self._by_name:
-            names = list(self._by_name)
-            listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-            raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
+            raise InputError(f"a contact names {side!r}: the bodies are {choices(body, list(self._by_name))}")
         placed = self._by_name[body]
         sides = self._side_names(placed)
         if any(part == own.name for own in placed.parts) or not any(part in names for names in sides):

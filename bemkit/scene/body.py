@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
-from bemkit.formulas import closest
+from bemkit.formulas import choices
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
@@ -109,10 +109,7 @@ class Body:
         sides = self.shape.outline().selectable_names
         if name not in sides:
             known = [*(part.name for part in self.parts), *sides]
-            listed = ", ".join(known[:12]) + (", ..." if len(known) > 12 else "")
-            raise InputError(
-                f"body {self.name!r} has no part or side {name!r}: there are {listed}{closest(name, known)}"
-            )
+            raise InputError(f"body {self.name!r} has no part or side {name!r}: there are {choices(name, known)}")
         return Part(name, Free(), sides=(name,))
 
 

@@ -17,7 +17,7 @@ from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
-from bemkit.formulas import closest
+from bemkit.formulas import choices
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Selection
@@ -140,10 +140,7 @@ class Scene(ShownInNotebooks):
         for part in self.parts:
             for side in part.sides:
                 if side not in names:
-                    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-                    raise InputError(
-                        f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
-                    )
+                    raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
     def _check_without_contact(self) -> None:
         for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):

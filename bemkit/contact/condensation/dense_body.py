@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
@@ -288,8 +288,7 @@ class DenseBody(LinearBody):
     @cached_property
     def _probe(self) -> FloatArray:
         """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
-        multiples = np.arange(1, self.n_unknowns + 1) * 0.6180339887498949
-        return np.asarray(0.5 + np.modf(multiples)[0])
+        return 0.5 + spread_fractions(self.n_unknowns)
 
 
 def refuse_other_tangents(conditions: LinearConditions, is_eliminated: BoolArray) -> None:

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import refuse_other_tangents
 from bemkit.contact.condensation.element_conditions import ElementConditions
@@ -202,7 +202,7 @@ class HierarchicalBody(LinearBody):
         """Elements where residuals are evaluated: half of them in contact, without any pattern."""
         n = len(self.force)
         n_points = min(n, int(np.clip(_SAMPLED_PAIRS // n, _FEWEST_SAMPLED, _MOST_SAMPLED)))
-        spread = np.modf(np.arange(1, n_points + 1) * 0.6180339887498949)[0]
+        spread = spread_fractions(n_points)
         in_contact = self.nodes.nodes[(spread[::2] * self.n_contact).astype(int)]
         return np.unique(np.concatenate([in_contact, (spread[1::2] * n).astype(int)]))
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, spread_fractions
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.contact.joined.coupled_members import CoupledMembers
@@ -250,7 +250,7 @@ def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) ->
     scaled = sparse.csr_array((matrix.data * by_row, matrix.indices, matrix.indptr), matrix.shape)
     terms.data *= by_row
     right_side = right_side / sizes
-    probe = 0.5 + np.modf(np.arange(1, len(right_side) + 1) * 0.6180339887498949)[0]
+    probe = 0.5 + spread_fractions(len(right_side))
     right_sides, is_motion = np.stack([right_side, probe], axis=1), np.arange(len(right_side)) >= len(probe) - n_motions
     rcond = 0.0
     for penalty in _PENALTIES:

@@ -27,6 +27,7 @@ from bemkit.contact.mortar.segments import MortarQuadrature, Segments, common_re
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.vectors import turned_left
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -291,7 +292,7 @@ def _integrate(
         nodes=dofs[order],
         points=side.points(element, xi)[:, 0],
         arc_length=arc_length[order],
-        frame=np.stack([direction, np.stack([-direction[:, 1], direction[:, 0]], axis=1)], axis=1),
+        frame=np.stack([direction, turned_left(direction)], axis=1),
         weights=nodal_weights,
         gap=distance,
         overlap=max(float(depth[piece, place]), 0.0),

@@ -15,7 +15,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import conic_arc
-from bemkit.geometry.vectors import cross, norms
+from bemkit.geometry.vectors import cross, enclosed_area, norms
 
 StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
 
@@ -220,7 +220,7 @@ def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
     Sides of a name of the file keep it; several of one name are numbered and have it as their group. Sides without
     a name are ``side-1``, ``side-2``, ... along the loops, each of which begins at its lower left corner.
     """
-    areas = [_signed_area(loop) for loop in loops]
+    areas = [enclosed_area(np.concatenate([stroke.points for stroke in loop])) for loop in loops]
     outer = int(np.argmax(np.abs(areas)))
     turned = [
         loop if (area > 0.0) == (k == outer) else [stroke.reversed() for stroke in loop[::-1]]
@@ -256,12 +256,6 @@ def _names(groups: Sequence[str]) -> list[str]:
         taken.add(name)
         names.append(name)
     return names
-
-
-def _signed_area(loop: Sequence[Stroke]) -> float:
-    points = np.concatenate([stroke.points for stroke in loop])
-    arms = points - points[0]
-    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
 
 
 def _from_lower_left(loop: list[Stroke]) -> list[Stroke]:
