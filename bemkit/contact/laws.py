@@ -43,10 +43,7 @@ def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool 
     if np.any(is_wrong):
         where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
         raise InputError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
-    if array.ndim == 0:
-        return float(array)
-    read_only(array)
-    return array
+    return read_only(array) if array.ndim else float(array)
 
 
 def numbers_of(name: str, value: Coefficient) -> float | FloatArray:

@@ -77,8 +77,7 @@ class ContactProblem:
             if is_wrong.any():
                 node = int(np.argmax(is_wrong))
                 raise InputError(f"{name} is {array[node]} at contact node {node}; give a number")
-            read_only(array)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
         _ = self.cohesion  # a law that fails does so at once
 
     @property

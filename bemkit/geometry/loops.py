@@ -293,8 +293,7 @@ def check_parts(
                 f"BoundaryMesh: element {element} is in the parts {other!r} and {name!r}: parts must not overlap"
             )
         part_of_element[members] = number
-        read_only(members)
-        checked[name] = members
+        checked[name] = read_only(members)
     return checked
 
 

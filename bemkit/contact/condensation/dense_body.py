@@ -87,8 +87,7 @@ class DenseBody(LinearBody):
                 raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
             if not np.isfinite(array).all():
                 raise InputError(f"{name} contains {array[~np.isfinite(array)][0]}; give finite numbers")
-            read_only(array)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
         if n_contact == 0:
             raise InputError("weights is empty; a body needs at least one contact node")
         if self.weights.min() <= 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -125,7 +125,11 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
     strokes = [
         _with_ends(stroke, *places[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
     ]
-    return [*closed, *_followed(strokes, place_of_end.reshape(-1, 2))], notes
+    chains = closed_chains(place_of_end.reshape(-1, 2))
+    return [
+        *closed,
+        *([strokes[k] if ahead else strokes[k].reversed() for k, ahead in chain] for chain in chains),
+    ], notes
 
 
 def _without_repeated(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], list[str]]:
@@ -195,23 +199,24 @@ def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:
     return Stroke(ends[0], replace(stroke.side, to=ends[1]))
 
 
-def _followed(strokes: Sequence[Stroke], pairs: IntArray) -> list[list[Stroke]]:
-    """Follow strokes from place to place, each of which two strokes share."""
-    by_place = np.argsort(pairs.ravel(), kind="stable").reshape(-1, 2) // 2
-    is_seen = np.zeros(len(strokes), dtype=bool)
-    loops = []
-    for first in range(len(strokes)):
-        loop, number, place = [], first, int(pairs[first, 0])
+def closed_chains(ends: IntArray) -> Iterator[list[tuple[int, bool]]]:
+    """Yield the closed chains of links whose ends (n, 2) are numbered so that two links share each.
+
+    Each as the numbers of its links in order, and whether the link is followed from its first end to its second.
+    """
+    by_end = np.argsort(ends.ravel(), kind="stable").reshape(-1, 2) // 2
+    is_seen = np.zeros(len(ends), dtype=bool)
+    for first in range(len(ends)):
+        chain, number, end = [], first, int(ends[first, 0])
         while not is_seen[number]:
             is_seen[number] = True
-            starts_here = int(pairs[number, 0]) == place
-            loop.append(strokes[number] if starts_here else strokes[number].reversed())
-            place = int(pairs[number, 1 if starts_here else 0])
-            one, other = by_place[place].tolist()
+            is_ahead = int(ends[number, 0]) == end
+            chain.append((number, is_ahead))
+            end = int(ends[number, 1 if is_ahead else 0])
+            one, other = by_end[end].tolist()
             number = other if one == number else one
-        if loop:
-            loops.append(loop)
-    return loops
+        if chain:
+            yield chain
 
 
 def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
@@ -275,7 +280,7 @@ def ellipse_strokes(
     strokes = []
     for k in range(n):
         arc = conic_arc(centre, first, second, float(ends[k]), float(ends[k + 1]))
-        begin, middle, finish = map(_pair, arc.points)
+        begin, middle, finish = map(pair, arc.points)
         weights = tuple(float(weight) for weight in arc.weights)
         strokes.append(Stroke(begin, NurbsTo(finish, (middle,), weights=weights, group=group)))
     return strokes
@@ -283,7 +288,7 @@ def ellipse_strokes(
 
 def bezier_stroke(points: FloatArray, group: str) -> Stroke:
     """Return a Bezier curve of control points (n, 2) [m], as a line if it is one."""
-    start, *inner, end = map(_pair, points)
+    start, *inner, end = map(pair, points)
     chord, arms = points[-1] - points[0], points[1:] - points[0]
     along, length = np.append(0.0, arms @ chord), float(norms(chord))
     is_line = (np.diff(along) >= 0.0).all() and np.abs(cross(chord, arms)).max() <= _STRAIGHT * length * length
@@ -319,7 +324,7 @@ def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: F
         if len(own) == degree + 1 and is_plain:
             strokes.append(bezier_stroke(own_points, group))
             continue
-        start, *middle, to = map(_pair, own_points)
+        start, *middle, to = map(pair, own_points)
         kept = None if is_plain else tuple(map(float, own_weights))
         strokes.append(Stroke(start, NurbsTo(to, tuple(middle), degree, own_knots, kept, group=group)))
     return strokes
@@ -337,5 +342,6 @@ def _inserted(knots: FloatArray, values: FloatArray, degree: int, knot: float) -
     return knots, values
 
 
-def _pair(point: FloatArray) -> Point:
+def pair(point: FloatArray) -> Point:
+    """Return the coordinates of a point (2,)."""
     return float(point[0]), float(point[1])
