@@ -7,18 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 from bemkit.contact.body import SlipHistory
 from bemkit.contact.problem import Certificate
+from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.load_history import LoadHistory, at_step, step_rows
+from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
@@ -115,8 +116,32 @@ class SolvedProblem(ShownInNotebooks):
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     def at_step(self, number: int) -> Self:
-        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
-        return at_step(self, number)
+        """Return the solution at the end of an earlier step of its load history.
+
+        Parameters
+        ----------
+        number : int
+            Of the step, counted from 1.
+
+        Returns
+        -------
+        Solution or AssemblySolution
+            Its `loading` ends there, too. If it comes from a file, linear solves, history, timings and warnings are
+            those of the whole run.
+
+        Raises
+        ------
+        InputError
+            If there is no such step.
+        """
+        loading = self.loading
+        if loading is None:
+            raise InputError("the result has no load history: give [[steps]] or load_factors")
+        if not 1 <= number <= len(loading.steps):
+            most = len(loading.steps)
+            raise InputError(f"step {number} is none of the finished ones: give a number from 1 to {most}")
+        end = cast(Any, loading.steps[number - 1].end)
+        return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
 
     @property
     def n_elements(self) -> int:
