@@ -192,26 +192,14 @@ class Model:
         energy : float [J/m]
             Elastic energy of the stresses in the plane; without heat 1/2 a(u, u).
         """
-        units, mesh = self.units, self.mesh
+        units = self.units
         displacement, force = self.body.recover(state)
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
         traction *= units.stress
         insert_loads(traction, self.scene, self.mesh, self.elastic.traction_space)
-        # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
-        of_map, map_force = self.map_fields(displacement, force)
-        strained = without_motion(mesh.unit, dof_points(self.prepared.space), of_map)
-        energy = 0.5 * float(np.sum(strained * map_force))
-        if isinstance(self.elastic, HeavyElasticity):
-            energy += self.elastic.energy_beyond(displacement, force)
+        energy = elastic_energy(self.elastic, self.prepared.space, displacement, force)
         return displacement * units.displacement, traction, energy * units.stress * units.displacement * units.length
-
-    def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
-        if isinstance(self.elastic, SurfaceElasticity):
-            return self.elastic.strain_displacement(force), force
-        inside = self.prepared.inside
-        return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
@@ -243,6 +231,26 @@ class Model:
             turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
             found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
         return found
+
+
+def map_fields(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+    if isinstance(elastic, SurfaceElasticity):
+        return elastic.strain_displacement(force), force
+    if isinstance(elastic, HeavyElasticity):
+        return displacement - elastic.inside.displacement, force - elastic.inside.force
+    return displacement, force
+
+
+def elastic_energy(
+    elastic: SteklovPoincare, space: BoundarySpace, displacement: FloatArray, force: FloatArray
+) -> float:
+    """Return the elastic energy of the stresses in the plane, dimensionless, from nodal fields (n_nodes, 2)."""
+    of_map, map_force = map_fields(elastic, displacement, force)
+    # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
+    strained = without_motion(space.mesh, dof_points(space), of_map)
+    beyond = elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else 0.0
+    return 0.5 * float(np.sum(strained * map_force)) + beyond
 
 
 def build_model(prepared: Prepared) -> Model:

@@ -21,7 +21,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.geometry.spaces import BoundarySpace, dof_points
-from bemkit.model.contact_model import Model
+from bemkit.model.contact_model import Model, map_fields
 from bemkit.operators.equilibrium import NOISE_FACTOR, round_off_of
 from bemkit.operators.rigid_modes import traction_free_modes
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
@@ -147,7 +147,7 @@ def with_energy_checked(model: Model, result: ContactSolution) -> ContactSolutio
         return result
     if model.mesh.surface is not None:  # the flexibility of a half-plane is positive in closed form
         return result
-    displacement, force = model.map_fields(*model.body.recover(result.state))
+    displacement, force = map_fields(model.elastic, *model.body.recover(result.state))
     space = model.prepared.space
     if model.body.condensed is None:  # the work of the solution alone tells
         sensitivity = np.full(displacement.shape, model.elastic.material.plane_modulus)
@@ -166,13 +166,10 @@ def with_energies_checked(model: AssembledModel, result: ContactSolution) -> Con
     if not result.state.is_finite or result.status is Status.NOT_FINITE:
         return result
     unknowns = model.body.member_displacements(result.state)[: len(model.condensed)]  # rigid bodies come last
-    bodies = zip(model.prepared.bodies, model.elastic, model.condensed, model.prepared.insides, unknowns, strict=True)
-    for body, elastic, condensed, inside, own in bodies:
-        displacement, force = condensed.recover(own)
-        if inside is not None:
-            displacement, force = displacement - inside.displacement, force - inside.force
-        is_symmetric = body.scene.discretisation.is_symmetric
-        doubt = _doubt_of(condensed, elastic, body.own_space, is_symmetric, (displacement, force))
+    bodies = zip(model.prepared.bodies, model.elastic, model.condensed, unknowns, strict=True)
+    for body, elastic, condensed, own in bodies:
+        fields, is_symmetric = map_fields(elastic, *condensed.recover(own)), body.scene.discretisation.is_symmetric
+        doubt = _doubt_of(condensed, elastic, body.own_space, is_symmetric, fields)
         if doubt:
             return _named_negative(result, f"body {body.name!r}: {doubt}")
     return result
