@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from bemkit.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from bemkit.contact.history_laws import RateStrengthening as RateStrengthening
-    from bemkit.contact.history_laws import SlipWeakening as SlipWeakening
-    from bemkit.contact.laws import CohesiveCoulomb as CohesiveCoulomb
+    from bemkit.contact.further_laws import CohesiveCoulomb as CohesiveCoulomb
+    from bemkit.contact.further_laws import RateStrengthening as RateStrengthening
+    from bemkit.contact.further_laws import SlipWeakening as SlipWeakening
     from bemkit.contact.laws import Coulomb as Coulomb
     from bemkit.contact.laws import FrictionLaw as FrictionLaw
     from bemkit.contact.laws import Frictionless as Frictionless
@@ -44,14 +44,14 @@ if TYPE_CHECKING:
     from bemkit.geometry.drawn import SplineTo as SplineTo
     from bemkit.geometry.files.shape_file import DrawingFile as DrawingFile
     from bemkit.geometry.files.shape_file import MeshFile as MeshFile
-    from bemkit.geometry.grading import Algebraic as Algebraic
-    from bemkit.geometry.grading import Geometric as Geometric
-    from bemkit.geometry.grading import Uniform as Uniform
     from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
+    from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
+    from bemkit.geometry.meshing.discretise import Geometric as Geometric
+    from bemkit.geometry.meshing.discretise import Uniform as Uniform
     from bemkit.geometry.meshing.discretise import discretise as discretise
     from bemkit.geometry.neighbours import corner_nodes as corner_nodes
+    from bemkit.geometry.outline import Selection as Selection
     from bemkit.geometry.placement import Placement as Placement
-    from bemkit.geometry.selection import Selection as Selection
     from bemkit.geometry.shapes import Disk as Disk
     from bemkit.geometry.shapes import ExteriorOf as ExteriorOf
     from bemkit.geometry.shapes import HalfPlaneBody as HalfPlaneBody
@@ -127,9 +127,9 @@ if TYPE_CHECKING:
     from bemkit.scene.discretisation import HpGalerkin as HpGalerkin
     from bemkit.scene.discretisation import LinearGalerkin as LinearGalerkin
     from bemkit.scene.discretisation import QuadraticGalerkin as QuadraticGalerkin
-    from bemkit.scene.far_field import FarField as FarField
     from bemkit.scene.mesh_options import MeshOptions as MeshOptions
-    from bemkit.scene.rigid_body import RigidBody as RigidBody
+    from bemkit.scene.plane_motion import FarField as FarField
+    from bemkit.scene.plane_motion import RigidBody as RigidBody
     from bemkit.scene.scene import Scene as Scene
     from bemkit.scene.steps import Step as Step
     from bemkit.scene.toml import load_scene as load_scene
@@ -148,8 +148,8 @@ if TYPE_CHECKING:
     from bemkit.testing.lemke import LemkePivoting as LemkePivoting
 
 _HOME = {
-    "contact.history_laws": ("RateStrengthening", "SlipWeakening"),
-    "contact.laws": ("CohesiveCoulomb", "Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
+    "contact.further_laws": ("CohesiveCoulomb", "RateStrengthening", "SlipWeakening"),
+    "contact.laws": ("Coulomb", "FrictionLaw", "Frictionless", "Tresca"),
     "contact.obstacle": ("Cavity", "Circle", "Gap", "HalfPlane", "Obstacle"),
     "contact.polygon": ("PolygonalObstacle",),
     "contact.rough_profile": ("Profile", "SelfAffineProfile"),
@@ -159,11 +159,10 @@ _HOME = {
     "formulas": ("Expression",),
     "geometry.drawn": ("ArcTo", "LineTo", "Loop", "NurbsTo", "OutlineShape", "SplineTo"),
     "geometry.files.shape_file": ("DrawingFile", "MeshFile"),
-    "geometry.grading": ("Algebraic", "Geometric", "Uniform"),
     "geometry.mesh": ("BoundaryMesh",),
-    "geometry.meshing.discretise": ("discretise",),
+    "geometry.meshing.discretise": ("Algebraic", "Geometric", "Uniform", "discretise"),
     "geometry.placement": ("Placement",),
-    "geometry.selection": ("Selection",),
+    "geometry.outline": ("Selection",),
     "geometry.shapes": (
         *("Disk", "ExteriorOf", "HalfPlaneBody", "PeriodicHalfPlaneBody", "PlateWithHole", "Polygon", "Rectangle"),
         *("Ring", "Sector"),
@@ -201,9 +200,8 @@ _HOME = {
     ),
     "scene.copies": ("CircleCopies", "GridCopies", "ListedCopies"),
     "scene.discretisation": ("ConstantCollocation", "Galerkin", "HpGalerkin", "LinearGalerkin", "QuadraticGalerkin"),
-    "scene.far_field": ("FarField",),
     "scene.mesh_options": ("MeshOptions",),
-    "scene.rigid_body": ("RigidBody",),
+    "scene.plane_motion": ("FarField", "RigidBody"),
     "scene.scene": ("Scene",),
     "scene.steps": ("Step",),
     "scene.toml": ("load_scene", "scene_from_toml", "scene_to_toml"),

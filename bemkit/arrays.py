@@ -1,7 +1,7 @@
 """Names for the array types that every signature uses, and what is done to indices everywhere."""
 
 import itertools
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,13 @@ IntArray: TypeAlias = npt.NDArray[np.intp]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 
-def read_only(array: npt.NDArray[np.generic]) -> None:
-    """Forbid writing to an array that a frozen value holds."""
+AnyArray = TypeVar("AnyArray", FloatArray, IntArray, BoolArray, npt.NDArray[np.generic])
+
+
+def read_only(array: AnyArray) -> AnyArray:
+    """Return an array that a frozen value holds, after writing to it has been forbidden."""
     array.setflags(write=False)
+    return array
 
 
 Run: TypeAlias = tuple[slice, slice | IntArray]
@@ -36,6 +40,12 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
         return [(slice(0, indices.size), indices)]
     edges = [0, *breaks.tolist(), indices.size]
     return [(slice(i, j), slice(int(indices[i]), int(indices[i]) + j - i)) for i, j in itertools.pairwise(edges)]
+
+
+def spread_fractions(n: int) -> FloatArray:
+    """Return n fractions without any pattern, as far from each other as can be: multiples of the golden ratio."""
+    fractions: FloatArray = np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]
+    return fractions
 
 
 def blended(one: FloatArray, two: FloatArray, share: float) -> FloatArray:

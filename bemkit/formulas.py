@@ -192,6 +192,11 @@ def closest(word: str, names: "tuple[str, ...] | list[str]") -> str:
     return f"; did you mean '{matches[0]}'?" if matches else ""
 
 
+def choices(word: str, names: "tuple[str, ...] | list[str]") -> str:
+    """Return the first of the names there are, and which of them the word may have meant."""
+    return ", ".join(names[:12]) + (", ..." if len(names) > 12 else "") + closest(word, names)
+
+
 def shorten(text: str, length: int = 60) -> str:
     """Return the quoted text without control characters, cut to a length that fits into a message."""
     return repr(text if len(text) <= length else text[:length] + "...")

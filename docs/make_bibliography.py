@@ -6,7 +6,7 @@ from pathlib import Path
 
 from markers import between
 
-from bemkit.results.bibliography import works
+from bemkit.results.citations import works
 
 PAGE = Path(__file__).parent / "references.md"
 TOPICS = ("contact", "closed-forms", "meshes", "operators")

@@ -10,7 +10,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan

@@ -8,8 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.contact.rigid_motions import RigidMotions, as_rows, largest_components
+from bemkit.contact.conditions import LinearConditions, RigidMotions, as_rows, largest_components, separated, stick
 from bemkit.errors import BemkitError, InputError
 from bemkit.operators.equilibrium import Imbalance
 

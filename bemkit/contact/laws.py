@@ -14,16 +14,68 @@ which `FrictionLaw.at` turns into numbers per node.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import ClassVar, Protocol, Self, runtime_checkable
+from typing import ClassVar, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.coefficients import Coefficient as Coefficient
-from bemkit.contact.coefficients import LawError as LawError
-from bemkit.contact.coefficients import checked_coefficient, evaluated_coefficient, is_zero, numbers_of
 from bemkit.errors import InputError
+from bemkit.formulas import ScalarField, check_field, evaluate_field
+
+Coefficient: TypeAlias = ScalarField | FloatArray
+"""A number, a formula or function of x and y, or one number per contact node."""
+
+
+class LawError(InputError):
+    """A friction law failed or returned what no bound can be; the message names the law."""
+
+
+def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool = False) -> Coefficient:
+    """Check a coefficient and return it as a float, a read-only array of its own, or the formula it is."""
+    if callable(value):
+        check_field(value, name)
+        return value
+    array = np.array(value, dtype=float)
+    if array.ndim > 1:
+        raise InputError(f"{name} has the shape {array.shape}; give one number or one number per contact node")
+    is_wrong = np.isnan(array) | (array < 0.0) | (False if may_be_infinite else np.isinf(array))
+    if np.any(is_wrong):
+        where = f" at contact node {int(np.argmax(is_wrong))}" if array.ndim else ""
+        raise InputError(f"{name} = {array[is_wrong][0] if array.ndim else array:g}{where}; give a number >= 0")
+    return read_only(array) if array.ndim else float(array)
+
+
+def numbers_of(name: str, value: Coefficient) -> float | FloatArray:
+    """Return a coefficient that is known in numbers; InputError if it is a function of the coordinates."""
+    if callable(value):
+        raise InputError(f"{name} is a function of the coordinates; take law.at(points) for the contact nodes first")
+    return value
+
+
+def is_zero(value: Coefficient) -> bool:
+    """Whether a coefficient is known to vanish everywhere."""
+    return not callable(value) and not np.any(value)
+
+
+def evaluated_coefficient(name: str, value: Coefficient, points: FloatArray) -> Coefficient:
+    """Return a coefficient in numbers, evaluated at (n_contact, 2) points [m] if it is a formula or function."""
+    if isinstance(value, np.ndarray) and len(value) != len(points):
+        raise LawError(
+            f"{name} has {len(value)} values for {len(points)} contact nodes: give one number, one for each node, or a "
+            "formula of x and y"
+        )
+    if not callable(value):
+        return value
+    values = evaluate_field(value, points)
+    if np.any(values < 0.0):
+        node = int(np.argmin(values))
+        x, y = points[node]
+        raise LawError(
+            f"{name} = {value!r} is {values[node]:g} at (x, y) = ({x:.6g}, {y:.6g}); it must be zero or positive on "
+            "the whole contact part"
+        )
+    return values
 
 
 @runtime_checkable
@@ -253,58 +305,6 @@ class Coulomb(LawOfCoefficients):
         """Return ``-s`` (zero under tension)."""
         s = numbers_of("friction_coefficient", self.friction_coefficient)
         return np.where(sigma_n <= 0.0, -np.asarray(s), 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class CohesiveCoulomb(LawOfCoefficients):
-    """Coulomb's law with cohesion and cap: ``bound = min(c + s |sigma_n|, tau_max)``.
-
-    Parameters
-    ----------
-    friction_coefficient : Coefficient [-]
-        s, not negative.
-    cohesion : Coefficient [Pa]
-        c, not negative; acts while the node is closed and ends when it opens.
-    cap : Coefficient [Pa]
-        tau_max, not below the cohesion; infinite by default.
-
-    Notes
-    -----
-    Because cohesion is lost by jump when a node opens, a problem with ``c > 0`` and a moving edge of contact need
-    not have a solution; drivers then say so by their status.
-    """
-
-    friction_coefficient: Coefficient
-    cohesion: Coefficient = 0.0
-    cap: Coefficient = float("inf")
-    stresses = ("cohesion", "cap")
-    may_be_infinite = ("cap",)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not (callable(self.cap) or callable(self.cohesion)) and np.any(self.cap < np.asarray(self.cohesion)):
-            raise InputError(
-                f"cap = {np.min(self.cap):g} lies below cohesion = {np.max(self.cohesion):g}; "
-                "the cap bounds cohesion and friction together, so give cap >= cohesion"
-            )
-
-    @property
-    def is_frictionless(self) -> bool:
-        """Whether friction coefficient and cohesion are zero, or the cap is."""
-        return is_zero(self.cap) or (is_zero(self.friction_coefficient) and is_zero(self.cohesion))
-
-    def bound(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``min(c + s |sigma_n|, tau_max)``."""
-        return np.minimum(self._uncapped(sigma_n), numbers_of("cap", self.cap))
-
-    def bound_derivative(self, sigma_n: FloatArray) -> FloatArray:
-        """Return ``-s`` below the cap and zero from the cap on (and under tension)."""
-        is_rising = (self._uncapped(sigma_n) < numbers_of("cap", self.cap)) & (sigma_n <= 0.0)
-        return np.where(is_rising, -np.asarray(numbers_of("friction_coefficient", self.friction_coefficient)), 0.0)
-
-    def _uncapped(self, sigma_n: FloatArray) -> FloatArray:
-        s = numbers_of("friction_coefficient", self.friction_coefficient)
-        return np.asarray(numbers_of("cohesion", self.cohesion) + s * np.maximum(-sigma_n, 0.0))
 
 
 @dataclass(frozen=True)

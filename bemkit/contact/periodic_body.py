@@ -133,7 +133,8 @@ class PeriodicBody(LinearBody):
         unknowns, motion = system.solved()
         traction = reduced.tractions(unknowns)
         displacement = self._rest + self._caused(traction) + motion @ self._motions[self._driven]
-        return ContactState(*reduced.met_exactly(as_pairs(displacement), as_pairs(traction)))
+        met = conditions.with_given_tractions(as_pairs(traction))
+        return ContactState(conditions.with_given_displacements(as_pairs(displacement)), met)
 
     def _caused(self, traction: ComplexArray) -> ComplexArray:
         return self._at_contact(self.elastic.displaced(self._on_surface(traction)))

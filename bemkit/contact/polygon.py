@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import check_pair, unit_vectors
 from bemkit.errors import InputError
+from bemkit.geometry.vectors import turned_left
 
 _ROUND_OFF = 1e-12
 """Distance from a corner, relative to the coordinates, that may be their round-off."""
@@ -77,7 +78,7 @@ class PolygonalObstacle:
         is_as_near = distance <= distance.min(axis=1, keepdims=True) + self._round_off(points)
         rows, nearest = np.arange(len(points)), np.argmin(np.where(is_as_near & is_beside, -1.0, distance), axis=1)
         unit = along[nearest] / np.hypot(*along[nearest].T)[:, None]
-        return to_side[rows, nearest], np.stack([-unit[:, 1], unit[:, 0]], axis=1), is_beside[rows, nearest]
+        return to_side[rows, nearest], turned_left(unit), is_beside[rows, nearest]
 
     def _is_at_corner(self, points: FloatArray) -> BoolArray:
         """Return (n,) bool: points so near to a corner that round-off decides which of its sides is nearest."""

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.contact.body import SingularResponse
 from bemkit.contact.conditions import LinearConditions
 
@@ -31,9 +31,6 @@ class ReducedConditions:
 
     Parameters
     ----------
-    conditions : LinearConditions
-    is_of_traction : (n_contact, 2) bool array
-        Conditions that involve no displacement.
     given : (n_contact,) complex array [Pa]
         Tractions that such conditions give.
     node : (n_unknowns,) int array
@@ -44,8 +41,6 @@ class ReducedConditions:
     value : (n_unknowns,) array [m]
     """
 
-    conditions: LinearConditions
-    is_of_traction: BoolArray
     given: ComplexArray
     node: IntArray
     direction: ComplexArray
@@ -83,8 +78,6 @@ class ReducedConditions:
         direction = np.where(n_of_traction[node] == 1, along[node], np.where(equation == 0, 1j, 1.0))
         size = np.hypot(*on_u[node, equation].T)
         return cls(
-            conditions,
-            is_of_traction,
             given,
             node,
             direction,
@@ -159,19 +152,3 @@ class ReducedConditions:
     @cached_property
     def _along(self) -> ComplexArray:
         return np.asarray(self.direction.conj())
-
-    def met_exactly(self, displacement: FloatArray, traction: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return displacements and tractions (n_contact, 2) that meet conditions on one of them to the digit."""
-        conditions = self.conditions
-        for own in (0, 1):
-            on_u, on_t, value = (
-                conditions.on_displacement[:, own],
-                conditions.on_traction[:, own],
-                conditions.value[:, own],
-            )
-            gives_u = (on_u[:, own] != 0.0) & (on_u[:, 1 - own] == 0.0) & ~(on_t != 0.0).any(axis=1)
-            np.divide(value, on_u[:, own], out=displacement[:, own], where=gives_u)
-            rest = value - on_t[:, 1 - own] * traction[:, 1 - own]
-            gives_t = self.is_of_traction[:, own] & (on_t[:, own] != 0.0)
-            np.divide(rest, on_t[:, own], out=traction[:, own], where=gives_t)
-        return displacement, traction

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
+from bemkit.geometry.vectors import turned_left
 
 _STEPS = 4.0 ** -np.arange(2.5, 9.0)
 """Steps of differences, in sizes of what is measured: whatever the curvature, one of them suits."""
@@ -89,7 +90,7 @@ class SignedDistance:
             slope = self._slope(foot, size)
             steepness = np.sqrt(_squares(slope, foot))
             normal = slope / steepness[:, None]
-            along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+            along = turned_left(normal)
             away = foot - points
             rise = np.sum(away * along, axis=1)  # of half the squared distance along the surface
             curvature = np.einsum("ni,nik,nk->n", along, self._second_derivatives(foot, size), along) / steepness

@@ -16,7 +16,7 @@ from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import CheckedShape
-from bemkit.geometry.vectors import cross, norms
+from bemkit.geometry.vectors import cross, enclosed_area, norms
 
 Point = tuple[float, float]
 
@@ -267,9 +267,7 @@ def _arc(centre: FloatArray, start: FloatArray, sweep: float) -> Arc:
 
 def _signed_area(loop: Sequence[Side]) -> float:
     """Return the area [m^2] of a loop, to a few digits; negative if it runs clockwise."""
-    points = np.concatenate([side.curve.point(_SEEN) for side in loop])
-    arms = points - points[0]
-    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
+    return enclosed_area(np.concatenate([side.curve.point(_SEEN) for side in loop]))
 
 
 def drawn_shape(shape: object) -> OutlineShape | None:

@@ -88,3 +88,16 @@ def _as_seen(space: BoundarySpace, degree: int) -> BoundarySpace:
     if isinstance(space, LagrangeSpace) and space.element_degrees is not None:
         return space.of_degree(degree)
     return space
+
+
+def mean_tractions(space: BoundarySpace, traction: FloatArray) -> FloatArray:
+    """Return the means (n_elements, 2) of tractions (n_elements, n_local, 2) at the local nodes of their space."""
+    xi, weights = gauss_legendre(space.degree + 1)
+    mean: FloatArray = np.einsum("l,elc->ec", space.basis(xi) @ weights / 2.0, traction)
+    return mean
+
+
+def projector(space: BoundarySpace, xi: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return (n_local, n_points): the local dofs of the least-squares fit to values at quadrature points."""
+    basis = space.basis(xi)
+    return np.asarray(np.linalg.solve((basis * weights) @ basis.T, basis * weights), float)

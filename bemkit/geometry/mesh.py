@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.curves import Curve, MovedCurve, as_point, require_positive
 from bemkit.geometry.elements import Elements, bisected
 from bemkit.geometry.errors import GeometryError, UnknownPartError
-from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.surface import Surface
-from bemkit.geometry.symmetry import Symmetry, check_half, unfold
-from bemkit.geometry.validity.chords import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
-from bemkit.geometry.validity.loops import swept_areas
-from bemkit.geometry.validity.mesh_checks import (
+from bemkit.geometry.loops import (
     as_index,
     check_chains,
     check_curves,
@@ -25,11 +20,15 @@ from bemkit.geometry.validity.mesh_checks import (
     check_parts,
     follow_loops,
     restrict_loops,
+    swept_areas,
 )
+from bemkit.geometry.pieces import Pieces, derivative_on, evaluate_curves, make_pieces, point_on
+from bemkit.geometry.quadrature import gauss_legendre
+from bemkit.geometry.surface import Surface
+from bemkit.geometry.symmetry import Symmetry, check_half, unfold
 from bemkit.geometry.vectors import norms, turned_right
 
 _N_LENGTH_POINTS = 16
-_Array = TypeVar("_Array", FloatArray, IntArray, BoolArray)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +111,7 @@ class BoundaryMesh:
         return f"BoundaryMesh({', '.join([f'{self.n_elements} elements', *parts])})"
 
     def _keep(self, name: str, array: FloatArray | IntArray) -> None:
-        read_only(array)
-        object.__setattr__(self, name, array)
+        object.__setattr__(self, name, read_only(array))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the constructor takes: a mesh from elsewhere is validated like any other."""
@@ -133,7 +131,7 @@ class BoundaryMesh:
     def on_symmetry_lines(self) -> BoolArray:
         """(n_nodes, 2) bool array: whether a node lies on the line x = a, and on y = b, of the symmetry."""
         meets = np.zeros((self.n_nodes, 2), bool) if self.symmetry is None else self.symmetry.meets(self.nodes)
-        return _frozen(meets)
+        return read_only(meets)
 
     @property
     def n_nodes(self) -> int:
@@ -148,17 +146,17 @@ class BoundaryMesh:
     @cached_property
     def is_straight(self) -> BoolArray:
         """(n_elements,) bool array: whether the element is its chord."""
-        return _frozen(self._curve_index < 0)
+        return read_only(self._curve_index < 0)
 
     @cached_property
     def start(self) -> FloatArray:
         """(n_elements, 2) array [m]: start points."""
-        return _frozen(self.nodes[self.elements[:, 0]])
+        return read_only(self.nodes[self.elements[:, 0]])
 
     @cached_property
     def end(self) -> FloatArray:
         """(n_elements, 2) array [m]: end points."""
-        return _frozen(self.nodes[self.elements[:, 1]])
+        return read_only(self.nodes[self.elements[:, 1]])
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -166,23 +164,23 @@ class BoundaryMesh:
         lengths, curved = self._pieces.chord_length, np.flatnonzero(~self.is_straight)
         xi, weights = gauss_legendre(_N_LENGTH_POINTS)
         lengths[curved] = self.jacobian(curved, xi) @ weights
-        return _frozen(lengths)
+        return read_only(lengths)
 
     @cached_property
     def centres(self) -> FloatArray:
         """(n_elements, 2) array [m]: points at xi = 0, on the element."""
-        return _frozen(self.points(np.arange(self.n_elements), np.zeros(1))[:, 0])
+        return read_only(self.points(np.arange(self.n_elements), np.zeros(1))[:, 0])
 
     @cached_property
     def tangents(self) -> FloatArray:
         """(n_elements, 2) array: unit vectors along the chords."""
         chord = self.end - self.start
-        return _frozen(chord / norms(chord)[:, None])
+        return read_only(chord / norms(chord)[:, None])
 
     @cached_property
     def normals(self) -> FloatArray:
         """(n_elements, 2) array: unit normals of the chords, out of the body."""
-        return _frozen(turned_right(self.tangents))
+        return read_only(turned_right(self.tangents))
 
     @cached_property
     def node_elements(self) -> IntArray:
@@ -194,7 +192,7 @@ class BoundaryMesh:
         pairs[self.elements] = np.arange(self.n_elements)[:, None, None]
         pairs[self.elements[:, 1], 0] = np.arange(self.n_elements)
         pairs[self.elements[:, 0], 1] = np.arange(self.n_elements)
-        return _frozen(pairs)
+        return read_only(pairs)
 
     @cached_property
     def loops(self) -> tuple[IntArray, ...]:
@@ -203,16 +201,16 @@ class BoundaryMesh:
         Of loops that are images of each other there is one; of a half-plane its strip.
         """
         if self.surface is not None:
-            return (_frozen(np.arange(self.n_elements)),)
+            return (read_only(np.arange(self.n_elements)),)
         symmetric = self.symmetry is not None
         loops = restrict_loops(self.whole.loops, self.elements) if symmetric else follow_loops(self.elements)
-        return tuple(_frozen(loop) for loop in loops)
+        return tuple(read_only(loop) for loop in loops)
 
     @cached_property
     def centre(self) -> FloatArray:
         """(2,) array [m]: middle of the bounding box of the boundary, images included."""
         low, high = self._bounds
-        return _frozen(0.5 * (low + high))
+        return read_only(0.5 * (low + high))
 
     @cached_property
     def diameter(self) -> float:
@@ -224,9 +222,9 @@ class BoundaryMesh:
     def loop_areas(self) -> FloatArray:
         """(n_loops,) array [m^2]: area within each loop, images included, negative where the loop runs clockwise."""
         if self.symmetry is not None:
-            return _frozen(self.whole.loop_areas[[loop[0] < self.n_elements for loop in self.whole.loops]])
+            return read_only(self.whole.loop_areas[[loop[0] < self.n_elements for loop in self.whole.loops]])
         areas = swept_areas(self._pieces)
-        return _frozen(np.array([areas[loop].sum() for loop in self.loops]))
+        return read_only(np.array([areas[loop].sum() for loop in self.loops]))
 
     @property
     def area(self) -> float:
@@ -330,7 +328,7 @@ class BoundaryMesh:
             symmetry = symmetry.transformed(shift, factor)
             nodes = symmetry.snapped(nodes)
         curves = tuple(MovedCurve(curve, shift, factor) for curve in self.curves)
-        content = self._content._replace(nodes=_frozen(nodes), curves=curves)
+        content = self._content._replace(nodes=read_only(nodes), curves=curves)
         return (*content, self.is_exterior, symmetry, self.surface)
 
     @cached_property
@@ -341,7 +339,7 @@ class BoundaryMesh:
 
     def unchecked_copy(self, nodes: FloatArray, curves: tuple[Curve, ...]) -> "BoundaryMesh":
         """Return the mesh of the body moved rigidly, with its nodes (n_nodes, 2) [m] and curves there; no symmetry."""
-        moved = self._content._replace(nodes=_frozen(nodes), curves=curves)
+        moved = self._content._replace(nodes=read_only(nodes), curves=curves)
         return _unchecked((*moved, self.is_exterior, None, self.surface))
 
     @cached_property
@@ -385,11 +383,6 @@ class BoundaryMesh:
             s = span[:, :1] * (0.5 - 0.5 * xi) + span[:, 1:] * (0.5 + 0.5 * xi)
             straight[curve >= 0] = evaluate_curves(self.curves, curve, s, evaluate)[curve >= 0]
         return straight
-
-
-def _frozen(array: _Array) -> _Array:
-    read_only(array)
-    return array
 
 
 def _unchecked(content: tuple[Any, ...]) -> BoundaryMesh:

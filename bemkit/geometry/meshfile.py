@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.files.meshio_files import read_with_meshio, require_meshio
 from bemkit.geometry.files.plane_mesh import PlaneMesh, boundary_chains
+from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.validity.loops import following_in_loops
-from bemkit.geometry.vectors import cross
+from bemkit.geometry.vectors import enclosed_area
 
 _SURFACES = (".ply", ".stl", ".off", ".obj")
 
@@ -53,9 +52,9 @@ def read_mesh(path: str | Path, *, is_exterior: bool = False) -> BoundaryMesh:
     except GeometryError as error:
         raise GeometryError(f"read_mesh: {path}: {error}") from error
     loops = [(chain.points, chain.names) for chain in chains]
-    largest = int(np.argmax([abs(_signed_area(points)) for points, _ in loops]))
+    largest = int(np.argmax([abs(enclosed_area(points)) for points, _ in loops]))
     for k, (points, names) in enumerate(loops):
-        is_anticlockwise = _signed_area(points) > 0.0
+        is_anticlockwise = enclosed_area(points) > 0.0
         if is_anticlockwise != (k == largest and not is_exterior):
             loops[k] = np.roll(points[::-1], 1, axis=0), names[::-1]  # the last chord, turned, is now the first
     group = np.array([name for _, names in loops for name in names])
@@ -99,8 +98,3 @@ def write_mesh(path: str | Path, mesh: BoundaryMesh) -> None:
         field_data=names,
     )
     meshio.write(path, file_mesh, file_format="gmsh22", binary=False)
-
-
-def _signed_area(corners: FloatArray) -> float:
-    arms = corners - corners[0]
-    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())

@@ -51,9 +51,7 @@ def break_nodes(mesh: BoundaryMesh) -> BoolArray:
         owner[mesh.part(name)] = number
     before, after = mesh.node_elements.T
     changes = (owner[before] != owner[after]) | (before == after)  # the same only at the ends of a half-plane
-    breaks: BoolArray = corner_nodes(mesh) | changes
-    read_only(breaks)
-    return breaks
+    return read_only(corner_nodes(mesh) | changes)
 
 
 def corner_nodes(mesh: BoundaryMesh, angle: float = 1e-6) -> BoolArray:

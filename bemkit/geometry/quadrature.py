@@ -24,9 +24,7 @@ def gauss_legendre(n_points: int) -> tuple[FloatArray, FloatArray]:
         Read-only.
     """
     points, weights = np.polynomial.legendre.leggauss(n_points)
-    read_only(points)
-    read_only(weights)
-    return points, weights
+    return read_only(points), read_only(weights)
 
 
 @lru_cache(maxsize=16)
@@ -45,9 +43,7 @@ def gauss_lobatto(degree: int) -> FloatArray:
     """
     inside = np.polynomial.legendre.legroots(np.polynomial.legendre.legder(np.eye(degree + 1)[degree]))
     points = np.concatenate([[-1.0], np.sort(inside.real), [1.0]])
-    symmetric: FloatArray = 0.5 * (points - points[::-1])
-    read_only(symmetric)
-    return symmetric
+    return read_only(0.5 * (points - points[::-1]))
 
 
 @lru_cache(maxsize=64)
@@ -68,6 +64,4 @@ def gauss_graded(n_points: int) -> tuple[FloatArray, FloatArray]:
     v = 0.5 * (reference + 1.0)
     points = v**6
     weights = 3.0 * reference_weights * v**5
-    read_only(points)
-    read_only(weights)
-    return points, weights
+    return read_only(points), read_only(weights)

@@ -15,7 +15,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.curves import Curve, MovedCurve
 from bemkit.geometry.elements import Elements
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.validity.chords import RESOLUTION
+from bemkit.geometry.pieces import RESOLUTION
 
 _ON_LINE = 64 * RESOLUTION
 """Nodes closer to a line than this, times the size of coordinates, lie on it: trigonometry loses a few digits."""

@@ -27,6 +27,17 @@ def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
     return angles
 
 
+def enclosed_area(points: FloatArray) -> float:
+    """Return the area of the polygon through points (n, 2), negative if it runs clockwise."""
+    arms = points - points[0]
+    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
+
+
+def turned_left(vectors: FloatArray) -> FloatArray:
+    """Turn vectors anticlockwise by a right angle: outward normals to tangents."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
 def turned_right(vectors: FloatArray) -> FloatArray:
     """Turn vectors clockwise by a right angle: tangents to outward normals."""
     return np.stack([vectors[..., 1], -vectors[..., 0]], axis=-1)

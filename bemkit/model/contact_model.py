@@ -7,6 +7,7 @@ it is. A scene without contact is a contact problem without nodes.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -18,11 +19,10 @@ from bemkit.contact.condensation.nodes import ContactNodes
 from bemkit.contact.condensation.reduction import CondensedBody, condensed_body
 from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.problem import ContactProblem
-from bemkit.geometry.local_values import element_degrees, from_own_nodes
+from bemkit.geometry.local_values import element_degrees, from_own_nodes, projector
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_tractions import insert_loads, projector
+from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
 from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared
@@ -35,7 +35,7 @@ from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import HeavyElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import supporting_forces
-from bemkit.scene.conditions import Contact
+from bemkit.scene.conditions import Contact, Free, Pressure, Traction
 from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolver
 
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
     from bemkit.contact.periodic_body import PeriodicBody
 
+_MORE_POINTS = 4
+"""Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
 ContactBody: TypeAlias = "CondensedBody | HierarchicalBody | PeriodicBody | UntouchedBody"
 
 
@@ -190,26 +192,14 @@ class Model:
         energy : float [J/m]
             Elastic energy of the stresses in the plane; without heat 1/2 a(u, u).
         """
-        units, mesh = self.units, self.mesh
+        units = self.units
         displacement, force = self.body.recover(state)
         traction = self.elastic.element_tractions(displacement, force)
         self._insert_contact(traction, state)
         traction *= units.stress
         insert_loads(traction, self.scene, self.mesh, self.elastic.traction_space)
-        # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
-        of_map, map_force = self.map_fields(displacement, force)
-        strained = without_motion(mesh.unit, dof_points(self.prepared.space), of_map)
-        energy = 0.5 * float(np.sum(strained * map_force))
-        if isinstance(self.elastic, HeavyElasticity):
-            energy += self.elastic.energy_beyond(displacement, force)
+        energy = elastic_energy(self.elastic, self.prepared.space, displacement, force)
         return displacement * units.displacement, traction, energy * units.stress * units.displacement * units.length
-
-    def map_fields(self, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
-        if isinstance(self.elastic, SurfaceElasticity):
-            return self.elastic.strain_displacement(force), force
-        inside = self.prepared.inside
-        return (displacement, force) if inside is None else (displacement - inside.displacement, force - inside.force)
 
     def _insert_contact(self, traction: FloatArray, state: ContactState) -> None:
         """Replace the tractions of contact elements by the projection of those that their nodes interpolate."""
@@ -241,6 +231,26 @@ class Model:
             turns = np.sum(directions[there] * directions[beside], axis=1) <= SMOOTH_SIDE_COSINE
             found[:, end] = np.where((there >= 0) & ~own[there] & turns, beside, there)
         return found
+
+
+def map_fields(elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return nodal displacements and forces (n_nodes, 2) less those of what acts inside the body or far away."""
+    if isinstance(elastic, SurfaceElasticity):
+        return elastic.strain_displacement(force), force
+    if isinstance(elastic, HeavyElasticity):
+        return displacement - elastic.inside.displacement, force - elastic.inside.force
+    return displacement, force
+
+
+def elastic_energy(
+    elastic: SteklovPoincare, space: BoundarySpace, displacement: FloatArray, force: FloatArray
+) -> float:
+    """Return the elastic energy of the stresses in the plane, dimensionless, from nodal fields (n_nodes, 2)."""
+    of_map, map_force = map_fields(elastic, displacement, force)
+    # the forces are in equilibrium: on a rigid motion, which may be huge, they would only do the work of round-off
+    strained = without_motion(space.mesh, dof_points(space), of_map)
+    beyond = elastic.energy_beyond(displacement, force) if isinstance(elastic, HeavyElasticity) else 0.0
+    return 0.5 * float(np.sum(strained * map_force)) + beyond
 
 
 def build_model(prepared: Prepared) -> Model:
@@ -300,3 +310,32 @@ def _law(prepared: Prepared, body: ContactBody) -> FrictionLaw:
     contact = prepared.contact
     law = prepared.scene.law_at(contact.parts, contact.points, body.is_held)
     return law.scaled(prepared.units.stress)
+
+
+def insert_loads(
+    traction: FloatArray, scene: Scene, mesh: BoundaryMesh, space: BoundarySpace, touching: Collection[str] = ()
+) -> None:
+    """Replace the tractions of loaded elements by the projection of the loads, of free elements by zero.
+
+    Parameters
+    ----------
+    traction : (n_elements, n_local, 2) array [Pa]
+        At the local nodes of their space; changed in place, but for elements in contact and those that supports hold.
+    scene : Scene
+    mesh : BoundaryMesh
+        In physical units.
+    space : BoundarySpace
+        Of the tractions.
+    touching : collection of str
+        Free parts that other bodies touch: they are left as they are.
+    """
+    xi, weights = gauss_legendre(space.degree + 1 + _MORE_POINTS)
+    projection = projector(space, xi, weights)
+    is_free = np.ones(mesh.n_elements, bool)
+    for part, elements in scene.parts_on(mesh):
+        is_free[elements] = isinstance(part.condition, Free) and part.name not in touching
+        if isinstance(part.condition, Traction | Pressure):
+            points, normals = mesh.points(elements, xi), mesh.normals_at(elements, xi)
+            values = part.condition.at(points.reshape(-1, 2), normals.reshape(-1, 2)).reshape(points.shape)
+            traction[elements] = np.einsum("lq,eqc->elc", projection, values)
+    traction[is_free] = 0.0

@@ -22,7 +22,7 @@ from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Part
 from bemkit.scene.load_history import load_steps
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.unit_names import UnitNames
 

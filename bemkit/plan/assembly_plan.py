@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bemkit.contact.joined.joined_bodies import MOST_DENSE
-from bemkit.contact.joined.sparse_solver import sparse_solver_name
+from bemkit.contact.joined.sparse_form import sparse_solver_name
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, prepare_assembly_steps
 from bemkit.operators.counts import OperationCounts

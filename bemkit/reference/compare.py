@@ -13,8 +13,8 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, read_only
 from bemkit.errors import InputError
-from bemkit.geometry.grading import Algebraic
 from bemkit.geometry.local_values import from_own_nodes
+from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes

@@ -18,7 +18,7 @@ from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solved_body import BoundaryFields, SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.results.zone_ends import Side, ZoneEnd
-from bemkit.scene.assembly import Assembly
+from bemkit.scene.assembly import Assembly, ContactPair, body_and_part
 from bemkit.scene.scene import Scene
 
 
@@ -114,11 +114,6 @@ class AssemblySolution(SolvedProblem):
         return float(self.contact.weight[own].sum()) + max(float(self.contact.s[own][0]), 0.0)
 
     @property
-    def n_elements(self) -> int:
-        """Number of elements of all bodies."""
-        return sum(body.mesh.n_elements for body in self.bodies.values())
-
-    @property
     def energy(self) -> float:
         """Elastic energy of all bodies [J/m]."""
         return sum(body.energy for body in self.bodies.values())
@@ -132,14 +127,6 @@ class AssemblySolution(SolvedProblem):
     def force_tangential(self) -> float:
         """Sum of the friction forces of all contacts along their tangents [N/m]."""
         return sum(contact.force_tangential for contact in self.contacts)
-
-    @cached_property
-    def estimated_error(self) -> float | None:
-        """Estimated error in the energy norm of all bodies, relative to the solution; None without an estimate."""
-        errors = [body.element_errors for body in self.bodies.values()]
-        if any(each is None for each in errors) or not self.error_unit > 0.0:
-            return None
-        return float(np.sqrt(sum(float(each.sum()) for each in errors if each is not None) / self.error_unit))
 
     @property
     def error_unit(self) -> float:
@@ -157,9 +144,7 @@ class AssemblySolution(SolvedProblem):
         Without those at edges that press into another side: pressures there have no bound.
         """
         own = self.bodies[body]
-        sides = [side.split(".", 1) for pair in self.assembly.contacts for side in pair.elastic_sides]
-        parts = dict.fromkeys(part for owner, part in sides if owner == body)
-        parts.update(dict.fromkeys(part.name for part in own.scene.contact_parts))
+        parts = dict.fromkeys([*self.assembly.listed_parts(body), *(part.name for part in own.scene.contact_parts)])
         at_edges = [
             side.elements_at(point) for one, two, point, _ in self._edges for side in (one, two) if side.body == body
         ]
@@ -168,12 +153,16 @@ class AssemblySolution(SolvedProblem):
 
     def _sides_of(self, contact: str) -> list[Side]:
         """Return the sides of a contact of the table, of an obstacle the one that there is."""
-        names = (side.split(".", 1) for side in self._elastic_sides.get(contact, (contact,)))
+        pair = self._listed.get(contact)
+        names = [body_and_part(contact)] if pair is None else pair.elastic_parts
         return [Side(body, self.bodies[body].mesh, part) for body, part in names]
 
     @cached_property
-    def _elastic_sides(self) -> dict[str, tuple[str, ...]]:
-        return {pair.name: pair.elastic_sides for pair in self.assembly.contacts}
+    def _listed(self) -> dict[str, ContactPair]:
+        return {pair.name: pair for pair in self.assembly.contacts}
+
+    def _n_sides(self, contact: str) -> int:
+        return len(self._sides_of(contact))
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
@@ -196,20 +185,6 @@ class AssemblySolution(SolvedProblem):
     def facing_ends(self) -> tuple[ZoneEnd, ...]:
         """Where a side ends inside another one that it lies on: its edge presses into that."""
         return tuple(place for _, _, _, place in self._edges)
-
-    @property
-    def contact_traction_size(self) -> float:
-        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]: those between two bodies count on either."""
-        table = self.contact
-        squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
-        return float(
-            np.sqrt(
-                sum(
-                    len(self._elastic_sides.get(each, (each,))) * squared[table.rows(each)].sum()
-                    for each in table.parts
-                )
-            )
-        )
 
     @cached_property
     def estimated_traction_error(self) -> float | None:

@@ -111,7 +111,7 @@ def _at_obstacles(
     moving: dict[str, list[ContactPair]] = {}
     for pair in assembly.contacts:
         if pair.rigid_body is not None:
-            moving.setdefault(pair.elastic_sides[0].split(".", 1)[0], []).append(pair)
+            moving.setdefault(pair.elastic_parts[0][0], []).append(pair)
     for owner, body in bodies.items():
         scene = body.scene
         facing: dict[str, list[_Measured]] = {}
@@ -121,7 +121,7 @@ def _at_obstacles(
                 name = f"{owner}.{part.name}"
                 facing.setdefault(part.name, []).append(_Measured(name, (owner,), scene.laws[part.name], values))
         for pair in moving.get(owner, ()):
-            part_name = pair.elastic_sides[0].split(".", 1)[1]
+            part_name = pair.elastic_parts[0][1]
             stated = assembly.rigid_body_of(pair)
             values = points_at_obstacle(body, stated.obstacle, body.mesh.part(part_name))
             motion = rigid[str(pair.rigid_body)]
@@ -140,7 +140,7 @@ def _at_bodies(assembly: Assembly, solved: Mapping[str, SolvedBody]) -> Iterator
     placements = {body.name: body.placement for body in assembly.placed_bodies}
     known: dict[Hashable, _Facing] = {}
     for pair in assembly.elastic_contacts:
-        names, parts = zip(*(side.split(".", 1) for side in pair.sides), strict=True)
+        names, parts = zip(*pair.elastic_parts, strict=True)
         one, two = (solved[name] for name in names)
         reach = reach_of(pair, one.mesh, two.mesh)
         alike = stand_alike((one.mesh, placements[names[0]]), (two.mesh, placements[names[1]]), reach)

@@ -28,7 +28,7 @@ _POINTS_PER_NODE = 4
 class BetweenNodes:
     """Largest violation of each contact condition at points between the nodes; zero is perfect.
 
-    Names and signs are those of `bemkit.contact.certificate.Certificate`, which speaks of the nodes. These violations
+    Names and signs are those of `bemkit.contact.problem.Certificate`, which speaks of the nodes. These violations
     are errors of the discretisation: they are not round-off, and fall when elements become smaller or their degree
     higher. The opposition of slip is left to the nodes.
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -151,14 +152,12 @@ class Transition:
 
     def as_dict(self) -> dict[str, str | float]:
         """Return the entries under the names of the results file."""
-        return {
-            "part": self.part,
-            "x": self.x,
-            "y": self.y,
-            "s": self.s,
-            "from": self.from_status,
-            "to": self.to_status,
-        }
+        return {name.removesuffix("_status"): value for name, value in vars(self).items()}
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Transition:
+        """Return what `as_dict` has written."""
+        return cls(*(row[entry.name.removesuffix("_status")] for entry in fields(cls)))
 
 
 _FIRST_FITTED, _LEAST_FITTED = 4, 8

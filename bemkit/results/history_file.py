@@ -6,33 +6,182 @@
 /steps/slip      (n_finished, n_contact) array: the path that each node has slipped; last_slip: in the last increment
 /steps/state     dimensionless displacement and traction of the contact nodes, from which a run goes on, a row a step
 
-and the fields of the bodies at the end of each step, see `bemkit.results.step_fields`.
+and what stands there of the ends of all steps, stacked:
+
+/steps/certificate       table: the entries of the certificate of each step
+/steps/transitions       table as /transitions, with the number of the step, counted from 0
+/steps/bodies/N          boundary fields of body N (of a scene the only one), a row for each step; energy
+/steps/friction_bound    (n_finished, n_contact) array, of assemblies; nan without friction
+/steps/directions        contact directions, of assemblies, a row for each step
+/steps/contacts, /rigid  the numbers of these tables, of assemblies, a row for each step
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
+from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
-from bemkit.hdf5 import Reader, rows_of, write_table, write_text
+from bemkit.hdf5 import Reader, columns_of, rows_of, write_table, write_text
+from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, LoadStep, StepWork
-from bemkit.results.step_fields import read_ends, write_ends
+from bemkit.results.part_forces import ContactForce, RigidResult
+from bemkit.results.solution import BoundaryFields, Solution
+from bemkit.results.solved_body import SolvedBody
+from bemkit.results.tables import CERTIFICATE_ENTRIES
+from bemkit.scene.assembly import Assembly
+from bemkit.scene.load_history import load_steps
+from bemkit.scene.scene import Scene
 from bemkit.scene.toml import MAX_BYTES, scene_from_toml, scene_to_toml
+from bemkit.solvers.base import Status
 
 if TYPE_CHECKING:
     import h5py
 
-    from bemkit.results.assembly_solution import AssemblySolution
-    from bemkit.results.solution import Solution
-
+_Row = TypeVar("_Row", ContactForce, RigidResult)
+_FIELDS = ("displacement", "traction", "traction_dofs")
+TRANSITION_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
+    {"texts": ("part", "from", "to"), "floats": ("x", "y", "s")}
+)
+_OF_ASSEMBLIES = ("friction_bound", "directions", "contacts", "rigid")
 _WORK = ("external_work", "dissipation", "increment_work", "friction_gain")
 _FLOATS = ("time", "elastic_energy", *_WORK)
 _COUNTS = ("n_increments", "linear_solves")
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
+
+
+def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
+    """Write the ends of steps, which are all solutions or all solutions of assemblies, into a group."""
+    certificates = [end.certificate.as_dict() for end in ends]
+    write_table(group.create_group("certificate"), columns_of(certificates, floats=CERTIFICATE_ENTRIES))
+    rows = [{"step": k, **each.as_dict()} for k, end in enumerate(ends) for each in end.transitions]
+    write_table(group.create_group("transitions"), columns_of(rows, **TRANSITION_COLUMNS, integers=("step",)))
+    for number, body in enumerate(zip(*(end.solved_bodies for end in ends), strict=True)):
+        for name in _FIELDS:
+            group[f"bodies/{number}/{name}"] = np.stack([getattr(own.boundary, name).ravel() for own in body])
+        group[f"bodies/{number}/energy"] = np.array([own.energy for own in body])
+    assemblies = [end for end in ends if isinstance(end, AssemblySolution)]
+    if assemblies:
+        group["directions"] = np.stack([end.contact_directions.ravel() for end in assemblies])
+        bounds = [end.friction_bound for end in assemblies]
+        none = np.full(assemblies[0].contact.n_contact, np.nan)
+        group["friction_bound"] = np.stack([none if bound is None else bound for bound in bounds])
+        group["contacts"] = _numbers([end.contacts for end in assemblies], ContactForce)
+        group["rigid"] = _numbers([tuple(end.rigid.values()) for end in assemblies], RigidResult)
+
+
+def read_ends(
+    reader: Reader,
+    last: Solution | AssemblySolution,
+    asked: Scene | Assembly,
+    tables: Sequence[ContactTable],
+) -> list[Solution | AssemblySolution]:
+    """Read what `write_ends` wrote.
+
+    Parameters
+    ----------
+    reader : Reader
+    last : Solution or AssemblySolution
+        The result in the file; what is not known of each step is that of this one.
+    asked : Scene or Assembly
+        With all steps.
+    tables : sequence of ContactTable
+        Of each finished step.
+    """
+    n = len(tables)
+    rows = rows_of(reader.table("steps/certificate", floats=CERTIFICATE_ENTRIES))
+    transitions = _read_transitions(reader, n)
+    bodies = [_read_body(reader, f"steps/bodies/{number}", body, n) for number, body in enumerate(last.solved_bodies)]
+    if len(rows) != n:
+        raise InputError(f"{len(rows)} certificates for {n} steps")
+    if isinstance(asked, Assembly) != isinstance(last, AssemblySolution):
+        raise InputError("the steps are not those of the result")
+    scenes: Sequence[Any] = load_steps(cast(Any, asked))
+    names = _OF_ASSEMBLIES if isinstance(last, AssemblySolution) else ()
+    columns = {name: reader.floats(f"steps/{name}") for name in names}
+    ends: list[Solution | AssemblySolution] = []
+    for k, (scene, table, row) in enumerate(zip(scenes[:n], tables, rows, strict=True)):
+        own: dict[str, Any] = {
+            "status": Status.CONVERGED,
+            "message": Status.CONVERGED.value,
+            "certificate": Certificate(**row),
+            "contact": table,
+            "transitions": transitions[k],
+            "loading": None,
+        }
+        if isinstance(last, Solution):
+            own["boundary"], own["energy"] = bodies[0][k]
+            own["force_normal"] = float(np.sum(-table.weight * table.sigma_n))
+            own["force_tangential"] = float(np.sum(table.weight * table.sigma_t))
+            ends.append(replace(last, scene=scene, **own))
+        else:
+            numbers = {name: column[k] for name, column in columns.items()}
+            ends.append(_assembly_end(last, scene, [body[k] for body in bodies], numbers, own))
+    return ends
+
+
+def _assembly_end(
+    last: AssemblySolution,
+    step: Assembly,
+    bodies: Sequence[tuple[BoundaryFields, float]],
+    numbers: Mapping[str, FloatArray],
+    common: dict[str, Any],
+) -> AssemblySolution:
+    assembly = step.with_contacts(last.assembly.contacts) if step.touching else step
+    scenes = {body.name: assembly.scene_of(body) for body in assembly.placed_bodies}
+    bound = numbers["friction_bound"]
+    contact_names = [own.name for own in last.contacts]
+    return replace(
+        last,
+        assembly=assembly,
+        bodies={
+            name: replace(body, scene=scenes[name], boundary=boundary, energy=energy)
+            for (name, body), (boundary, energy) in zip(last.bodies.items(), bodies, strict=True)
+        },
+        contact_directions=numbers["directions"].reshape(-1, 2).copy(),
+        friction_bound=None if np.isnan(bound).all() else bound.copy(),
+        contacts=tuple(_rows(numbers["contacts"], contact_names, ContactForce)),
+        rigid={own.name: own for own in _rows(numbers["rigid"], last.rigid, RigidResult)},
+        **common,
+    )
+
+
+def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ...]]:
+    """Return the places of change of each step."""
+    rows = rows_of(reader.table("steps/transitions", **TRANSITION_COLUMNS, integers=("step",)))
+    return [tuple(Transition.of(row) for row in rows if row["step"] == k) for k in range(n_steps)]
+
+
+def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> list[tuple[BoundaryFields, float]]:
+    energies = reader.floats(f"{place}/energy")
+    columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS}
+    if any(len(column) != n_steps for column in (energies, *columns.values())):
+        raise InputError(f"the fields of {n_steps} steps differ in number")
+    shaped = {name: column.reshape(-1, *getattr(body.boundary, name).shape) for name, column in columns.items()}
+    return [
+        (replace(body.boundary, **{name: column[k].copy() for name, column in shaped.items()}), float(energies[k]))
+        for k in range(n_steps)
+    ]
+
+
+def _numbers(steps: Sequence[Sequence[object]], kind: type) -> FloatArray:
+    """Return the numbers of rows whose first entry is a name: (n_steps, n_rows * n_numbers)."""
+    names = [entry.name for entry in fields(kind)][1:]
+    return np.array([[float(getattr(row, name)) for row in rows for name in names] for rows in steps])
+
+
+def _rows(numbers: FloatArray, names: Iterable[str], kind: type[_Row]) -> list[_Row]:
+    """Return the rows of one step."""
+    n_numbers = len(fields(kind)) - 1
+    return [kind(name, *row) for name, row in zip(names, numbers.reshape(-1, n_numbers).tolist(), strict=True)]
 
 
 def write_history(file: h5py.File, loading: LoadHistory) -> None:
@@ -47,17 +196,13 @@ def write_history(file: h5py.File, loading: LoadHistory) -> None:
     group, rows = file.create_group("steps"), [step.as_dict() for step in loading.steps]
     motions, states = [step.motion for step in loading.steps], [step.state for step in loading.steps]
     group.attrs["n_steps"] = loading.n_steps
-    floats = {name: np.array([row[name] for row in rows], dtype=float) for name in _FLOATS}
-    write_table(group, floats | {name: np.array([row[name] for row in rows], dtype=np.int64) for name in _COUNTS})
+    write_table(group, columns_of(rows, floats=_FLOATS, integers=_COUNTS))
     for name in (*_CONTACT, "status"):
         column = np.stack([getattr(step.contact, name) for step in loading.steps])
         group[f"contact/{name}"] = column.astype(np.int64) if name == "status" else column
-    group["time_step"] = np.array([motion.time_step for motion in motions])
-    group["slip"] = np.stack([motion.slip for motion in motions])
-    group["last_slip"] = np.stack([motion.last_slip for motion in motions])
-    group["state"] = np.stack(
-        [np.concatenate([state.displacement, state.traction], axis=1).ravel() for state in states]
-    )
+    for name in ("time_step", "slip", "last_slip"):
+        group[name] = np.array([getattr(motion, name) for motion in motions])
+    group["state"] = np.stack([np.hstack([state.displacement, state.traction]).ravel() for state in states])
     write_ends(group, [step.end for step in loading.steps])
 
 

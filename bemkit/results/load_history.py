@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+from dataclasses import astuple, dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
-from bemkit.errors import InputError
 from bemkit.results.contact_table import ContactTable
 
 if TYPE_CHECKING:
@@ -27,13 +26,6 @@ class StepEnd(Protocol):
     @property
     def contact(self) -> ContactTable:
         """What every contact node carries."""
-
-    @property
-    def loading(self) -> LoadHistory | None:
-        """The steps up to this one."""
-
-
-AnySolution = TypeVar("AnySolution", bound=StepEnd)
 
 
 @dataclass(frozen=True)
@@ -69,12 +61,7 @@ class StepWork:
 
     def __add__(self, other: StepWork) -> StepWork:
         """Return the work in both."""
-        return StepWork(
-            self.external_work + other.external_work,
-            self.dissipation + other.dissipation,
-            self.increment_work + other.increment_work,
-            self.friction_gain + other.friction_gain,
-        )
+        return StepWork(*(one + two for one, two in zip(astuple(self), astuple(other), strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +76,7 @@ class LoadStep:
         One, or the increments in which the step was gone because one jump failed.
     linear_solves : int
     end : Solution or AssemblySolution
-        All fields at its end; see `at_step`.
+        All fields at its end; see `SolvedProblem.at_step`.
     state : ContactState
         Dimensionless, at its end.
     motion : SlipHistory
@@ -206,32 +193,3 @@ class LoadHistory:
 def step_rows(loading: LoadHistory | None) -> list[dict[str, float | int]]:
     """Return the numbers of each step; none without a load history."""
     return [] if loading is None else [step.as_dict() for step in loading.steps]
-
-
-def at_step(solution: AnySolution, number: int) -> AnySolution:
-    """Return the solution at the end of an earlier step of its load history.
-
-    Parameters
-    ----------
-    solution : Solution or AssemblySolution
-    number : int
-        Of the step, counted from 1.
-
-    Returns
-    -------
-    Solution or AssemblySolution
-        Its `loading` ends there, too. If it comes from a file, linear solves, history, timings and warnings are those
-        of the whole run.
-
-    Raises
-    ------
-    InputError
-        If there is no such step.
-    """
-    loading = solution.loading
-    if loading is None:
-        raise InputError("the result has no load history: give [[steps]] or load_factors")
-    if not 1 <= number <= len(loading.steps):
-        raise InputError(f"step {number} is none of the finished ones: give a number from 1 to {len(loading.steps)}")
-    end = cast(Any, loading.steps[number - 1].end)
-    return cast(AnySolution, replace(end, loading=replace(loading, steps=loading.steps[:number])))

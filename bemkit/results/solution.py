@@ -61,20 +61,6 @@ class Solution(SolvedProblem, SolvedBody):
         return f"Solution({self.scene.title!r}: {self.status_words}, {self.n_elements} elements{nodes})"
 
     @cached_property
-    def estimated_error(self) -> float | None:
-        """Estimated error in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
-
-        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
-        zero of a body at rest.
-        """
-        if self.element_errors is None:
-            return None
-        error = float(self.element_errors.sum())
-        if error == 0.0:
-            return 0.0
-        return float(np.sqrt(error / self.error_unit)) if self.error_unit > 0.0 else None
-
-    @cached_property
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions in L2, relative to them.
 
@@ -118,11 +104,6 @@ class Solution(SolvedProblem, SolvedBody):
         """The one body: the solution itself."""
         return (self,)
 
-    @property
-    def n_elements(self) -> int:
-        """Number of elements."""
-        return self.mesh.n_elements
-
     def part_length(self, part: str) -> float:
         """Return the length of boundary of a part [m]."""
         return float(self.mesh.lengths[self.mesh.part(part)].sum())
@@ -149,12 +130,6 @@ class Solution(SolvedProblem, SolvedBody):
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
         """Where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
         return tuple(zone_ends_on(self.mesh, self.contact, self.transitions))
-
-    @property
-    def contact_traction_size(self) -> float:
-        """L2 norm of the contact tractions [Pa m^(1/2)]."""
-        table = self.contact
-        return float(np.sqrt(table.weight @ (table.sigma_n**2 + table.sigma_t**2)))
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         return violations_between_nodes(self, self.contact, motion)

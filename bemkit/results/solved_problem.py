@@ -7,16 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
+
+import numpy as np
 
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
+from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
-from bemkit.results.load_history import LoadHistory, at_step, step_rows
+from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
@@ -70,11 +73,7 @@ class SolvedProblem(ShownInNotebooks):
     warnings: tuple[str, ...] = ()
     loading: LoadHistory | None = None
 
-    if TYPE_CHECKING:  # fields of the one kind, properties of the other
-
-        @property
-        def n_elements(self) -> int:
-            """Number of elements."""
+    if TYPE_CHECKING:  # a field of the one kind, a property of the other
 
         @property
         def energy(self) -> float:
@@ -93,6 +92,10 @@ class SolvedProblem(ShownInNotebooks):
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         """Return what is measured between the nodes of each contact, with their slip for laws that depend on it."""
         raise NotImplementedError
+
+    def _n_sides(self, contact: str) -> int:
+        """Return how many elastic bodies carry the tractions of a contact."""
+        return 1
 
     def _sizes(self) -> dict[str, int]:
         """Return what the summary counts besides elements and contact nodes."""
@@ -113,8 +116,59 @@ class SolvedProblem(ShownInNotebooks):
         return self.status in (Status.CONVERGED, Status.ACCURACY_NOT_REACHED)
 
     def at_step(self, number: int) -> Self:
-        """Return the solution at the end of a finished step of its load history, counted from 1; see `LoadHistory`."""
-        return at_step(self, number)
+        """Return the solution at the end of an earlier step of its load history.
+
+        Parameters
+        ----------
+        number : int
+            Of the step, counted from 1.
+
+        Returns
+        -------
+        Solution or AssemblySolution
+            Its `loading` ends there, too. If it comes from a file, linear solves, history, timings and warnings are
+            those of the whole run.
+
+        Raises
+        ------
+        InputError
+            If there is no such step.
+        """
+        loading = self.loading
+        if loading is None:
+            raise InputError("the result has no load history: give [[steps]] or load_factors")
+        if not 1 <= number <= len(loading.steps):
+            most = len(loading.steps)
+            raise InputError(f"step {number} is none of the finished ones: give a number from 1 to {most}")
+        end = cast(Any, loading.steps[number - 1].end)
+        return cast("Self", replace(end, loading=replace(loading, steps=loading.steps[:number])))
+
+    @property
+    def n_elements(self) -> int:
+        """Number of elements of all bodies."""
+        return sum(body.mesh.n_elements for body in self.solved_bodies)
+
+    @cached_property
+    def estimated_error(self) -> float | None:
+        """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
+
+        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
+        zero of bodies at rest.
+        """
+        errors = [float(np.sum(body.element_errors)) for body in self.solved_bodies if body.element_errors is not None]
+        unit = sum(body.error_unit for body in self.solved_bodies)
+        if len(errors) < len(self.solved_bodies):
+            return None
+        if not any(errors):
+            return 0.0
+        return float(np.sqrt(sum(errors) / unit)) if unit > 0.0 else None
+
+    @property
+    def contact_traction_size(self) -> float:
+        """L2 norm of the contact tractions of all bodies [Pa m^(1/2)]: those between two bodies count on either."""
+        table = self.contact
+        squared = table.weight * (table.sigma_n**2 + table.sigma_t**2)
+        return float(np.sqrt(sum(self._n_sides(name) * squared[table.rows(name)].sum() for name in table.parts)))
 
     @property
     def units(self) -> UnitNames | None:

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.certificate import Certificate
+from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.hdf5 import columns_of
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import step_rows
 from bemkit.results.outputs import csv_text, json_text
 from bemkit.results.solution import Solution
+from bemkit.results.solved_body import SolvedBody
 from bemkit.solvers.base import StepRecord
 
 TABLES = ("contact", "boundary", "history", "steps")
@@ -58,14 +60,9 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:
     """Return the convergence history as columns, the certificate's entries among them."""
-    columns: dict[str, Any] = {
-        name: np.array([getattr(record, name) for record in history], dtype=np.int64) for name in RECORD_COUNTS
-    }
-    columns["relative_change"] = np.array([record.relative_change for record in history], dtype=float)
-    for name in CERTIFICATE_ENTRIES:
-        columns[name] = np.array([getattr(record.certificate, name) for record in history], dtype=float)
-    columns["message"] = [record.message for record in history]
-    return columns
+    rows = [vars(record) | record.certificate.as_dict() for record in history]
+    floats = ("relative_change", *CERTIFICATE_ENTRIES)
+    return columns_of(rows, texts=("message",), floats=floats, integers=RECORD_COUNTS)
 
 
 def to_json(solution: Solution | AssemblySolution) -> str:
@@ -73,11 +70,11 @@ def to_json(solution: Solution | AssemblySolution) -> str:
     return json_text(solution.summary())
 
 
-def element_displacement(solution: Solution | BodyResult) -> FloatArray:
+def element_displacement(body: SolvedBody) -> FloatArray:
     """Return the displacement at the element centres, (n_elements, 2) array [m], interpolated if need be."""
-    space = solution.scene.discretisation.displacement_space(solution.mesh)
+    space = body.scene.discretisation.displacement_space(body.mesh)
     at_centre = space.basis(np.zeros(1))[:, 0]
-    return np.asarray(np.einsum("p,epc->ec", at_centre, values_on_elements(space, solution.boundary.displacement)))
+    return np.asarray(np.einsum("p,epc->ec", at_centre, values_on_elements(space, body.boundary.displacement)))
 
 
 def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any]:
@@ -87,8 +84,6 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
             columns = {name: getattr(contact, name) for name in _CONTACT}
             return columns | {"status": contact.status_words(), "part": list(contact.part)}
         case "boundary":
-            if isinstance(solution, AssemblySolution):
-                return _columns_of_bodies(solution)
             return _boundary_columns(solution)
         case "steps":
             rows = step_rows(solution.loading)
@@ -101,15 +96,24 @@ def _columns(solution: Solution | AssemblySolution, table: str) -> dict[str, Any
             return columns
 
 
-def _boundary_columns(solution: Solution | BodyResult) -> dict[str, Any]:
-    names = [""] * solution.mesh.n_elements
-    for name, elements in solution.mesh.parts.items():
-        for element in elements.tolist():
-            names[element] = name
-    centres, traction = solution.boundary.centres, solution.boundary.traction
-    displacement = element_displacement(solution)
+def _boundary_columns(solution: Solution | AssemblySolution) -> dict[str, Any]:
+    """Return the columns of one body after the other, those of several with the name of the body in front."""
+    tables = [_columns_of_body(body) for body in solution.solved_bodies]
+    columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+    if isinstance(solution, Solution):
+        return columns
+    counts = [body.mesh.n_elements for body in solution.solved_bodies]
+    return {"body": np.repeat(list(solution.bodies), counts)} | columns
+
+
+def _columns_of_body(body: SolvedBody) -> dict[str, Any]:
+    names = np.full(body.mesh.n_elements, "", dtype=object)
+    for name, elements in body.mesh.parts.items():
+        names[elements] = name
+    centres, traction = body.boundary.centres, body.boundary.traction
+    displacement = element_displacement(body)
     return {
-        "element": np.arange(solution.mesh.n_elements),
+        "element": np.arange(body.mesh.n_elements),
         "part": names,
         "x": centres[:, 0],
         "y": centres[:, 1],
@@ -118,11 +122,3 @@ def _boundary_columns(solution: Solution | BodyResult) -> dict[str, Any]:
         "t_x": traction[:, 0],
         "t_y": traction[:, 1],
     }
-
-
-def _columns_of_bodies(solution: AssemblySolution) -> dict[str, Any]:
-    """Return the columns of one body after the other, with the name of the body in front."""
-    tables = {name: _boundary_columns(body) for name, body in solution.bodies.items()}
-    names = [name for name, table in tables.items() for _ in table["part"]]
-    first = next(iter(tables.values()))
-    return {"body": names} | {column: np.concatenate([table[column] for table in tables.values()]) for column in first}

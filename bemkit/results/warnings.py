@@ -43,39 +43,34 @@ _CLOSED = 1e-9
 """Share of the largest clearance that may be the round-off of none."""
 
 
-def find_warnings(solution: Solution) -> tuple[str, ...]:
+def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
     """Say what is doubtful about a solution.
 
     Returns
     -------
     tuple of str
-        One sentence for each doubt: what it is, its value and the remedy. Those of the plan come first.
+        One sentence for each doubt: what it is, its value and the remedy. Those of the plan come first. Of many alike
+        doubts about several bodies and contacts, the first.
     """
     if not solution.is_certified:
         return solution.plan.warnings
-    laws = solution.scene.laws
-    smooth = {part for part, law in laws.items() if law.is_frictionless}
-    remedy = _remedy((solution,))
-    narrow = _narrow_zones(solution.contact, smooth, remedy)
-    overlaps = _hidden_overlaps(solution.contacts_between_nodes, solution.units, remedy)
-    doubts = _error(solution), _turned(solution), _coarse_curves(solution.mesh), _large_strains(solution), narrow
-    return (*solution.plan.warnings, *chain(*doubts, overlaps))
-
-
-def find_assembly_warnings(solution: AssemblySolution) -> tuple[str, ...]:
-    """Say what is doubtful about a solution of several bodies; see `find_warnings`. Of many alike doubts, the first."""
-    if not solution.is_certified:
-        return solution.plan.warnings
-    smooth = {pair.name for pair in solution.assembly.contacts if solution.assembly.law_of(pair).is_frictionless}
-    remedy = _remedy(solution.bodies.values())
+    remedy = _remedy(solution.solved_bodies)
+    if isinstance(solution, AssemblySolution):
+        laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
+        of_all: list[Iterator[str]] = [_large(solution.estimated_error, remedy)]
+        titled: dict[str, SolvedBody] = {f"Body {name!r}: ": body for name, body in solution.bodies.items()}
+    else:
+        laws, of_all, titled = solution.scene.laws, [_error(solution), _turned(solution)], {"": solution}
+    smooth = {name for name, law in laws.items() if law.is_frictionless}
     doubts = [
-        _large(solution.estimated_error, remedy),
-        (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _coarse_curves(body.mesh)),
-        (f"Body {body.name!r}: {doubt}" for body in solution.bodies.values() for doubt in _large_strains(body)),
+        *of_all,
+        (title + doubt for title, body in titled.items() for doubt in _coarse_curves(body.mesh)),
+        (title + doubt for title, body in titled.items() for doubt in _large_strains(body)),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.units, remedy),
     ]
-    return (*solution.plan.warnings, *chain(*(_first(list(each)) for each in doubts)))
+    is_one = isinstance(solution, Solution)
+    return (*solution.plan.warnings, *chain(*(each if is_one else _first(list(each)) for each in doubts)))
 
 
 def _first(doubts: list[str]) -> list[str]:

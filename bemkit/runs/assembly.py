@@ -13,13 +13,12 @@ from bemkit.arrays import IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.model import AssembledModel, build_assembled_model
 from bemkit.model.assembled.prepared import PreparedAssembly, prepare_assembly_steps
-from bemkit.model.boundary_tractions import mean_tractions
-from bemkit.model.energy import with_energies_checked
-from bemkit.model.solved_contact import SLIP_TOLERANCE
+from bemkit.model.solved_contact import SLIP_TOLERANCE, with_energies_checked
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan
 from bemkit.plan.assembly_plan import plan_assembly
@@ -28,7 +27,7 @@ from bemkit.results.contact_table import ContactTable, bound_at, find_transition
 from bemkit.results.part_forces import RigidResult, contact_forces, nodal_resultants
 from bemkit.results.solution import BoundaryFields
 from bemkit.results.solved_problem import SolvedSteps
-from bemkit.results.warnings import find_assembly_warnings
+from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.solvers.active_sets import NodeStatus
@@ -171,7 +170,7 @@ def assembly_solution(
         message=result.message,
         rigid=rigid,
     )
-    return solution.with_warnings(find_assembly_warnings(solution))
+    return solution.with_warnings(find_warnings(solution))
 
 
 def _at_rest(model: AssembledModel, result: ContactSolution, furthest: float) -> IntArray:

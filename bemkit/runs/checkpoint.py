@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, overload
+from typing import overload
 
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.result_file import check_result_target, read_result, write_result
@@ -12,7 +12,7 @@ from bemkit.results.solution import Solution
 from bemkit.runs.adaptive import run_adaptive, run_assembly_adaptive
 from bemkit.runs.assembly import SEVERAL_BODIES
 from bemkit.runs.history import ONE_BODY
-from bemkit.runs.steps import Kind, joined, solved_history
+from bemkit.runs.steps import joined, solved_history
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
@@ -67,14 +67,19 @@ def run_to_file(
     def write(solution: Solution | AssemblySolution) -> None:
         write_result(target, solution)
 
-    is_assembly = isinstance(scene, Assembly)
     solution: Solution | AssemblySolution
-    if scene.mesh.accuracy is None:
-        kind: Kind[Any, Any] = SEVERAL_BODIES if is_assembly else ONE_BODY
-        asked: list[Any] = [scene]
-        solution = joined(*solved_history(kind, asked, None, callback, done, write))
+    is_adaptive = scene.mesh.accuracy is not None
+    if isinstance(scene, Assembly):
+        several = done if isinstance(done, AssemblySolution) else None
+        if is_adaptive:
+            solution = run_assembly_adaptive(scene, callback=callback, done=several, finished=write)[-1]
+        else:
+            solution = joined(*solved_history(SEVERAL_BODIES, [scene], None, callback, several, write))
     else:
-        adaptive: Callable[..., Any] = run_assembly_adaptive if is_assembly else run_adaptive
-        solution = adaptive(scene, callback=callback, done=done, finished=write)[-1]
+        one = done if isinstance(done, Solution) else None
+        if is_adaptive:
+            solution = run_adaptive(scene, callback=callback, done=one, finished=write)[-1]
+        else:
+            solution = joined(*solved_history(ONE_BODY, [scene], None, callback, one, write))
     write_result(target, solution)
     return solution

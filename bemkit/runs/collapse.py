@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bemkit.contact.limit_load import largest_factor
+from bemkit.contact.solvability import largest_factor
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.model import build_assembled_model
@@ -40,7 +40,7 @@ def largest_load_factor(assembly: Assembly, *, meshes: Mapping[str, BoundaryMesh
     Notes
     -----
     The static theorem of limit analysis on the contact nodes, by one linear programme: nothing is said of stresses
-    inside the bodies. Of Coulomb friction this is a bound from above, see `bemkit.contact.limit_load.largest_factor`.
+    inside the bodies. Of Coulomb friction this is a bound from above, see `bemkit.contact.solvability.largest_factor`.
     """
     assembly = load_steps(replace(assembly, load_factors=(1.0,)))[-1]
     loaded, constant = prepare_assembly_steps([assembly, with_scaled_loads(assembly, 0.0)], meshes)

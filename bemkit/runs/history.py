@@ -11,14 +11,13 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.solvability import UnsolvableLoad
 from bemkit.errors import InputError
+from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
-from bemkit.model.boundary_tractions import mean_tractions
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps
-from bemkit.model.solved_contact import contact_warnings, with_held_friction
+from bemkit.model.solved_contact import contact_warnings, with_energy_checked, with_held_friction
 from bemkit.operators.stopwatch import Stage, StageClock
 from bemkit.plan import Plan, check_elements, plan_steps
 from bemkit.results.contact_table import ContactTable, find_transitions

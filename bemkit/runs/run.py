@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, overload
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.energy import with_energy_checked
 from bemkit.model.free_motion import describe
+from bemkit.model.solved_contact import with_energy_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage
 from bemkit.plan.plan import few_on, make_plan

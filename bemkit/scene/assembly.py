@@ -11,21 +11,26 @@ import numpy as np
 
 from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
-from bemkit.formulas import closest
+from bemkit.formulas import choices, closest
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
-from bemkit.scene.body import Body
+from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
-from bemkit.scene.halved_bodies import check_place, lines_across
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
+
+
+def body_and_part(side: str) -> tuple[str, str]:
+    """Return the names of body and part in the name of a side, ``"body.part"``."""
+    body, part = side.split(".", 1)
+    return body, part
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,11 @@ class ContactPair:
     def elastic_sides(self) -> tuple[str, ...]:
         """The sides of elastic bodies: two, or the one that faces a rigid body."""
         return tuple(side for side in self.sides if "." in side)
+
+    @property
+    def elastic_parts(self) -> tuple[tuple[str, str], ...]:
+        """The same as names of body and part."""
+        return tuple(body_and_part(side) for side in self.elastic_sides)
 
     @property
     def rigid_body(self) -> str | None:
@@ -268,11 +278,9 @@ class Assembly(ShownInNotebooks):
                 raise InputError(f"rigid body {name!r} touches nothing: list a contact with it, or leave it out")
 
     def _check_side(self, side: str) -> None:
-        body, part = side.split(".", 1)
+        body, part = body_and_part(side)
         if body not in self._by_name:
-            names = list(self._by_name)
-            listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-            raise InputError(f"a contact names {side!r}: the bodies are {listed}{closest(body, names)}")
+            raise InputError(f"a contact names {side!r}: the bodies are {choices(body, list(self._by_name))}")
         placed = self._by_name[body]
         sides = self._side_names(placed)
         if any(part == own.name for own in placed.parts) or not any(part in names for names in sides):
@@ -306,18 +314,20 @@ class Assembly(ShownInNotebooks):
         return {body.name: body for body in self.placed_bodies}
 
     @cached_property
-    def _contact_parts(self) -> Mapping[str, tuple[str, ...]]:
-        """The parts in contact of each body that is listed as such."""
+    def _listed_parts(self) -> Mapping[str, tuple[str, ...]]:
         named: dict[str, list[str]] = {}
         for pair in self.contacts:
-            for side in pair.elastic_sides:
-                body, part = side.split(".", 1)
+            for body, part in pair.elastic_parts:
                 named.setdefault(body, []).append(part)
         return {body: tuple(dict.fromkeys(parts)) for body, parts in named.items()}
 
+    def listed_parts(self, body: str) -> tuple[str, ...]:
+        """Return the parts and sides of a placed body that contacts name."""
+        return self._listed_parts.get(body, ())
+
     def contact_parts(self, body: Body) -> tuple[str, ...]:
         """Return the names of the parts and sides of a placed body that may touch other bodies."""
-        listed = self._contact_parts.get(body.name, ())
+        listed = self.listed_parts(body.name)
         if self.touching is None:
             return listed
         taken = {side for part in body.parts for side in part.sides} | set(listed)

@@ -13,7 +13,8 @@ from bemkit.contact.laws import FrictionLaw
 from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, ScalarField, check_field, evaluate_field
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
+from bemkit.geometry.vectors import turned_left
 
 Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
 """A condition on the coordinates, such as ``Expression("x > 0.5")``."""
@@ -120,9 +121,8 @@ class Pressure:
 
     def at(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Evaluate the traction at (n, 2) points [m] with unit normals as an (n, 2) array [Pa]."""
-        tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
         pressure = evaluate_field(self.pressure, points)[:, None]
-        return evaluate_field(self.shear, points)[:, None] * tangents - pressure * normals
+        return evaluate_field(self.shear, points)[:, None] * turned_left(normals) - pressure * normals
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from bemkit.operators.linear.solvers import (
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
-from bemkit.scene.thinness import thinness_warnings
+from bemkit.scene.mesh_options import thinness_warnings
 
 
 class Discretisation(Protocol):

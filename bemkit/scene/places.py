@@ -15,7 +15,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.scene.body import Body
 from bemkit.scene.conditions import Part
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 
 _NAME = r'(?:"[^"]+"|[^.\[\]"=\s]+)'
 _PLACE = re.compile(rf"{_NAME}(?:\.{_NAME}|\[\d+\])*")

@@ -1,52 +1,54 @@
-"""What moves as it is told or as forces drive it: rigid bodies, and half-planes far away."""
+"""What moves as it is told or as forces drive it: rigid bodies in an assembly, and half-planes far away."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import Field, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.obstacle import Obstacle, check_pair
 from bemkit.errors import InputError
 
 COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
 """The three motions in the plane, each with the load that does work on it."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class PlaneMotion:
-    """The part that frozen dataclasses with these fields have in common.
+    """What rigid bodies and half-planes have in common.
 
     Of each motion and its load one is given, and the other follows; what is given of neither does not move.
     """
 
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-    x: float | None
-    y: float | None
-    turn: float | None
-    force_x: float | None
-    force_y: float | None
-    moment: float | None
+    x: float | None = None
+    y: float | None = None
+    turn: float | None = None
+    force_x: float | None = None
+    force_y: float | None = None
+    moment: float | None = None
+    centre: tuple[float, float] = (0.0, 0.0)
 
-    def check_motion(self, owner: str = "") -> None:
-        """Refuse numbers that are not finite, and a motion that is given together with its load.
-
-        Parameters
-        ----------
-        owner : str
-            What moves, for messages, with a colon and a space behind it.
-        """
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", tuple(self.centre))
+        check_pair(f"{self._owner}centre", self.centre)
         for motion, load in COMPONENTS:
             for key in (motion, load):
                 value = getattr(self, key)
                 if value is not None and not math.isfinite(value):
-                    raise InputError(f"{owner}{key} is {value}: give a finite number")
+                    raise InputError(f"{self._owner}{key} is {value}: give a finite number")
             if getattr(self, motion) is not None and getattr(self, load) is not None:
                 raise InputError(
-                    f"{owner}{motion} is {getattr(self, motion)} and {load} is {getattr(self, load)}: give one of "
-                    "them, the other follows"
+                    f"{self._owner}{motion} is {getattr(self, motion)} and {load} is {getattr(self, load)}: give one "
+                    "of them, the other follows"
                 )
+
+    @property
+    def _owner(self) -> str:
+        """What moves, for messages, with a colon and a space behind it."""
+        return ""
 
     @property
     def is_driven(self) -> BoolArray:
@@ -73,3 +75,76 @@ class PlaneMotion:
         factors = dict(zip(keys, np.column_stack([motions, loads]).ravel().tolist(), strict=True))
         given = {key: getattr(self, key) for key in keys}
         return replace(self, **{key: factors[key] * value for key, value in given.items() if value is not None})
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidBody(PlaneMotion):
+    """A rigid obstacle that moves.
+
+    Of each motion and its load one is given, and the other follows; what is given of neither does not move.
+
+    Parameters
+    ----------
+    name : str
+        Without a dot: contacts name the body by it, ``("plate.top", "punch")``.
+    obstacle : Obstacle
+        Its shape, where it stands before it moves.
+    centre : (float, float) [m]
+        The point whose motion is `x`, `y`, about which it turns, and where its forces act.
+    x, y : float, optional [m]
+    turn : float, optional [rad]
+        Anticlockwise; small, as all motions are: a point at r from the centre moves by ``turn`` times r turned by 90
+        degrees.
+    force_x, force_y : float, optional [N/m]
+    moment : float, optional [N m/m]
+        About the centre, anticlockwise.
+
+    Raises
+    ------
+    InputError
+        If the name is empty or has a dot, a number is not finite, or a motion is given together with its load.
+    """
+
+    name: str
+    obstacle: Obstacle
+
+    def __post_init__(self) -> None:
+        if not self.name or not self.name.isprintable() or "." in self.name:
+            raise InputError(f"the rigid body name {self.name!r} does not do: give printable text without a dot")
+        super().__post_init__()
+
+    @property
+    def _owner(self) -> str:
+        return f"rigid body {self.name!r}: "
+
+    def motions_at(self, points: FloatArray) -> FloatArray:
+        """Return (n, 2, 3): how the motions x, y, turn displace points (n, 2) [m] of the body."""
+        x, y = (points - np.array(self.centre)).T
+        one, zero = np.ones_like(x), np.zeros_like(x)
+        return np.stack([np.stack([one, zero, -y], axis=1), np.stack([zero, one, x], axis=1)], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FarField(PlaneMotion):
+    """Motion or load of a half-plane far away from its surface.
+
+    Of each motion and its load one is given, and the other follows; what is given of neither does not move. A rigid
+    indenter that is pressed down with a force is a half-plane that is pressed up against it with the same force.
+
+    Parameters
+    ----------
+    x, y : float, optional [m]
+    turn : float, optional [rad]
+        Anticlockwise about the centre; small.
+    force_x, force_y : float, optional [N/m]
+        On the half-plane; on each period of a periodic one.
+    moment : float, optional [N m/m]
+        On the half-plane about the centre, anticlockwise.
+    centre : (float, float) [m]
+        Where the forces act, and about which it turns.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or a motion is given together with its load.
+    """

@@ -144,9 +144,9 @@ SIDES = Registry(
 GRADINGS = Registry(
     "grading",
     {
-        "uniform": "bemkit.geometry.grading:Uniform",
-        "algebraic": "bemkit.geometry.grading:Algebraic",
-        "geometric": "bemkit.geometry.grading:Geometric",
+        "uniform": "bemkit.geometry.meshing.discretise:Uniform",
+        "algebraic": "bemkit.geometry.meshing.discretise:Algebraic",
+        "geometric": "bemkit.geometry.meshing.discretise:Geometric",
     },
 )
 
@@ -203,9 +203,9 @@ LAWS = Registry(
         "frictionless": "bemkit.contact.laws:Frictionless",
         "tresca": "bemkit.contact.laws:Tresca",
         "coulomb": "bemkit.contact.laws:Coulomb",
-        "cohesive-coulomb": "bemkit.contact.laws:CohesiveCoulomb",
-        "slip-weakening": "bemkit.contact.history_laws:SlipWeakening",
-        "rate-strengthening": "bemkit.contact.history_laws:RateStrengthening",
+        "cohesive-coulomb": "bemkit.contact.further_laws:CohesiveCoulomb",
+        "slip-weakening": "bemkit.contact.further_laws:SlipWeakening",
+        "rate-strengthening": "bemkit.contact.further_laws:RateStrengthening",
     },
     "bemkit.laws",
 )

@@ -13,24 +13,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
-from bemkit.formulas import closest
+from bemkit.formulas import choices
 from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
-from bemkit.scene.conditions import Contact, Part
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Roller
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
-from bemkit.scene.far_field import FarField, check_half_plane
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
 from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
@@ -128,7 +128,7 @@ class Scene(ShownInNotebooks):
             )
         outline = self.shape.outline()
         if outline.surface is not None or self.far is not None:
-            check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
+            _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
         if self.units is not None and (drawn := drawn_shape(self.shape)):
             check_length_of_file(drawn.unit, self.units)
         if self.body_forces and outline.is_exterior:
@@ -140,10 +140,7 @@ class Scene(ShownInNotebooks):
         for part in self.parts:
             for side in part.sides:
                 if side not in names:
-                    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-                    raise InputError(
-                        f"part {part.name!r}: unknown side {side!r}: the sides are {listed}{closest(side, names)}"
-                    )
+                    raise InputError(f"part {part.name!r}: unknown side {side!r}: the sides are {choices(side, names)}")
 
     def _check_without_contact(self) -> None:
         for name, default in (("law", Frictionless()), ("solver", SemismoothNewton())):
@@ -230,3 +227,47 @@ class Scene(ShownInNotebooks):
         if self.symmetry is not None:
             check_symmetry(self, mesh)
         return mesh
+
+
+def _check_half_plane(
+    outline: Outline, far: FarField | None, discretisation: Discretisation, mesh: MeshOptions, parts: Sequence[Part]
+) -> None:
+    """Refuse in a scene what a half-plane does not have, and a far field of other bodies.
+
+    Raises
+    ------
+    InputError
+        Naming the key, its value and the remedy.
+    """
+    if outline.surface is None:
+        if far is not None:
+            raise InputError(
+                f"far is {far}, but the body is no half-plane: hold or load its parts, or give the shape "
+                "'half-plane' or 'periodic-half-plane'"
+            )
+        return
+    if not (discretisation.is_symmetric and getattr(discretisation, "degree", 0) == 1) or discretisation.needs_accuracy:
+        raise InputError(
+            f"discretisation is {discretisation}, but tractions on a half-plane are constant on each element: choose "
+            "the discretisation 'linear', or leave it out"
+        )
+    if outline.surface.is_periodic:
+        _check_periodic(far, mesh, parts)
+
+
+def _check_periodic(far: FarField | None, mesh: MeshOptions, parts: Sequence[Part]) -> None:
+    if far is not None and (far.turn or far.moment is not None):
+        name = "turn" if far.turn else "moment"
+        raise InputError(f"far.{name} is {getattr(far, name)}: a periodic half-plane cannot turn: leave it out")
+    for part in parts:
+        if isinstance(part.condition, Clamped | PrescribedDisplacement | Roller):
+            raise InputError(
+                f"part {part.name!r} holds the surface of a periodic half-plane: hold it far away, or let the part "
+                "touch an obstacle"
+            )
+    if mesh.accuracy is not None:
+        raise InputError(
+            f"mesh.accuracy is {mesh.accuracy}: the elements of a periodic half-plane are equal: give elements"
+        )
+    if not any(isinstance(part.condition, Contact) for part in parts):
+        raise InputError("no part of the periodic half-plane is in contact: give one an obstacle")

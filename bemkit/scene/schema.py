@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
@@ -18,7 +19,6 @@ from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
-from bemkit.scene.docstrings import parameters, summary
 from bemkit.scene.registry import Registry
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import NAMED, options_of, registry_of, unstructure
@@ -34,6 +34,8 @@ _PLAIN: tuple[tuple[Any, Schema], ...] = (
     (Expression, {"type": "string"}),
     (FloatArray, {"type": "array", "items": {"type": ["number", "array"]}}),
 )
+_SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.MULTILINE)
+_UNIT = re.compile(r"\[([^\]]+)\]\s*$")
 
 
 def scene_schema() -> Schema:
@@ -202,3 +204,39 @@ def _described(schema: Schema, entry: Field[Any], declared: Any, text: str) -> S
             described["default"] = unstructure(default, declared)
     # beside a reference nothing else counts in draft 7
     return ({"allOf": [schema]} if "$ref" in schema and described else schema) | described
+
+
+def summary(docstring: str) -> str:
+    """Return the first paragraph of a docstring, as one line."""
+    return _plain(docstring.strip().partition("\n\n")[0])
+
+
+def parameters(docstring: str) -> dict[str, str]:
+    """Return what a docstring says of each parameter, as one line that begins with the unit if there is one.
+
+    Parameters
+    ----------
+    docstring : str
+        With the indentation removed, as `inspect.getdoc` returns it.
+    """
+    texts: dict[str, str] = {}
+    names: list[str] = []
+    for line in _section(docstring, "Parameters").splitlines():
+        if line[:1].strip():  # not indented: the names, and what they are
+            heading, _, kind = line.partition(" : ")
+            unit = _UNIT.search(kind)
+            names = [name.strip() for name in heading.split(",")]
+            texts |= dict.fromkeys(names, f"[{unit[1]}]" if unit else "")
+        else:
+            texts |= {name: f"{texts[name]} {_plain(line)}".strip() for name in names}
+    return texts
+
+
+def _section(docstring: str, heading: str) -> str:
+    pieces = _SECTION.split(docstring)
+    return next((text for name, text in zip(pieces[1::2], pieces[2::2], strict=True) if name == heading), "")
+
+
+def _plain(text: str) -> str:
+    """Return a text without marks of reStructuredText and line breaks."""
+    return " ".join(text.replace("``", "").replace("`", "").split())

@@ -28,7 +28,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
 from bemkit.geometry.drawn import DrawnSide
 from bemkit.geometry.files.shape_file import ShapeFile
-from bemkit.geometry.grading import Grading
+from bemkit.geometry.meshing.discretise import Grading
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
 from bemkit.scene.body import Body
@@ -37,6 +37,7 @@ from bemkit.scene.conditions import Condition, Part
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.explanations import explain
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.registry import (
     BODY_FORCES,
     CONDITIONS,
@@ -51,7 +52,6 @@ from bemkit.scene.registry import (
     SOLVERS,
     Registry,
 )
-from bemkit.scene.rigid_body import RigidBody
 from bemkit.solvers.base import ContactSolver
 
 T = TypeVar("T")

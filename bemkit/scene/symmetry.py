@@ -19,7 +19,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import divide
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material

@@ -18,7 +18,7 @@ from bemkit.geometry.shapes import CheckedShape, Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, Pressure, Region, Traction, with_fields
-from bemkit.scene.far_field import FarField
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 
 

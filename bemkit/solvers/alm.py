@@ -6,8 +6,7 @@ from enum import Enum
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.certificate import certificate_scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.base import Iterate, check_count, check_max_steps, check_rho
 from bemkit.solvers.newton import negligible, respond

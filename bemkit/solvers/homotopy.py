@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.conditions import LinearConditions, of_statuses, slip, stick
 from bemkit.contact.problem import ContactProblem, ContactState, SingularResponse
 from bemkit.solvers.active_sets import ActiveSets
@@ -210,8 +210,7 @@ class Extras:
 
 def _uneven(count: int) -> FloatArray:
     """Return numbers from 1 to 3/2, as unequal as can be, which keep symmetric nodes from changing at once."""
-    fractions: FloatArray = np.modf(np.arange(1, count + 1) * 0.6180339887498949)[0]
-    return 1.0 + 0.5 * fractions
+    return 1.0 + 0.5 * spread_fractions(count)
 
 
 class _Path:

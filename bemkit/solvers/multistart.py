@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bemkit.arrays import IntArray
-from bemkit.contact.certificate import certificate_scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
 from bemkit.errors import InputError
 from bemkit.solvers.base import ContactSolution, ContactSolver, solve
 

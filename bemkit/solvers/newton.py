@@ -5,10 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.certificate import DEFORMED, certificate_scales
-from bemkit.contact.conditions import LinearConditions, separated, stick
-from bemkit.contact.problem import ContactProblem, ContactState, LinearBody, SingularResponse
-from bemkit.contact.rigid_motions import RigidMotions, as_dense, as_rows
+from bemkit.contact.conditions import LinearConditions, RigidMotions, as_dense, as_rows, separated, stick
+from bemkit.contact.problem import (
+    DEFORMED,
+    ContactProblem,
+    ContactState,
+    LinearBody,
+    SingularResponse,
+    certificate_scales,
+)
 from bemkit.errors import InputError
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual, coheres
 

@@ -16,10 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from bemkit.arrays import IntArray, read_only
-from bemkit.contact.certificate import certificate_scales
-from bemkit.contact.problem import ContactProblem, ContactState
+from bemkit.contact.problem import ContactProblem, ContactState, certificate_scales
 from bemkit.errors import NoResultError
-from bemkit.geometry.grading import Algebraic
+from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.linear.threads import blas_threads_for

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
+from bemkit.contact.conditions import LinearConditions, as_dense, augmented, separated, slip, stick
 from bemkit.contact.laws import Frictionless
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.rigid_motions import as_dense
 from bemkit.errors import InputError
 from bemkit.testing.failure import demand
 

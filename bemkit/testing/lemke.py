@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.conditions import stick
-from bemkit.contact.piecewise_law import law_name
+from bemkit.arrays import FloatArray, IntArray, spread_fractions
+from bemkit.contact.conditions import as_dense, stick
+from bemkit.contact.further_laws import law_name
 from bemkit.contact.problem import ContactProblem, ContactState, LawError
-from bemkit.contact.rigid_motions import as_dense
 from bemkit.solvers.base import Iterate, Status, check_max_steps
 from bemkit.solvers.newton import spring_stiffness
 
@@ -120,7 +119,7 @@ def lemke(matrix: FloatArray, vector: FloatArray, max_pivots: int | None = None)
     if vector.min() >= 0.0:
         return np.zeros(n), 0
     # Columns: w (n), z (n), covering variable, right-hand side. The cover is uneven, against ties.
-    cover = 1.0 + 0.5 * np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]
+    cover = 1.0 + 0.5 * spread_fractions(n)
     tableau = np.hstack([np.eye(n), -matrix, -cover[:, None], vector[:, None]])
     basis = np.arange(n)
     row, entering = int(np.argmin(vector / cover)), 2 * n

@@ -20,7 +20,7 @@ import pytest
 
 import bemkit.__main__
 import bemkit.operators.hierarchy.skeletons
-import bemkit.results.outcome_file
+import bemkit.results.result_file
 import bemkit.runs.run
 from bemkit.cli.console import ConvergenceTable, format_size
 from bemkit.cli.main import commands, main
@@ -310,7 +310,7 @@ def test_an_interrupt_leaves_no_file(
     def interrupted(*arguments: object, **options: object) -> None:
         raise error
 
-    monkeypatch.setattr(bemkit.results.outcome_file, "_write_mesh", interrupted)
+    monkeypatch.setattr(bemkit.results.result_file, "_write_mesh", interrupted)
     assert call("run", "paper-1", *SMALL, "-o", "r.h5") == (130 if error is KeyboardInterrupt else 2)
     assert os.listdir() == []
     assert capsys.readouterr().err.strip().count("\n") == 0
@@ -338,7 +338,7 @@ def test_a_real_ctrl_c_ends_with_130() -> None:
 STAGES = {
     "compression": (bemkit.operators.hierarchy.skeletons.CollocationView, "skeleton"),
     "contact step": (SemismoothNewton, "step"),
-    "writing": (bemkit.results.outcome_file, "_write_mesh"),
+    "writing": (bemkit.results.result_file, "_write_mesh"),
 }
 
 

@@ -9,9 +9,8 @@ import pytest
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.body import SlipHistory
-from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
+from bemkit.contact.further_laws import PiecewiseLaw, RateStrengthening, SlipWeakening
 from bemkit.contact.laws import Coulomb, FrictionLaw, RescaledLaw
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.testing import CheckFailed, check_law

@@ -1,17 +1,9 @@
 import numpy as np
 import pytest
 
-from bemkit.contact import history_laws, laws
-from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
-from bemkit.contact.laws import (
-    CohesiveCoulomb,
-    Coulomb,
-    FrictionLaw,
-    Frictionless,
-    LawOfCoefficients,
-    RescaledLaw,
-    Tresca,
-)
+from bemkit.contact import further_laws, laws
+from bemkit.contact.further_laws import CohesiveCoulomb, PiecewiseLaw, RateStrengthening, SlipWeakening
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, LawOfCoefficients, RescaledLaw, Tresca
 from bemkit.contact.problem import ContactProblem, LawError
 from bemkit.formulas import Expression
 from bemkit.testing import check_law
@@ -30,6 +22,7 @@ LAWS = [
     RescaledLaw(CohesiveCoulomb(0.4, 0.1, 3.0), stress_scale=7.0),
     SlipWeakening(0.6, PER_NODE.clip(max=0.6), 1e-3),
     RateStrengthening(PER_NODE, 0.1, 2.0),
+    PiecewiseLaw([Coulomb(0.5), Tresca(0.2)], [np.arange(0, PER_NODE.size, 2), np.arange(1, PER_NODE.size, 2)]),
 ]
 
 
@@ -56,7 +49,7 @@ def test_laws_are_equal_by_their_coefficients(make, other):
 
 
 def test_every_law_is_checked():
-    classes = {**vars(laws), **vars(history_laws)}.values()
+    classes = {**vars(laws), **vars(further_laws)}.values()
     found = {cls for cls in classes if isinstance(cls, type) and FrictionLaw in cls.__mro__[1:]}
     assert found - {LawOfCoefficients} == {type(law) for law in LAWS}
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from bemkit.contact.conditions import null_space
 from bemkit.contact.joined.member import diagonal_blocks
-from bemkit.contact.rigid_motions import null_space
 from tests.slow import slow_except
 
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, Frictionless, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, LinearBody
 from bemkit.contact.solvability import find_unsolvable_load, needs_contact
 from bemkit.solvers.newton import untouched_response

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import bemkit
-from bemkit.results.bibliography import PACKAGE, works
+from bemkit.results.citations import PACKAGE, works
 from tests.docs.pages import DOCS, read
 
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:18|19|20)\d\d)\]")

@@ -16,8 +16,8 @@ from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.material import Material
 from bemkit.scene import registry as kinds
 from bemkit.scene.conditions import Part
-from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import structure
 from bemkit.scene.steps import Step

@@ -7,10 +7,8 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.curves import ParametricCurve, Segment
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.grading import Algebraic, Geometric
-from bemkit.geometry.meshing.discretise import discretise, share_elements
-from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, discretise, share_elements
+from bemkit.geometry.outline import Outline, Selection, Side
 from bemkit.geometry.shapes import Disk, PlateWithHole, Polygon, Rectangle, Ring
 
 from .strategies import sizes, star_polygons

@@ -10,7 +10,7 @@ from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, Outli
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.nurbs import Nurbs, clamped_knots, conic_arc
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import ExteriorOf, Rectangle
 from bemkit.testing.spaces import check_curve
 

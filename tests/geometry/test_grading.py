@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 
 gradings = st.one_of(
     st.just(Uniform()),

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.curves import Arc
 from bemkit.geometry.errors import UnknownPartError
-from bemkit.geometry.grading import Geometric
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.meshing.discretise import Geometric, discretise
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring
 
 from .strategies import angles, closed, polygon_area, rotation, sizes, star_polygons

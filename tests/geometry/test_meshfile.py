@@ -14,7 +14,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshfile import read_mesh, write_mesh
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import ExteriorOf, Polygon, Rectangle
 
 from .strategies import closed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bemkit.geometry.meshing.partition import LEAST, STEEPEST, Partition, better_partition, first_partition
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 
 PARTS = {"floor": Selection(("bottom",)), "load": Selection(("top",), lambda x, y: x > 0.5)}

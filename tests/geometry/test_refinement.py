@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import discretise
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import PlateWithHole, Rectangle
 
 from .strategies import closed, star_polygons

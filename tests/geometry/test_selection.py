@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from bemkit.geometry.curves import Arc, Segment
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.selection import Selection, breakpoints, merge_breakpoints
+from bemkit.geometry.outline import Selection, breakpoints, merge_breakpoints
 
 BOTTOM = Segment((0.0, 0.0), (1.0, 0.0))
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bemkit.geometry.validity.self_intersection import overlapping_boxes, point_distances, segment_distances
+from bemkit.geometry.pieces import overlapping_boxes, point_distances, segment_distances
 
 points = arrays(float, (40, 2), elements=st.integers(-20, 20).map(float))
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bemkit as bk
-from bemkit.geometry.meshing.transition import ALIKE, LARGEST_STRETCH, gradual_positions
+from bemkit.geometry.meshing.discretise import ALIKE, LARGEST_STRETCH, gradual_positions
 
 sizes = st.floats(1e-6, 1e3)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.model.energy import is_indefinite, negative_share
+from bemkit.model.solved_contact import is_indefinite, negative_share
 from bemkit.operators.rigid_modes import rigid_motions
 
 PAPER = bk.ConstantCollocation(slopes=False)
@@ -41,7 +41,7 @@ def test_scenes_without_contact_are_judged_too(monkeypatch: pytest.MonkeyPatch) 
     squeeze = bk.Part("load", bk.Traction(y=bk.Expression("-y")), sides=tuple(f"outer-{k}" for k in range(1, 5)))
     scene = thin_ring(0.8, 40, squeeze, symmetry=bk.Symmetry(x=0.0, y=0.0), law=bk.Frictionless())
     assert bk.run(scene).is_converged
-    monkeypatch.setattr("bemkit.model.energy.negative_share", lambda *_: 0.25)
+    monkeypatch.setattr("bemkit.model.solved_contact.negative_share", lambda *_: 0.25)
     solution = bk.run(scene)
     assert solution.status is bk.Status.NEGATIVE_ENERGY
     assert "2.5e-01 times" in solution.message

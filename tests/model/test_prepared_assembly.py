@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import Coulomb, LawOfCoefficients
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.model.assembled.contact_tractions import ContactSpread
 from bemkit.model.assembled.prepared import prepare_assembly_steps
 from bemkit.scene.load_history import load_steps

@@ -18,7 +18,7 @@ from bemkit.pictures.shown import at_mesh_nodes, shown
 from bemkit.pictures.zoom import is_short
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
-from bemkit.scene.far_field import FarField
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.scene.unit_names import UnitNames
 from tests.slow import slow_except

@@ -1,4 +1,4 @@
-from bemkit.contact.joined.sparse_solver import sparse_solver_name
+from bemkit.contact.joined.sparse_form import sparse_solver_name
 from bemkit.plan.assembly_plan import make_assembly_plan
 from tests.runs.masonry import wall
 

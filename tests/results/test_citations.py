@@ -11,9 +11,8 @@ from click.testing import CliRunner
 
 import bemkit as bk
 from bemkit.cli.main import commands
-from bemkit.contact.history_laws import SlipWeakening
-from bemkit.results.bibliography import PACKAGE, Work, works
-from bemkit.results.citations import DRIVERS, LAW_WORKS, Citations, Method, cite
+from bemkit.contact.further_laws import SlipWeakening
+from bemkit.results.citations import DRIVERS, LAW_WORKS, PACKAGE, Citations, Method, Work, cite, works
 from bemkit.scene.registry import LAWS, SOLVERS
 from bemkit.scene.toml import shipped_files, with_overrides
 from bemkit.solvers.ssn import PATH_MESSAGE, SPRINGS_MESSAGE

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.history_laws import SlipWeakening
+from bemkit.contact.further_laws import SlipWeakening
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare_steps
 from bemkit.results.load_history import LoadHistory, StepWork

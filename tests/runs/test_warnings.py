@@ -26,7 +26,7 @@ from bemkit.results.result_file import read_result, write_result
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import unlike
 from bemkit.results.tables import to_json
-from bemkit.results.warnings import FEWEST_NODES, find_assembly_warnings, find_warnings
+from bemkit.results.warnings import FEWEST_NODES, find_warnings
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
@@ -73,9 +73,9 @@ def test_large_rotations_are_warned_of() -> None:
 def test_large_strains_of_one_body_of_several_are_warned_of(monkeypatch) -> None:
     solution = run(with_overrides(load_scene("two-cylinders"), elements=40))
     assert isinstance(solution, bk.AssemblySolution)
-    assert not any(LARGE in words for words in find_assembly_warnings(solution))
+    assert not any(LARGE in words for words in find_warnings(solution))
     monkeypatch.setattr(warnings_module, "LARGEST_STRAIN", 1e-4)
-    doubts = [words for words in find_assembly_warnings(solution) if LARGE in words]
+    doubts = [words for words in find_warnings(solution) if LARGE in words]
     assert [words.split(":")[0] for words in doubts] == [f"Body '{name}'" for name in solution.bodies]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.piecewise_law import PiecewiseLaw
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
 from bemkit.scene.toml import SceneError, scene_from_toml, scene_to_toml, shipped_files

@@ -14,8 +14,7 @@ from jsonschema import Draft7Validator
 
 from bemkit.cli.main import commands
 from bemkit.errors import BemkitError
-from bemkit.scene.docstrings import parameters, summary
-from bemkit.scene.schema import scene_schema
+from bemkit.scene.schema import parameters, scene_schema, summary
 from bemkit.scene.toml import shipped_files
 from bemkit.studies.stability.random_scenes.scenes import random_case
 from tests.docs.test_scene_files_page import EXAMPLES, as_text

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane
 from bemkit.formulas import Expression
-from bemkit.geometry.grading import Algebraic, Geometric, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Uniform
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector
 from bemkit.operators.material import Material, Plane
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction

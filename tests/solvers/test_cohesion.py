@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, Tresca
 from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.solvers.base import solve

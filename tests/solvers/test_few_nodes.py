@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.contact.certificate import certify
 from bemkit.contact.laws import Coulomb
-from bemkit.contact.problem import ContactProblem, ContactState, DenseBody
+from bemkit.contact.problem import ContactProblem, ContactState, DenseBody, certify
 from bemkit.solvers.active_sets import NodeStatus, contact_sets
 from bemkit.studies.stability.independent_check import check_solution
 from tests.slow import slow_only

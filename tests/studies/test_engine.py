@@ -13,8 +13,7 @@ import pytest
 from bemkit.atomic_files import OutputFileError
 from bemkit.hdf5 import FileFormat, ResultFileError
 from bemkit.results.outputs import Outputs, TextFile
-from bemkit.results.record_file import RecordFile
-from bemkit.results.row_journal import RowJournal
+from bemkit.results.record_file import RecordFile, RowJournal
 from bemkit.studies.engine import Task, compute, compute_with_progress
 
 

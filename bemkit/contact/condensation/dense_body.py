@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.conditions import LinearConditions
 from bemkit.errors import InputError
@@ -87,8 +87,7 @@ class DenseBody(LinearBody):
                 raise InputError(f"{name} has the shape {array.shape}; {n_contact} contact nodes need {shape}")
             if not np.isfinite(array).all():
                 raise InputError(f"{name} contains {array[~np.isfinite(array)][0]}; give finite numbers")
-            read_only(array)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
         if n_contact == 0:
             raise InputError("weights is empty; a body needs at least one contact node")
         if self.weights.min() <= 0.0:
@@ -159,7 +158,7 @@ class DenseBody(LinearBody):
         traction = np.zeros_like(displacement)
         traction.flat[self.unknown_dofs] = self.stiffness @ unknowns - self.load
         traction /= self.weights[:, None]
-        return ContactState(displacement, with_given_tractions(conditions, traction))
+        return ContactState(displacement, conditions.with_given_tractions(traction))
 
     def rigid_motions(self) -> FloatArray:
         """Return the motions given to the constructor."""
@@ -288,19 +287,7 @@ class DenseBody(LinearBody):
     @cached_property
     def _probe(self) -> FloatArray:
         """(n_unknowns,) array around one: not orthogonal to rigid motions, and without any pattern."""
-        multiples = np.arange(1, self.n_unknowns + 1) * 0.6180339887498949
-        return np.asarray(0.5 + np.modf(multiples)[0])
-
-
-def with_given_tractions(conditions: LinearConditions, traction: FloatArray) -> FloatArray:
-    """Return tractions (n_contact, 2) with those that conditions give, or tie to the other component, met exactly."""
-    met = traction.copy()
-    for row in (0, 1):
-        rest = conditions.value[:, row] - conditions.on_traction[:, row, 1 - row] * met[:, 1 - row]
-        factor = conditions.on_traction[:, row, row]
-        is_given = (factor != 0.0) & ~np.any(conditions.on_displacement[:, row] != 0.0, axis=1)
-        np.divide(rest, factor, out=met[:, row], where=is_given)
-    return met
+        return 0.5 + spread_fractions(self.n_unknowns)
 
 
 def refuse_other_tangents(conditions: LinearConditions, is_eliminated: BoolArray) -> None:

@@ -71,21 +71,6 @@ class ElementConditions:
         return ContactState(_times(self.of_displacement, displacement), _times(self.of_traction, traction))
 
 
-def exactly(state: ContactState, conditions: LinearConditions, is_held: BoolArray) -> ContactState:
-    """Return a response that meets prescribed displacements, zero tractions and slip tractions to the last digit."""
-    displacement, traction = state.displacement.copy(), state.traction.copy()
-    for own in (0, 1):
-        on_displacement, on_traction = conditions.on_displacement[:, own], conditions.on_traction[:, own]
-        value, other = conditions.value[:, own], 1 - own
-        gives = (on_displacement[:, own] != 0.0) & (on_displacement[:, other] == 0.0) & ~on_traction.any(axis=1)
-        displacement[gives, own] = value[gives] / on_displacement[gives, own]
-        gives = (on_traction[:, own] != 0.0) & ~on_displacement.any(axis=1)
-        rest = value - on_traction[:, other] * traction[:, other]
-        traction[gives, own] = rest[gives] / on_traction[gives, own]
-    traction[is_held, 1] = 0.0
-    return ContactState(displacement, traction)
-
-
 def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     product: FloatArray = np.einsum("nij,nj->ni", matrices, vectors)
     return product

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
 from bemkit.contact.condensation.dense_body import refuse_other_tangents
-from bemkit.contact.condensation.element_conditions import ElementConditions, exactly
+from bemkit.contact.condensation.element_conditions import ElementConditions
 from bemkit.contact.condensation.nodes import ContactNodes, free_motions, held_nodes
 from bemkit.contact.condensation.reduction import NoContactNodesError
 from bemkit.contact.conditions import LinearConditions, stick
@@ -202,7 +202,7 @@ class HierarchicalBody(LinearBody):
         """Elements where residuals are evaluated: half of them in contact, without any pattern."""
         n = len(self.force)
         n_points = min(n, int(np.clip(_SAMPLED_PAIRS // n, _FEWEST_SAMPLED, _MOST_SAMPLED)))
-        spread = np.modf(np.arange(1, n_points + 1) * 0.6180339887498949)[0]
+        spread = spread_fractions(n_points)
         in_contact = self.nodes.nodes[(spread[::2] * self.n_contact).astype(int)]
         return np.unique(np.concatenate([in_contact, (spread[1::2] * n).astype(int)]))
 
@@ -252,7 +252,9 @@ class HierarchicalBody(LinearBody):
                 break
             self._travelled[:] = [loaded.moved(travel)]
         response = self._elements.of_contact(state[:, :2] + traction, state[:, 2:] + moved)
-        return exactly(response, conditions, self.is_held)
+        met = conditions.with_given_tractions(response.traction)
+        met[self.is_held, 1] = 0.0
+        return ContactState(conditions.with_given_displacements(response.displacement), met)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
+from bemkit.geometry.vectors import turned_left
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, Support, free_modes, supported
 
 APPROACH_TOLERANCE = 1e-3
@@ -83,7 +84,7 @@ class ContactNodes:
 
 def contact_frame(directions: FloatArray) -> FloatArray:
     """Return the frames (n, 2, 2) of directions of contact (n, 2); see `ContactNodes`."""
-    return np.stack([directions, np.stack([-directions[:, 1], directions[:, 0]], axis=1)], axis=1)
+    return np.stack([directions, turned_left(directions)], axis=1)
 
 
 def nodes_on(space: BoundarySpace, elements: IntArray) -> tuple[IntArray, FloatArray]:

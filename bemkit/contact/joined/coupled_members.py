@@ -12,8 +12,8 @@ from scipy import sparse
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.nodes import retained_tangents
+from bemkit.contact.conditions import null_space
 from bemkit.contact.joined.member import Member, Shape, blocks_of_members, deformation, shapes_of
-from bemkit.contact.rigid_motions import null_space
 from bemkit.errors import InputError
 
 _ROUNDS = 2

@@ -136,8 +136,7 @@ class Shape:
             )
         is_symmetric = np.array_equal(stiffness, stiffness.T)
         flexibility = 0.5 * (flexibility + flexibility.T) if is_symmetric else flexibility
-        read_only(flexibility)
-        return np.asarray(flexibility)
+        return read_only(np.asarray(flexibility))
 
     @cached_property
     def column_sizes(self) -> FloatArray:

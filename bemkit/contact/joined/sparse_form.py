@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, spread_fractions
 from bemkit.contact.body import ContactState, SingularResponse
 from bemkit.contact.conditions import LinearConditions
-from bemkit.contact.joined.compliance import Compliance
 from bemkit.contact.joined.coupled_members import CoupledMembers
-from bemkit.contact.joined.sparse_solver import factored
+from bemkit.contact.joined.member import blocks_of_members
+from bemkit.errors import printable
 from bemkit.operators.linear.dense import SingularMatrixError
 
+_MISSING = "SuperLU (pip install 'bemkit[pardiso]' brings PARDISO, which is faster)"
+_OPTIONS = {1: 1, 2: 2, 8: 0, 10: 13, 11: 0, 13: 0}
+"""Nested dissection, tiny pivots enlarged by 1e-13, neither scaling nor matching: these would spoil the order, and the
+rows are scaled before. Refinement is left to the caller, who knows the matrix without its penalty."""
+
+Solve = Callable[[FloatArray], FloatArray]
 _SMALLEST_RCOND = 1e-15
 """Reciprocal condition number from which on the system counts as singular; free motions are found before."""
 _LARGEST_RESIDUAL = 1e-13
@@ -23,6 +38,119 @@ Small beside what contact gives there, or that takes many rounds; the smaller, t
 _MOST_ROUNDS = 12
 """Rounds of refinement; three are usual."""
 _TINY = float(np.finfo(float).tiny)
+
+
+def sparse_solver_name() -> str:
+    """Say in a few words which solver factors sparse contact systems, and what would be faster."""
+    return _pardiso()
+
+
+def uses_pardiso() -> bool:
+    """Whether PARDISO is installed and works."""
+    return _pardiso() == "PARDISO"
+
+
+@contextmanager
+def factored(matrix: sparse.csr_array) -> Iterator[Solve]:
+    """Factor a matrix along its diagonal, and lend the function that solves with it.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse array
+        With a diagonal that may serve as pivots, and rows of size about one.
+
+    Raises
+    ------
+    SingularMatrixError
+        If a pivot vanishes.
+    """
+    if uses_pardiso():
+        with _factored_by_pardiso(matrix) as solve:
+            yield solve
+        return
+    try:
+        factors = splu(
+            sparse.csc_array(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except RuntimeError as error:
+        raise SingularMatrixError(str(error)) from error
+    yield factors.solve
+
+
+@contextmanager
+def _factored_by_pardiso(matrix: sparse.csr_array) -> Iterator[Solve]:
+    import pypardiso
+
+    solver, plain = copy(_solver_without_matrix()), sparse.csr_matrix(matrix)
+    solver.pt, solver.iparm = np.zeros_like(solver.pt), np.zeros_like(solver.iparm)
+    for number, value in _OPTIONS.items():
+        solver.set_iparm(number, value)
+    try:
+        solver.factorize(plain)
+        yield lambda right_side: np.asarray(solver.solve(plain, right_side))
+    except pypardiso.pardiso_wrapper.PyPardisoError as error:
+        raise SingularMatrixError(str(error)) from error
+    finally:
+        solver.free_memory(everything=True)
+
+
+@cache
+def _solver_without_matrix() -> Any:
+    """Return a solver that has searched the installation for the library, which takes as long as a factorisation."""
+    import pypardiso
+
+    return pypardiso.PyPardisoSolver()
+
+
+@cache
+def _pardiso() -> str:
+    if importlib.util.find_spec("pypardiso") is None:
+        return _MISSING
+    try:
+        with _factored_by_pardiso(sparse.csr_array(np.array([[2.0, 1.0], [0.0, 4.0]]))) as solve:
+            if not np.allclose(solve(np.array([4.0, 8.0])), [1.0, 2.0]):
+                return "SuperLU (PARDISO computes wrong numbers here)"
+    except Exception as error:  # whatever a broken installation raises
+        return f"SuperLU (PARDISO does not work here: {printable(f'{type(error).__name__}: {error}')[:120]})"
+    return "PARDISO"
+
+
+@dataclass(frozen=True, eq=False)
+class Compliance:
+    """Members seen from their contact nodes: forces p and motions a move them by ``by_force p + by_motion a``.
+
+    Strain and motion stand apart: a body of large modulus that soft ones carry moves far and hardly deforms, and no
+    stiffness would tell the one from the other in the last digits.
+
+    Parameters
+    ----------
+    by_force : (2 n_contact, 2 n_contact) sparse array [1/Pa]
+    by_motion : (2 n_contact, n_motions) sparse array [-]
+    force_unit : (2 n_contact,) array [Pa]
+        E' of the partner that yields more: what makes the first array one of size one.
+    motion_unit : (n_motions,) array [1/Pa]
+        One by the E' of the member that moves.
+    """
+
+    by_force: sparse.csr_array
+    by_motion: sparse.csr_array
+    force_unit: FloatArray
+    motion_unit: FloatArray
+
+    @classmethod
+    def of(cls, joined: CoupledMembers) -> Compliance:
+        """Multiply the flexibilities of the members by their coupling."""
+        of_members = blocks_of_members(joined.shapes, lambda shape: shape.flexibility)
+        moduli = np.array([member.modulus for member in joined.members])
+        return cls(
+            sparse.csr_array(joined.relative @ of_members @ joined.relative.T),
+            sparse.csr_array(joined.felt_motions.T),
+            joined.moduli,
+            1.0 / moduli[joined.motion_owner],
+        )
 
 
 def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: LinearConditions) -> ContactState:
@@ -72,7 +200,8 @@ def sparse_response(joined: CoupledMembers, compliance: Compliance, conditions: 
     force = given.by_kept @ (row * solution[: kept.size])
     displacement = at_rest + compliance.by_force @ force + compliance.by_motion @ (motion * solution[kept.size :])
     traction = (force + given.at_rest).reshape(n, 2) / joined.weights[:, None]
-    return _exact(conditions, displacement.reshape(n, 2), traction)
+    displacement, traction = displacement.reshape(n, 2), conditions.with_given_tractions(traction)
+    return ContactState(conditions.with_given_displacements(displacement), traction)
 
 
 class _Given:
@@ -121,7 +250,7 @@ def _solved(matrix: sparse.csr_array, right_side: FloatArray, n_motions: int) ->
     scaled = sparse.csr_array((matrix.data * by_row, matrix.indices, matrix.indptr), matrix.shape)
     terms.data *= by_row
     right_side = right_side / sizes
-    probe = 0.5 + np.modf(np.arange(1, len(right_side) + 1) * 0.6180339887498949)[0]
+    probe = 0.5 + spread_fractions(len(right_side))
     right_sides, is_motion = np.stack([right_side, probe], axis=1), np.arange(len(right_side)) >= len(probe) - n_motions
     rcond = 0.0
     for penalty in _PENALTIES:
@@ -159,18 +288,3 @@ def _refined(
     except SingularMatrixError as error:
         raise SingularResponse(f"the contact conditions do not hold the bodies ({error})") from error
     return solutions, before
-
-
-def _exact(conditions: LinearConditions, displacement: FloatArray, traction: FloatArray) -> ContactState:
-    """Return the state with prescribed displacements and tractions met exactly, so that ties are decided alike."""
-    on_displacement, on_traction = conditions.on_displacement, conditions.on_traction
-    for row in (0, 1):
-        own, other = on_displacement[:, row, row], on_displacement[:, row, 1 - row]
-        is_met = (own != 0.0) & (other == 0.0) & ~np.any(on_traction[:, row] != 0.0, axis=1)
-        displacement[is_met, row] = conditions.value[is_met, row] / own[is_met]
-    for row in (0, 1):
-        own = on_traction[:, row, row]
-        is_met = (own != 0.0) & ~np.any(on_displacement[:, row] != 0.0, axis=1)
-        rest = conditions.value[:, row] - on_traction[:, row, 1 - row] * traction[:, 1 - row]
-        traction[is_met, row] = rest[is_met] / own[is_met]
-    return ContactState(displacement, traction)

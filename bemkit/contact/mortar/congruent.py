@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bemkit.arrays import IntArray
+from bemkit.arrays import IntArray, spread_fractions
 from bemkit.contact.mortar.coupling import MortarCoupling, couple
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.geometry.mesh import BoundaryMesh
@@ -81,7 +81,7 @@ def stand_alike(one: tuple[BoundaryMesh, Placement], two: tuple[BoundaryMesh, Pl
 def _shape(mesh: BoundaryMesh, placement: Placement, size: float) -> tuple[float, ...]:
     """Return what copies of a mesh share: the array of elements, and weighted sums of places in their own axes."""
     points = np.concatenate([mesh.start, mesh.centres])
-    weights = np.modf(np.arange(1, len(points) + 1) * 0.6180339887498949)[0]
+    weights = spread_fractions(len(points))
     sums = placement.turned_back(weights @ (points - points[0]))
     return id(mesh.elements), *np.round(sums / size, _DIGITS_OF_SUMS).tolist()
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
-from bemkit.contact.mortar.overlap import faces_away
-from bemkit.contact.mortar.sides import ContactSide
+from bemkit.contact.mortar.sides import ContactSide, faces_away
 from bemkit.geometry.vectors import cross, norms, turned_right
 
 _LEAST_OPPOSITION = 0.5

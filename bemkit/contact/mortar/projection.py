@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.contact.mortar.sides import ContactSide
-from bemkit.geometry.vectors import angles_between, cross, norms
+from bemkit.geometry.vectors import angles_between, cross, norms, turned_left
 
 _MOST_STEPS = 100
 _MOST_PASSES = 8
@@ -141,5 +141,5 @@ def mean_directions(non_mortar: ContactSide, mortar: ContactSide, reach: float) 
         if np.abs(half - before).max() <= _SETTLED:
             break
         cosine, sine = np.cos(half)[:, None], np.sin(half)[:, None]
-        directions = cosine * normals + sine * np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+        directions = cosine * normals + sine * turned_left(normals)
     return directions

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.contact.mortar.overlap import faces_away
 from bemkit.contact.mortar.projection import bracketed_roots, meeting_points, project
-from bemkit.contact.mortar.sides import ContactSide
+from bemkit.contact.mortar.sides import ContactSide, faces_away
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import cross
 

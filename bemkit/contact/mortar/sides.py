@@ -1,4 +1,4 @@
-"""One side of a contact: elements of one body in order, and directions that turn continuously along them."""
+"""One side of a contact: elements of a body in order, directions that turn continuously along them, what is behind."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.geometry.vectors import norms, turned_right
+from bemkit.geometry.vectors import angles_between, norms, turned_right
 
 _RESOLUTION = 32.0 * np.finfo(float).eps
 """Positions that differ by less than this share of the largest coordinate are the same."""
@@ -203,3 +203,38 @@ class ContactSide:
         values = at_knots[self.knot_numbers[rows]]
         vectors = np.matmul(basis.reshape(-1, *xi.shape).transpose(1, 2, 0), values)
         return np.asarray(vectors / norms(vectors)[..., None])
+
+
+def encloses(mesh: BoundaryMesh, points: FloatArray) -> BoolArray:
+    """Return (k,) bool: whether the body bounded by the chords of a mesh contains points (k, 2), by winding numbers."""
+    whole = mesh.whole
+    to_points = points[:, None]
+    angles = angles_between(whole.start - to_points, whole.end - to_points).sum(axis=1)
+    return np.asarray(angles > (-np.pi if mesh.is_exterior else np.pi))
+
+
+def faces_away(
+    one: BoundaryMesh, two: BoundaryMesh, middle: FloatArray, distance: FloatArray, slack: FloatArray
+) -> BoolArray:
+    """Find places where sides lie behind each other although their bodies do not overlap.
+
+    Parameters
+    ----------
+    one, two : BoundaryMesh
+    middle : (k, 2) array [m]
+        Halfway between a point of the first side and what it is projected onto on the second one.
+    distance : (k,) array [m]
+        From the one to the other along the direction out of the first body.
+    slack : (k,) array [m]
+        Depth of an overlap that is not looked into, because coordinates or chords do not resolve it.
+
+    Returns
+    -------
+    (k,) bool array
+        Where the distance is negative and the middle does not belong to both bodies.
+    """
+    behind = np.flatnonzero(distance < -slack)
+    result = np.zeros(len(middle), bool)
+    if behind.size:
+        result[behind] = ~(encloses(one, middle[behind]) & encloses(two, middle[behind]))
+    return result

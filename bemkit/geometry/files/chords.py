@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.drawn import ArcTo, LineTo, Point, SplineTo
-from bemkit.geometry.files.strokes import Stroke, StrokeSide
+from bemkit.geometry.drawn import ArcTo, LineTo, SplineTo
+from bemkit.geometry.files.strokes import Stroke, StrokeSide, pair
 from bemkit.geometry.vectors import angles_between, cross, norms
 
 CORNER_ANGLE = 25.0
@@ -95,14 +95,14 @@ def _corners(turns: FloatArray, is_inner: BoolArray, corner_angles: FloatArray) 
 def _closed(loop: ChordLoop) -> Stroke | None:
     """Return the one closed curve that a chain without corners is, or None if a part of it is straight or an arc."""
     points = loop.points
-    group, start = loop.names[0], _pair(points[0])
+    group, start = loop.names[0], pair(points[0])
     n = len(points)
     if _is_on_circle(points, (0, n // 3, 2 * n // 3)):
         opposite = _circle_centre(points, (0, n // 3, 2 * n // 3)) * 2.0 - points[0]
-        return Stroke(start, ArcTo(start, _pair(opposite), group=group))
+        return Stroke(start, ArcTo(start, pair(opposite), group=group))
     pieces = fitted_strokes(np.concatenate([points, points[:1]]), group)
     if len(pieces) == 1 and isinstance(pieces[0].side, SplineTo):
-        return Stroke(start, SplineTo(start, tuple(map(_pair, points[1:])), group=group))
+        return Stroke(start, SplineTo(start, tuple(map(pair, points[1:])), group=group))
     return None
 
 
@@ -113,7 +113,7 @@ def fitted_strokes(points: FloatArray, group: str) -> list[Stroke]:
 
     def end_rest(last: int) -> None:
         if last > rest:
-            start, *inner, end = map(_pair, points[rest : last + 1])
+            start, *inner, end = map(pair, points[rest : last + 1])
             side: StrokeSide = SplineTo(end, tuple(inner), group=group) if inner else LineTo(end, group=group)
             strokes.append(Stroke(start, side))
 
@@ -121,16 +121,16 @@ def fitted_strokes(points: FloatArray, group: str) -> list[Stroke]:
         line = _longest(points, first, _is_straight)
         arc = _longest(points, first, _is_arc)
         if line - first >= 2 and line >= arc:
-            side: StrokeSide = LineTo(_pair(points[line]), group=group)
+            side: StrokeSide = LineTo(pair(points[line]), group=group)
             last = line
         elif arc - first >= _LEAST_ARC_CHORDS:
-            side = ArcTo(_pair(points[arc]), _pair(points[(first + arc) // 2]), group=group)
+            side = ArcTo(pair(points[arc]), pair(points[(first + arc) // 2]), group=group)
             last = arc
         else:
             first += 1
             continue
         end_rest(first)
-        strokes.append(Stroke(_pair(points[first]), side))
+        strokes.append(Stroke(pair(points[first]), side))
         rest = first = last
     end_rest(n)
     return strokes
@@ -191,7 +191,3 @@ def note_on_curves(strokes: Sequence[Stroke]) -> str:
     counts = [(n_arcs, "arc"), (len(curved) - n_arcs, "spline")]
     words = " and ".join(f"{count} {word}{'s' if count > 1 else ''}" for count, word in counts if count)
     return f"{words} through the ends of straight pieces of the mesh"
-
-
-def _pair(point: FloatArray) -> Point:
-    return float(point[0]), float(point[1])

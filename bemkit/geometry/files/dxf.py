@@ -17,8 +17,7 @@ from bemkit.errors import printable
 from bemkit.formulas import closest
 from bemkit.geometry.drawn import ArcTo, LineTo, Point
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.files.free_form import ellipse_strokes, nurbs_strokes
-from bemkit.geometry.files.strokes import Stroke
+from bemkit.geometry.files.strokes import Stroke, ellipse_strokes, nurbs_strokes
 
 _UNITS: Mapping[int, str] = MappingProxyType({1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 13: "um"})
 """Units of length by their number in the header of a DXF file."""

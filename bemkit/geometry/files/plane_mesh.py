@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.files.chords import ChordLoop
+from bemkit.geometry.files.strokes import closed_chains
 from bemkit.geometry.vectors import cross
 
 _PLANE = 1e-9
@@ -80,6 +81,9 @@ class _Edge:
     nodes: tuple[int, ...]
     name: str = ""
     curve: int = 0
+
+    def reversed(self) -> _Edge:
+        return _Edge(self.nodes[::-1], self.name, self.curve)
 
 
 def in_plane(points: FloatArray) -> FloatArray:
@@ -185,31 +189,19 @@ def _mixed_senses(edges: Sequence[_Edge]) -> list[str]:
 
 def _chained(points: FloatArray, edges: Sequence[_Edge]) -> list[ChordLoop]:
     """Follow edges around, each node of which two share."""
-    at_node: dict[int, list[int]] = {}
-    for k, edge in enumerate(edges):
-        for node in (edge.nodes[0], edge.nodes[-1]):
-            at_node.setdefault(node, []).append(k)
-    for node, there in at_node.items():
-        if len(there) != 2:
-            raise GeometryError(
-                f"{len(there)} lines of its boundary meet at {format_point(points[node])}: the boundary must be closed "
-                "and simple, two lines at each node; leave lines inside the body out, or write its triangles too"
-            )
-    is_seen = [False] * len(edges)
-    loops = []
-    for first in range(len(edges)):
-        chain, k, node = [], first, edges[first].nodes[0]
-        while not is_seen[k]:
-            is_seen[k] = True
-            edge = edges[k]
-            nodes = edge.nodes if edge.nodes[0] == node else edge.nodes[::-1]
-            chain.append(_Edge(nodes, edge.name, edge.curve))
-            node = nodes[-1]
-            one, other = at_node[node]
-            k = other if one == k else one
-        if chain:
-            loops.append(_chord_loop(points, chain))
-    return loops
+    nodes, place, count = np.unique(
+        np.array([(edge.nodes[0], edge.nodes[-1]) for edge in edges]), return_inverse=True, return_counts=True
+    )
+    if (wrong := np.flatnonzero(count != 2)).size:
+        raise GeometryError(
+            f"{count[wrong[0]]} lines of its boundary meet at {format_point(points[nodes[wrong[0]]])}: the boundary "
+            "must be closed and simple, two lines at each node; leave lines inside the body out, or write its "
+            "triangles too"
+        )
+    return [
+        _chord_loop(points, [edges[k] if ahead else edges[k].reversed() for k, ahead in chain])
+        for chain in closed_chains(place.reshape(-1, 2))
+    ]
 
 
 def _chord_loop(points: FloatArray, chain: Sequence[_Edge]) -> ChordLoop:

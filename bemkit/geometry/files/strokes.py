@@ -1,10 +1,12 @@
-"""Strokes: the lines and curves of a file, in any order and sense, joined to closed loops."""
+"""Strokes: the lines and curves of a file, free-form ones exactly, in any order and sense, joined to closed loops."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -12,13 +14,16 @@ import numpy as np
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.drawn import ArcTo, LineTo, Loop, NurbsTo, Point, SplineTo
 from bemkit.geometry.errors import GeometryError, format_point
-from bemkit.geometry.vectors import cross, norms
+from bemkit.geometry.nurbs import conic_arc
+from bemkit.geometry.vectors import cross, enclosed_area, norms
 
 StrokeSide: TypeAlias = LineTo | ArcTo | SplineTo | NurbsTo
 
 _SEEN = np.linspace(0.0, 1.0, 17)
 _ROUND_OFF = 1e-12
 """Gaps, relative to the coordinates, that are not worth a word."""
+_STRAIGHT = 1e-9
+"""Distance of control points from the chord of what is a line, relative to the chord."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +125,11 @@ def join_strokes(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[list
     strokes = [
         _with_ends(stroke, *places[pair]) for stroke, pair in zip(strokes, place_of_end.reshape(-1, 2), strict=True)
     ]
-    return [*closed, *_followed(strokes, place_of_end.reshape(-1, 2))], notes
+    chains = closed_chains(place_of_end.reshape(-1, 2))
+    return [
+        *closed,
+        *([strokes[k] if ahead else strokes[k].reversed() for k, ahead in chain] for chain in chains),
+    ], notes
 
 
 def _without_repeated(strokes: Sequence[Stroke], tolerance: float) -> tuple[list[Stroke], list[str]]:
@@ -190,23 +199,24 @@ def _with_ends(stroke: Stroke, start: FloatArray, end: FloatArray) -> Stroke:
     return Stroke(ends[0], replace(stroke.side, to=ends[1]))
 
 
-def _followed(strokes: Sequence[Stroke], pairs: IntArray) -> list[list[Stroke]]:
-    """Follow strokes from place to place, each of which two strokes share."""
-    by_place = np.argsort(pairs.ravel(), kind="stable").reshape(-1, 2) // 2
-    is_seen = np.zeros(len(strokes), dtype=bool)
-    loops = []
-    for first in range(len(strokes)):
-        loop, number, place = [], first, int(pairs[first, 0])
+def closed_chains(ends: IntArray) -> Iterator[list[tuple[int, bool]]]:
+    """Yield the closed chains of links whose ends (n, 2) are numbered so that two links share each.
+
+    Each as the numbers of its links in order, and whether the link is followed from its first end to its second.
+    """
+    by_end = np.argsort(ends.ravel(), kind="stable").reshape(-1, 2) // 2
+    is_seen = np.zeros(len(ends), dtype=bool)
+    for first in range(len(ends)):
+        chain, number, end = [], first, int(ends[first, 0])
         while not is_seen[number]:
             is_seen[number] = True
-            starts_here = int(pairs[number, 0]) == place
-            loop.append(strokes[number] if starts_here else strokes[number].reversed())
-            place = int(pairs[number, 1 if starts_here else 0])
-            one, other = by_place[place].tolist()
+            is_ahead = int(ends[number, 0]) == end
+            chain.append((number, is_ahead))
+            end = int(ends[number, 1 if is_ahead else 0])
+            one, other = by_end[end].tolist()
             number = other if one == number else one
-        if loop:
-            loops.append(loop)
-    return loops
+        if chain:
+            yield chain
 
 
 def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
@@ -215,7 +225,7 @@ def named_loops(loops: Sequence[list[Stroke]]) -> tuple[Loop, ...]:
     Sides of a name of the file keep it; several of one name are numbered and have it as their group. Sides without
     a name are ``side-1``, ``side-2``, ... along the loops, each of which begins at its lower left corner.
     """
-    areas = [_signed_area(loop) for loop in loops]
+    areas = [enclosed_area(np.concatenate([stroke.points for stroke in loop])) for loop in loops]
     outer = int(np.argmax(np.abs(areas)))
     turned = [
         loop if (area > 0.0) == (k == outer) else [stroke.reversed() for stroke in loop[::-1]]
@@ -253,15 +263,85 @@ def _names(groups: Sequence[str]) -> list[str]:
     return names
 
 
-def _signed_area(loop: Sequence[Stroke]) -> float:
-    points = np.concatenate([stroke.points for stroke in loop])
-    arms = points - points[0]
-    return float(0.5 * cross(arms, np.roll(arms, -1, axis=0)).sum())
-
-
 def _from_lower_left(loop: list[Stroke]) -> list[Stroke]:
     starts = np.array([stroke.start for stroke in loop])
     size = float(np.ptp(starts, axis=0).max()) or 1.0
     low = np.round((starts.sum(axis=1) - starts.sum(axis=1).min()) / size, 9)
     first = int(np.lexsort((starts[:, 1], low))[0])
     return [*loop[first:], *loop[:first]]
+
+
+def ellipse_strokes(
+    centre: FloatArray, first: FloatArray, second: FloatArray, start: float, end: float, group: str
+) -> list[Stroke]:
+    """Return the arc centre + cos(t) first + sin(t) second, t = start ... end [rad], a quarter at a time."""
+    n = max(1, math.ceil(abs(end - start) / (0.5 * math.pi) - 1e-9))
+    ends = np.linspace(start, end, n + 1)
+    strokes = []
+    for k in range(n):
+        arc = conic_arc(centre, first, second, float(ends[k]), float(ends[k + 1]))
+        begin, middle, finish = map(pair, arc.points)
+        weights = tuple(float(weight) for weight in arc.weights)
+        strokes.append(Stroke(begin, NurbsTo(finish, (middle,), weights=weights, group=group)))
+    return strokes
+
+
+def bezier_stroke(points: FloatArray, group: str) -> Stroke:
+    """Return a Bezier curve of control points (n, 2) [m], as a line if it is one."""
+    start, *inner, end = map(pair, points)
+    chord, arms = points[-1] - points[0], points[1:] - points[0]
+    along, length = np.append(0.0, arms @ chord), float(norms(chord))
+    is_line = (np.diff(along) >= 0.0).all() and np.abs(cross(chord, arms)).max() <= _STRAIGHT * length * length
+    return Stroke(start, LineTo(end, group=group) if is_line else NurbsTo(end, tuple(inner), group=group))
+
+
+def nurbs_strokes(points: FloatArray, degree: int, knots: FloatArray, weights: FloatArray, group: str) -> list[Stroke]:
+    """Return a rational B-spline as smooth strokes: cut where its knots let it have a kink.
+
+    Knots need not be repeated at the ends, as those of closed curves are not.
+    """
+    if len(knots) != len(points) + degree + 1 or (np.diff(knots) < 0.0).any() or not (weights > 0.0).all():
+        raise GeometryError(
+            f"a spline has {len(knots)} knots for {len(points)} control points and degree {degree}: draw it anew"
+        )
+    values = np.column_stack([points * weights[:, None], weights])
+    low, high = knots[degree], knots[-degree - 1]
+    inner = knots[(knots > low) & (knots < high)]
+    kinks = sorted({float(knot) for knot in inner if np.count_nonzero(inner == knot) >= degree})
+    for knot in (low, *kinks, high):
+        knots, values = _inserted(knots, values, degree, float(knot))
+    strokes = []
+    cuts = [float(low), *kinks, float(high)]
+    for begin, end in pairwise(cuts):
+        # the first control point that counts from a knot repeated as often as the degree lies on the curve
+        first = int(np.searchsorted(knots, begin, side="right")) - degree - 1
+        last = int(np.searchsorted(knots, end, side="left")) - 1
+        own = values[first : last + 1]
+        between = knots[(knots > begin) & (knots < end)]
+        own_knots = (begin,) * (degree + 1) + tuple(map(float, between)) + (end,) * (degree + 1)
+        own_points, own_weights = own[:, :2] / own[:, 2:], own[:, 2]
+        is_plain = bool(np.ptp(own_weights) == 0.0)
+        if len(own) == degree + 1 and is_plain:
+            strokes.append(bezier_stroke(own_points, group))
+            continue
+        start, *middle, to = map(pair, own_points)
+        kept = None if is_plain else tuple(map(float, own_weights))
+        strokes.append(Stroke(start, NurbsTo(to, tuple(middle), degree, own_knots, kept, group=group)))
+    return strokes
+
+
+def _inserted(knots: FloatArray, values: FloatArray, degree: int, knot: float) -> tuple[FloatArray, FloatArray]:
+    """Repeat a knot until its multiplicity is the degree, by Boehm's algorithm; the curve stays the same."""
+    while (multiplicity := int(np.count_nonzero(knots == knot))) < degree:
+        last = int(np.searchsorted(knots, knot, side="right")) - 1
+        changed = np.arange(last - degree + 1, last - multiplicity + 1)
+        ratio = ((knot - knots[changed]) / (knots[changed + degree] - knots[changed]))[:, None]
+        inner = ratio * values[changed] + (1.0 - ratio) * values[changed - 1]
+        values = np.concatenate([values[: changed[0]], inner, values[last - multiplicity :]])
+        knots = np.insert(knots, last + 1, knot)
+    return knots, values
+
+
+def pair(point: FloatArray) -> Point:
+    """Return the coordinates of a point (2,)."""
+    return float(point[0]), float(point[1])

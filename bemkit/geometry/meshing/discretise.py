@@ -1,18 +1,122 @@
-"""From an outline to a mesh: the user's parts, the user's number of elements."""
+"""From an outline to a mesh: the user's parts, the user's number of elements, and how these are spaced along a piece.
 
+Where a long element follows a short one, the nodal force between them belongs to the long one, and the traction that is
+found from it on the short one is wrong by a share that grows with the ratio of their lengths. So lengths grow gradually
+away from a densely divided neighbour, unless a grading says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.grading import Grading, Uniform
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.division import Division, divide
-from bemkit.geometry.meshing.transition import gradual_positions
-from bemkit.geometry.outline import Outline
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
+
+ALIKE = 1.2
+"""Ratio of two neighbouring element lengths up to which nothing is done."""
+GROWTH = 0.3
+"""Growth of the element length per length of boundary, unless there are too few elements for so little."""
+TIE = 1e-6
+"""A neighbour has shorter elements if they are shorter by more than this share: lengths hold few digits far away."""
+LARGEST_STRETCH = 2.0
+"""No element is longer than this many times the mean of its piece."""
+
+
+class Grading(Protocol):
+    """A rule for spacing elements."""
+
+    def positions(self, n: int) -> FloatArray:
+        """Return where `n` elements begin and end along a piece.
+
+        Parameters
+        ----------
+        n : int
+            Number of elements, at least one.
+
+        Returns
+        -------
+        (n + 1,) array
+            Fractions of the length of the piece, strictly increasing from 0 to 1.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Elements of equal length."""
+
+    def positions(self, n: int) -> FloatArray:
+        """Return equidistant fractions."""
+        return np.arange(n + 1) / n
+
+
+@dataclass(frozen=True)
+class Algebraic:
+    """Elements that shrink towards both ends like a power of the distance.
+
+    Parameters
+    ----------
+    exponent : float
+        Power of grading; 1 is uniform, 2 to 4 suit corners and edges of contact.
+    """
+
+    exponent: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.exponent) and self.exponent >= 1.0):
+            raise GeometryError(f"Algebraic: exponent is {self.exponent}: give a finite number of at least 1")
+
+    def positions(self, n: int) -> FloatArray:
+        """Return fractions (2 t)^exponent / 2 on the first half, mirrored on the second."""
+        half = np.arange(n // 2 + 1) / n
+        return _mirrored(0.5 * (2.0 * half) ** self.exponent, n)
+
+
+@dataclass(frozen=True)
+class Geometric:
+    """Elements that shrink by a constant ratio towards both ends, and are equal between.
+
+    Parameters
+    ----------
+    ratio : float
+        Length of an element over that of its larger neighbour, between 0 and 1.
+    levels : int
+        Number of times the length shrinks on the way to either end; the ends have elements ratio**levels times as long
+        as the middle. With fewer than 2 levels + 1 elements the largest ones are left out.
+    """
+
+    ratio: float = 0.5
+    levels: int = 8
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.ratio < 1.0:
+            raise GeometryError(f"Geometric: ratio is {self.ratio}: give a number between 0 and 1")
+        if not isinstance(self.levels, int | np.integer) or self.levels < 0:
+            raise GeometryError(f"Geometric: levels is {self.levels}: give a whole number, zero or more")
+
+    def positions(self, n: int) -> FloatArray:
+        """Return the partial sums of the geometric lengths."""
+        from_end = np.minimum(np.arange(n), np.arange(n)[::-1])
+        lengths = float(self.ratio) ** np.maximum(self.levels - from_end, 0)
+        half = np.concatenate([[0.0], np.cumsum(lengths[: n // 2])])
+        return _mirrored(half / lengths.sum(), n)
+
+
+def _mirrored(half: FloatArray, n: int) -> FloatArray:
+    """Complete the first n // 2 + 1 of n + 1 fractions, so that both halves mirror each other to round-off."""
+    if n % 2 == 0:
+        half = np.append(half[:-1], 0.5)
+        return np.concatenate([half, 1.0 - half[-2::-1]])
+    return np.concatenate([half, 1.0 - half[::-1]])
 
 
 def discretise(
@@ -157,3 +261,54 @@ def _check_sides_divided(density: Mapping[str, float], half: Division) -> None:
                 f"discretise: density names the side {side!r}, which lies beyond the symmetry lines ({half.symmetry}) "
                 f"and mirrors what is divided: name its image among the sides {', '.join(sorted(divided))}"
             )
+
+
+def gradual_positions(n: int, before: float, after: float) -> FloatArray:
+    """Return where `n` elements begin and end along a piece between neighbours that may be divided more densely.
+
+    Parameters
+    ----------
+    n : int
+        Number of elements, at least one.
+    before, after : float
+        Lengths of the elements next to the piece, in units of its own length; infinite if there are none.
+
+    Returns
+    -------
+    (n + 1,) array
+        Fractions of the length of the piece, increasing from 0 to 1; uniform where the neighbours are alike.
+
+    Notes
+    -----
+    At the distances s and 1 - s from its ends the elements have the length ``min(H, a + g s, b + g (1 - s))``, where a
+    and b are those of the neighbours: with constant tractions, twice that length at a roller costs the pressure there
+    an order.
+    """
+    own = (1.0 - TIE) / n
+    if n == 1 or min(before, after) >= own / ALIKE:
+        return np.arange(n + 1) / n
+    start, end = (length if length < own else LARGEST_STRETCH / n for length in (before, after))
+    growth = GROWTH
+    while _count(LARGEST_STRETCH / n, start, end, growth) > n:
+        growth *= 1.5
+    shortest, longest = 1.0 / n, LARGEST_STRETCH / n
+    for _ in range(60):  # bisection to round-off
+        middle = 0.5 * (shortest + longest)
+        shortest, longest = (middle, longest) if _count(middle, start, end, growth) > n else (shortest, middle)
+    # the number of elements up to a place is the integral of 1 / length, by sums that crowd where lengths are short
+    even = np.linspace(0.0, 1.0, 64 * n + 1)
+    near_start, near_end = (size * np.expm1(even * math.log1p(1.0 / size)) for size in (start, end))
+    s = np.unique(np.clip(np.concatenate([even, near_start, 1.0 - near_end]), 0.0, 1.0))
+    density = 1.0 / np.minimum(longest, np.minimum(start + growth * s, end + growth * (1.0 - s)))
+    count = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(s) * (density[1:] + density[:-1]))])
+    return np.asarray(np.interp(np.arange(n + 1) / n, count / count[-1], s))
+
+
+def _count(longest: float, start: float, end: float, growth: float) -> float:
+    """Return the number of elements if the longest have a given length."""
+    start, end = min(start, longest), min(end, longest)
+    level = 1.0 - (2.0 * longest - start - end) / growth
+    if level < 0.0:
+        peak = 0.5 * (start + end + growth)
+        return math.log(peak * peak / (start * end)) / growth
+    return math.log(longest * longest / (start * end)) / growth + level / longest

@@ -8,11 +8,10 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError, format_point
+from bemkit.geometry.loops import following_in_loops
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.selection import N_SAMPLES, Selection, breakpoints, merge_breakpoints
+from bemkit.geometry.outline import N_SAMPLES, Outline, Selection, Side, breakpoints, merge_breakpoints
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.geometry.validity.loops import following_in_loops
 from bemkit.geometry.vectors import norms
 
 _INNER = np.array([0.25, 0.5, 0.75])

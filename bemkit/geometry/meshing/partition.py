@@ -12,8 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import share_elements
 from bemkit.geometry.meshing.division import Division, Piece, divide
-from bemkit.geometry.outline import Outline
-from bemkit.geometry.selection import Selection
+from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.geometry.vectors import norms
 

@@ -9,11 +9,11 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import projector
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.assembled.contacts import ContactRows
 from bemkit.model.assembled.placed import PlacedBody
-from bemkit.model.boundary_tractions import projector
 
 _REACHED = 1e-12
 """Share of the largest coupling from which on a node takes part; less is round-off of places where meshes meet."""

@@ -14,15 +14,13 @@ from bemkit.contact.body import ContactState
 from bemkit.contact.joined.joined_bodies import JoinedBodies
 from bemkit.contact.joined.member import Member, diagonal_blocks
 from bemkit.contact.problem import ContactProblem
-from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly
 from bemkit.model.assembled.rigid import motion_units, rigid_members, rigid_motions
 from bemkit.model.assembled.shapes import condensed_shapes
-from bemkit.model.boundary_tractions import insert_loads
+from bemkit.model.contact_model import elastic_energy, insert_loads
 from bemkit.model.units import Units
 from bemkit.operators.counts import OperationCounts
-from bemkit.operators.rigid_modes import without_motion
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, HeavyElasticity, condensed_under
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes, supporting_forces
@@ -160,7 +158,9 @@ class AssembledModel:
                 traction[elements] = values
             touching = self.prepared.assembly.contact_parts(body.body)
             insert_loads(traction, body.scene, body.mesh, traction_space, touching)
-            energy = _energy(body, elastic, displacement, force) * self.prepared.force_unit * units.displacement
+            energy = (
+                elastic_energy(elastic, body.own_space, displacement, force) * prepared.force_unit * units.displacement
+            )
             fields.append((body.to_place(displacement) * units.displacement, traction, energy))
         return fields
 
@@ -187,16 +187,6 @@ class AssembledModel:
                 motion[is_driven] = next(unknowns) * units.displacement / motion_units(units)[is_driven]
             found.append((motion, reaction))
         return found
-
-
-def _energy(body: PlacedBody, elastic: SteklovPoincare, displacement: FloatArray, force: FloatArray) -> float:
-    """Return the elastic energy of a body, dimensionless; see `bemkit.model.contact_model.Model.boundary_fields`."""
-    beyond = 0.0
-    if isinstance(elastic, HeavyElasticity):
-        beyond = elastic.energy_beyond(displacement, force)
-        displacement, force = displacement - elastic.inside.displacement, force - elastic.inside.force
-    strained = without_motion(body.own_mesh.unit, dof_points(body.own_space), displacement)
-    return 0.5 * float(np.sum(strained * force)) + beyond
 
 
 def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None = None) -> AssembledModel:

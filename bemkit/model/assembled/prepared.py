@@ -11,15 +11,14 @@ import numpy as np
 from scipy import sparse
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.contact.further_laws import PiecewiseLaw
 from bemkit.contact.laws import FrictionLaw, Frictionless, LawOfCoefficients
-from bemkit.contact.piecewise_law import PiecewiseLaw
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.assembled.contact_tractions import ContactSpread
-from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts
-from bemkit.model.assembled.obstacles import obstacle_rows
+from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.particular import particular_solution
 from bemkit.model.prepared import linear_solver_of, nodal_forces, supports_on
@@ -30,7 +29,7 @@ from bemkit.operators.steklov_poincare.needs import BodyCase
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, supported
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body_forces import BodyForce, seen_from
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +218,7 @@ def find_common_units(assembly: Assembly, bodies: Sequence[PlacedBody]) -> Units
     numbers = {body.name: body for body in bodies}
     length = max(body.mesh.diameter for body in bodies)
     moduli = [
-        1.0 / sum(1.0 / numbers[side.split(".", 1)[0]].material.plane_modulus for side in pair.elastic_sides)
+        1.0 / sum(1.0 / numbers[body].material.plane_modulus for body, _ in pair.elastic_parts)
         for pair in assembly.contacts
     ]
     modulus = min(moduli, default=max(body.material.plane_modulus for body in bodies))

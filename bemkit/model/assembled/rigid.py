@@ -9,7 +9,7 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.joined.member import Member
 from bemkit.model.assembled.prepared import PreparedAssembly
 from bemkit.model.units import Units
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 
 
 def motion_units(units: Units) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.validity.chords import RESOLUTION
+from bemkit.geometry.pieces import RESOLUTION
 from bemkit.operators.hierarchy.clusters import Clusters, consecutive
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.somigliana.moments import CurvedElements

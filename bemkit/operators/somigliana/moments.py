@@ -24,8 +24,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.pieces import derivative_on, evaluate_curves, point_on
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.validity.chords import derivative_on, evaluate_curves, point_on
 from bemkit.operators import kernels
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.integrals.splitting import SEPARATION, split_until

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bemkit.errors import InputError
-from bemkit.geometry.grading import Algebraic, Grading, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Grading, Uniform
 from bemkit.reference.compare import MEASURES, Reference, answer_of, errors_of
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run as solve

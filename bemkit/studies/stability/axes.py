@@ -14,8 +14,8 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.laws import Coulomb
 from bemkit.contact.obstacle import Gap, HalfPlane
 from bemkit.errors import InputError
-from bemkit.geometry.grading import Uniform
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import Uniform
 from bemkit.geometry.shapes import Rectangle
 from bemkit.geometry.spaces import ConstantSpace
 from bemkit.operators.boundary import single_layer
@@ -24,8 +24,8 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
-from bemkit.scene.far_field import FarField
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset, with_turned_loads
 from bemkit.solvers.alm import AugmentedLagrangian

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bemkit.contact.laws import Coulomb, Tresca
-from bemkit.contact.limit_load import largest_factor
 from bemkit.contact.problem import ContactProblem
-from bemkit.contact.solvability import find_unsolvable_load
+from bemkit.contact.solvability import find_unsolvable_load, largest_factor
 from bemkit.solvers.base import Status, solve
 from bemkit.solvers.ssn import SemismoothNewton
 from tests.contact.joined.blocks import arch, joined, rectangle, wall

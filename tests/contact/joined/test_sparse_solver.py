@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.joined import sparse_solver
-from bemkit.contact.joined.sparse_solver import factored, sparse_solver_name, uses_pardiso
+from bemkit.contact.joined import sparse_form
+from bemkit.contact.joined.sparse_form import factored, sparse_solver_name, uses_pardiso
 from bemkit.operators.linear.dense import SingularMatrixError
 
 MATRIX = sparse.csr_array(np.array([[2.0, 1.0, 0.0], [0.0, 4.0, -1.0], [1.0, 0.0, -1e-8]]))
@@ -17,10 +17,10 @@ MATRIX = sparse.csr_array(np.array([[2.0, 1.0, 0.0], [0.0, 4.0, -1.0], [1.0, 0.0
 @pytest.fixture
 def asked_anew():
     """Let the search for PARDISO begin anew, and forget what a test has made it find."""
-    for found in (sparse_solver._pardiso, sparse_solver._solver_without_matrix):
+    for found in (sparse_form._pardiso, sparse_form._solver_without_matrix):
         found.cache_clear()
     yield
-    for found in (sparse_solver._pardiso, sparse_solver._solver_without_matrix):
+    for found in (sparse_form._pardiso, sparse_form._solver_without_matrix):
         found.cache_clear()
 
 
@@ -63,7 +63,7 @@ def test_pardiso_gives_what_superlu_gives(asked_anew, monkeypatch):
     assert sparse_solver_name() == "PARDISO"
     with factored(matrix) as solve:
         by_pardiso = solve(right_sides)
-    sparse_solver._pardiso.cache_clear()
+    sparse_form._pardiso.cache_clear()
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with factored(matrix) as solve:
         by_superlu = solve(right_sides)

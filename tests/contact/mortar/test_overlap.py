@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bemkit.contact.mortar.overlap import encloses, faces_away
+from bemkit.contact.mortar.sides import encloses, faces_away
 from bemkit.geometry.curves import Arc
 from bemkit.geometry.mesh import BoundaryMesh
 from tests.contact.mortar.pairs import block, chain

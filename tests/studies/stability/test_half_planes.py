@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bemkit as bk
-from bemkit.geometry.grading import Geometric
+from bemkit.geometry.meshing.discretise import Geometric
 from bemkit.operators.half_plane.flexibility import mean_logarithms
 from bemkit.scene.transform import with_turned_loads
 from bemkit.studies.stability.axes import AXES, find_axes

@@ -26,7 +26,7 @@ import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.material import Plane
-from bemkit.scene.far_field import FarField
+from bemkit.scene.plane_motion import FarField
 from bemkit.studies.stability.independent_check.boundary import trusted_stress
 from bemkit.studies.stability.independent_check.nodes import Fields
 

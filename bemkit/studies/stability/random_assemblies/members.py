@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
-from bemkit.geometry.grading import Algebraic, Uniform
+from bemkit.contact.further_laws import CohesiveCoulomb
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
+from bemkit.geometry.meshing.discretise import Algebraic, Uniform
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material, Plane

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.history_laws import RateStrengthening, SlipWeakening
-from bemkit.contact.laws import CohesiveCoulomb, Coulomb, FrictionLaw, Frictionless, Tresca
+from bemkit.contact.further_laws import CohesiveCoulomb, RateStrengthening, SlipWeakening
+from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.contact.spline import SplineObstacle
@@ -22,7 +22,7 @@ from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
 from bemkit.scene.conditions import Condition, Contact, Part, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.copies import CircleCopies, Copies, GridCopies, ListedCopies
 from bemkit.scene.load_history import with_changed_steps
-from bemkit.scene.rigid_body import RigidBody
+from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.transform import AffineMap, TransformedRegion
 
 

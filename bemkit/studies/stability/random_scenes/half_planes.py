@@ -12,7 +12,7 @@ from bemkit.contact.obstacle import Circle, Gap, HalfPlane, Obstacle
 from bemkit.contact.polygon import PolygonalObstacle
 from bemkit.contact.rough_profile import SelfAffineProfile
 from bemkit.formulas import Expression
-from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import HalfPlaneBody, PeriodicHalfPlaneBody, Shape
 from bemkit.operators.material import Material
 from bemkit.scene.conditions import (
@@ -25,9 +25,9 @@ from bemkit.scene.conditions import (
     Roller,
     Traction,
 )
-from bemkit.scene.far_field import FarField
 from bemkit.scene.load_history import with_scaled_loads
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step
 from bemkit.solvers.base import ContactSolver

@@ -9,7 +9,7 @@ import numpy as np
 
 from bemkit.contact.obstacle import Cavity, Circle, Gap, HalfPlane, Obstacle
 from bemkit.formulas import Expression
-from bemkit.geometry.grading import Algebraic, Geometric, Grading, Uniform
+from bemkit.geometry.meshing.discretise import Algebraic, Geometric, Grading, Uniform
 from bemkit.geometry.shapes import Disk, PlateWithHole, Rectangle, Ring, Shape
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.operators.linear.solvers import Automatic, DenseCholesky, LinearSolverChoice

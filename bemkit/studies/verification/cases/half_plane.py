@@ -30,7 +30,7 @@ from bemkit.reference import (
 from bemkit.results.solution import Solution
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Contact, Part, PrescribedDisplacement
-from bemkit.scene.far_field import FarField
+from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step
 from bemkit.scene.toml import with_overrides

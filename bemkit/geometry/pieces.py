@@ -1,8 +1,12 @@
-"""Pieces of a boundary: chords with a bound on how far the boundary strays from them.
+"""Pieces of a boundary: chords with a bound on how far the boundary strays from them, and whether they keep apart.
 
 The sides of an outline and the elements of a mesh are examined as the same thing: pieces in order along closed
 loops, each a chord and the total angle by which its tangent turns. A piece that turns by `turning` strays from its
 chord by at most tan(turning / 2) / 2 chord lengths, and leaves its ends within the angle `turning` of the chord.
+
+No test for crossing, touching and folding back compares with an absolute length. Two pieces touch if they come closer
+than the round-off of their own coordinates, so that neighbours a millionth of an element apart, and elements 1e-12 of
+the size of the body, are seen as they are.
 """
 
 from collections.abc import Callable
@@ -11,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.errors import GeometryError
-from bemkit.geometry.vectors import angles_between, norms
+from bemkit.geometry.vectors import angles_between, cross, norms
 
 LARGEST_TURNING = np.pi / 4
 """Pieces are split until they turn by less, so that none can meet itself."""
@@ -23,6 +27,8 @@ _TURNING_SAFETY = 1.25  # the turning is sampled, not bounded
 _MOST_SPLITS = 24  # the tip of a thin ellipse turns on as little of its length as the square of its slenderness
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
+_BATCH = 4096
+_MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
 
 
 def resolution(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -191,3 +197,140 @@ def _with_turning(pieces: Pieces, start: FloatArray, end: FloatArray, span: Floa
         tangent = evaluate_curves(pieces.curves, pieces.curve[rows], s, derivative_on)
         turning[rows] = _TURNING_SAFETY * np.abs(angles_between(tangent[:, :-1], tangent[:, 1:])).sum(axis=1)
     return replace(pieces, start=start, end=end, span=span, turning=turning)
+
+
+def find_meeting(pieces: Pieces, following: IntArray) -> tuple[int, int] | None:
+    """Find two pieces that cross, touch or fold back onto each other.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Pieces of closed loops, each of at least three pieces that turn by less than `LARGEST_TURNING`.
+    following : (n,) int array
+        Index of the piece that starts where this one ends.
+
+    Returns
+    -------
+    (int, int) or None
+        The owners of two pieces that meet, or None if the boundary is simple.
+
+    Notes
+    -----
+    Bounding boxes of contiguous runs of pieces, halved level by level, leave about n pairs to look at. A pair whose
+    chords are farther apart than both pieces stray is settled; otherwise the piece that strays more is halved.
+    Neighbours are settled when the angle between their chords exceeds what both turn.
+    """
+    reach = (pieces.deviation + pieces.resolution)[:, None]
+    low = np.minimum(pieces.start, pieces.end) - reach
+    high = np.maximum(pieces.start, pieces.end) + reach
+    first, second = overlapping_boxes(low, high)
+    is_apart = (following[first] != second) & (following[second] != first)
+    everyone = np.arange(len(pieces))
+    first = np.concatenate([first[is_apart], everyone])
+    second = np.concatenate([second[is_apart], following])
+    is_joint = np.arange(len(first)) >= np.count_nonzero(is_apart)
+    return _settle(pieces.take(first), pieces.take(second), is_joint)
+
+
+def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None:
+    """Settle pairs (a, b), halving where needed; where `is_joint`, b starts at the end of a.
+
+    Halves go first, a batch at a time: curves that coincide are found out after one descent to round-off.
+    """
+    waiting = [(a, b, is_joint)]
+    n_halved = 0
+    while waiting:
+        a, b, is_joint = waiting.pop()
+        if len(a) > _BATCH:
+            rest = np.arange(_BATCH, len(a))
+            waiting.append((a.take(rest), b.take(rest), is_joint[_BATCH:]))
+            a, b, is_joint = a.take(np.arange(_BATCH)), b.take(np.arange(_BATCH)), is_joint[:_BATCH]
+        is_open = ~np.where(is_joint, _neighbours_part(a, b), _keep_apart(a, b))
+        rows = np.flatnonzero(is_open)
+        if not len(rows):
+            continue
+        n_halved += len(rows)
+        a, b, is_joint = a.take(rows), b.take(rows), is_joint[rows]
+        is_final = np.maximum(a.deviation, b.deviation) <= np.maximum(a.resolution, b.resolution)
+        if is_final.any() or n_halved > _MOST_HALVED:
+            row = int(np.argmax(is_final))
+            return int(a.owner[row]), int(b.owner[row])
+        waiting.append(_halve_pairs(a, b, is_joint))
+    return None
+
+
+def _halve_pairs(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[Pieces, Pieces, BoolArray]:
+    """Replace each pair by two: the piece that strays more is halved."""
+    strays_more = a.deviation > b.deviation
+    in_a, in_b = np.flatnonzero(strays_more), np.flatnonzero(~strays_more)
+    a_first, a_second = a.take(in_a).halves()
+    b_first, b_second = b.take(in_b).halves()
+    halved_a = concatenate([a_first, a_second, a.take(in_b), a.take(in_b)])
+    halved_b = concatenate([b.take(in_a), b.take(in_a), b_first, b_second])
+    # b joins the second half of a, or the first half of b joins a
+    no_joint_a, no_joint_b = np.zeros(len(in_a), dtype=bool), np.zeros(len(in_b), dtype=bool)
+    return halved_a, halved_b, np.concatenate([no_joint_a, is_joint[in_a], is_joint[in_b], no_joint_b])
+
+
+def _keep_apart(a: Pieces, b: Pieces) -> BoolArray:
+    margin = a.deviation + b.deviation + np.maximum(a.resolution, b.resolution)
+    return segment_distances(a.start, a.end, b.start, b.end) > margin
+
+
+def _neighbours_part(a: Pieces, b: Pieces) -> BoolArray:
+    """Tell whether b leaves the end of a in a direction other than back along a."""
+    angle = np.abs(angles_between(a.start - a.end, b.end - b.start)) - a.turning - b.turning
+    opening = np.minimum(a.chord_length, b.chord_length) * np.sin(np.clip(angle, 0.0, 0.5 * np.pi))
+    return opening > np.maximum(a.resolution, b.resolution)
+
+
+def segment_distances(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """Return the distances of the segments from a to b and from c to d, all (n, 2); zero where they cross."""
+    ends = [point_distances(a, c, d), point_distances(b, c, d), point_distances(c, a, b), point_distances(d, a, b)]
+    # signs spoilt by round-off belong to ends that lie within round-off of the other line, which `ends` sees
+    is_crossing = (_side(a, b, c) * _side(a, b, d) < 0.0) & (_side(c, d, a) * _side(c, d, b) < 0.0)
+    return np.where(is_crossing, 0.0, np.minimum.reduce(ends))
+
+
+def point_distances(p: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the distances of the points p from the segments from a to b, all (n, 2)."""
+    chord = b - a
+    fraction = ((p - a) * chord).sum(axis=1) / (chord * chord).sum(axis=1)
+    return norms(p - a - np.clip(fraction, 0.0, 1.0)[:, None] * chord)
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the sign of the side of the line from a to b on which c lies, +1 for the left."""
+    return np.sign(cross(b - a, c - a))
+
+
+def overlapping_boxes(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Find all pairs of boxes that overlap.
+
+    Parameters
+    ----------
+    low, high : (n, 2) array
+        Corners of the boxes; neighbours in the list should be neighbours in the plane.
+
+    Returns
+    -------
+    first, second : (m,) int array
+        Indices of the pairs, first < second.
+    """
+    levels = [(low, high)]
+    while len(low) > 1:
+        if len(low) % 2:  # pad with an empty box, which overlaps nothing
+            low = np.vstack([low, np.full((1, 2), np.inf)])
+            high = np.vstack([high, np.full((1, 2), -np.inf)])
+        levels[-1] = (low, high)
+        low = low.reshape(-1, 2, 2).min(axis=1)
+        high = high.reshape(-1, 2, 2).max(axis=1)
+        levels.append((low, high))
+    first = second = np.zeros(1, dtype=np.intp)
+    for low, high in reversed(levels[:-1]):
+        first = (2 * first + np.array([[0], [0], [1], [1]])).ravel()
+        second = (2 * second + np.array([[0], [1], [0], [1]])).ravel()
+        meets = (first <= second) & (low[first] <= high[second]).all(axis=1) & (low[second] <= high[first]).all(axis=1)
+        first, second = first[meets], second[meets]
+    is_pair = first < second
+    return first[is_pair], second[is_pair]

@@ -1,1 +1,0 @@
-"""What makes an outline or mesh impossible: self-intersection, nested loops, extreme magnitudes."""
