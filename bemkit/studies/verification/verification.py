@@ -15,8 +15,7 @@ from bemkit.formulas import closest
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.verification.case import Case, Quantity
-from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.case import CASES, Case, Quantity
 from bemkit.studies.verification.records import FILE, Verification, VerificationRecord, rows_of
 from bemkit.version import __version__
 
