@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 
@@ -11,7 +11,6 @@ import numpy as np
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.places import Place, PlaceError, value_at, with_value
 from bemkit.scene.scene import Scene
-from bemkit.scene.toml import scene_to_toml
 
 _LAWS = ("law", "solver")
 _LOADS = ("parts", "body_forces", "load_factors", "steps", "contacts", "touching")
@@ -35,47 +34,24 @@ class Key(Place):
         return self.is_of_law or bool(names and names[0] in _LOADS and names[1:2] != ("within",))
 
 
-class VariedScene:
-    """A scene, and the same with other numbers.
-
-    Parameters
-    ----------
-    scene : Scene or Assembly
-        Without Python functions, which a scene file cannot hold.
+def with_values(scene: Scene | Assembly, values: Mapping[Key, float]) -> Scene | Assembly:
+    """Return a scene with other numbers at some places.
 
     Raises
     ------
-    SceneError
-        If it cannot be written as a scene file.
+    PlaceError
+        If a place does not exist in the scene, holds no number, or refuses a value; the message names the key.
     """
-
-    def __init__(self, scene: Scene | Assembly) -> None:
-        self.scene = scene
-        self.text = scene_to_toml(scene)
-
-    def with_values(self, values: Mapping[Key, float]) -> Scene | Assembly:
-        """Return the scene with other numbers at some places.
-
-        Raises
-        ------
-        PlaceError
-            If a place does not exist in the scene, holds no number, or refuses a value; the message names the key.
-        """
-        scene = self.scene
-        for key, value in values.items():
-            _check_number(value_at(scene, key), key)
-            # whole numbers fit where numbers of elements stand, and everywhere else
-            scene = with_value(scene, key, int(value) if float(value).is_integer() else float(value))
-        return scene
-
-    def check(self, keys: Sequence[Key]) -> None:
-        """Refuse keys that lead to no number of the scene; see `with_values`."""
-        for key in keys:
-            _check_number(value_at(self.scene, key), key)
+    for key, value in values.items():
+        check_number(scene, key)
+        # whole numbers fit where numbers of elements stand, and everywhere else
+        scene = with_value(scene, key, int(value) if float(value).is_integer() else float(value))
+    return scene
 
 
-def _check_number(value: object, key: Key) -> None:
-    """Refuse what is neither a number nor a formula that a number can replace."""
+def check_number(scene: Scene | Assembly, key: Key) -> None:
+    """Refuse a key that leads neither to a number nor to a formula that a number can replace; see `with_values`."""
+    value = value_at(scene, key)
     if isinstance(value, tuple | list | np.ndarray):
         raise PlaceError(f"{key.text} is a list: vary one number of it, such as {key.text}[0]")
     if isinstance(value, bool | str | Enum):
