@@ -11,14 +11,17 @@ from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.operators.stopwatch import announce
 from bemkit.pictures.boundary_traction import draw_boundary_traction
-from bemkit.pictures.contact_curves import draw_contact_clearance, draw_contact_displacement, draw_contact_traction
+from bemkit.pictures.contact_curves import (
+    draw_contact_clearance,
+    draw_contact_displacement,
+    draw_contact_traction,
+    draw_friction_cone,
+)
 from bemkit.pictures.contact_map import draw_contact_map
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
-from bemkit.pictures.friction_cone import draw_friction_cone
-from bemkit.pictures.load_history import draw_friction_loop, draw_work, has_friction
+from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
-from bemkit.pictures.status_over_time import draw_status_over_time
 from bemkit.pictures.stress import STRESSES, draw_stress
 from bemkit.pictures.zoom import draw_zoom, is_short
 from bemkit.results.assembly_solution import AssemblySolution

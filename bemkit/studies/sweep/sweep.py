@@ -20,8 +20,7 @@ from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
-from bemkit.studies.sweep.grid import all_rows
-from bemkit.studies.sweep.keys import Key, check_number, with_values
+from bemkit.studies.sweep.grid import Key, all_rows, check_number, with_values
 from bemkit.studies.sweep.records import FILE, SweepRow, row_of
 from bemkit.studies.sweep.table import Sweep
 

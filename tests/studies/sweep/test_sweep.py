@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.errors import BemkitError
 from bemkit.runs import shared_body as shared_module
 from bemkit.studies.sweep import sweep as sweep_module
-from bemkit.studies.sweep.keys import Key, with_values
+from bemkit.studies.sweep.grid import Key, with_values
 from bemkit.studies.sweep.table import Sweep
 from tests.studies.sweep.tables import equal_rows
 

@@ -10,8 +10,7 @@ import pytest
 import bemkit as bk
 from bemkit.scene.places import PlaceError
 from bemkit.studies.engine import StudyError
-from bemkit.studies.sweep.grid import all_rows, read_variation
-from bemkit.studies.sweep.keys import Key, check_number, with_values
+from bemkit.studies.sweep.grid import Key, all_rows, check_number, read_variation, with_values
 
 SCENE = bk.load_scene("paper-1")
 BODIES = bk.load_scene("two-cylinders")
