@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.pictures.plane import draw_arrows
+from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown
-from bemkit.pictures.stations import Stations, stations
 from bemkit.results.drawing import GREEN
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 
