@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -16,12 +15,9 @@ from bemkit.geometry.files.shape_file import DrawingFile, MeshFile, is_drawing
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.vectors import norms
-from bemkit.results.drawing import new_figure
+from bemkit.results.drawing import Figure, new_figure
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.scene.unit_names import UnitNames
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _SEEN = np.linspace(0.5 / 64, 1.0 - 0.5 / 64, 64)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
@@ -25,10 +24,7 @@ from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import STRESSES, draw_stress
 from bemkit.pictures.zoom import draw_zoom, is_short
 from bemkit.results.assembly_solution import AssemblySolution
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from bemkit.results.drawing import Axes, Figure
 
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""

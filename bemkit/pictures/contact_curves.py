@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.pictures.contact_axes import (
@@ -19,11 +17,8 @@ from bemkit.pictures.contact_axes import (
 )
 from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
-from bemkit.results.drawing import BLUE, VERMILION, axes_or_new, ignore_round_off, label_values, show_grid
+from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 MOST_DOTS = 300
 """Contact nodes of a part that are seen one by one: more would only thicken lines."""

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.errors import InputError
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.shown import Result
 from bemkit.results.contact_table import STATUS_WORDS
-from bemkit.results.drawing import BLUE, GREEN, GREY, VERMILION, axes_or_new, ignore_round_off, show_grid
+from bemkit.results.drawing import BLUE, GREEN, GREY, VERMILION, Axes, axes_or_new, ignore_round_off, show_grid
 from bemkit.results.load_history import LoadHistory
 from bemkit.scene.unit_names import UnitNames, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 _NO_FRICTION = 1e-9
 """Friction over pressing force that round-off explains."""

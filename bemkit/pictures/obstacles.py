@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +17,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import Shown
-from bemkit.results.drawing import GREY
+from bemkit.results.drawing import GREY, Axes
 from bemkit.scene.conditions import Contact
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _EDGE, _HATCH = "#555555", "#888888"
 _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}

@@ -10,11 +10,10 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.shown import Shown, ShownBody
-from bemkit.results.drawing import BLUE, GREY, axes_or_new
+from bemkit.results.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.path import Path
 
 BODY = "#DCEBF5"
