@@ -101,7 +101,7 @@ def shown_progress(quiet: bool) -> AbstractContextManager[Callable[[StepRecord],
         return nullcontext()
     from bemkit.cli.progress import live_progress
 
-    return live_progress(is_live=True)
+    return live_progress()
 
 
 class StudyProgress(ExitStack):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,8 +40,9 @@ def outline(
     With -o write a scene to start from: the body pressed onto a rigid floor, ready for bemkit run.
     """
     with shown_progress(quiet=False):
-        from bemkit.cli.sides import print_sides, shape_file, sides_figure
+        from bemkit.cli.sides import print_sides, shape_file
         from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
+        from bemkit.pictures.outline import draw_outline
         from bemkit.scene.starting_scene import START, starting_scene
         from bemkit.scene.toml import load_single_body
 
@@ -54,9 +55,11 @@ def outline(
         else:
             shape, units = shape_file(file, scale, only, corner_angle, tolerance), None
         text = TextFile[str](output, "scene to start from", START, str)
-        figures: Outputs[Outline] = Outputs(
-            (), folder, lambda each: {"outline": sides_figure(each, file, units)}, "outline"
-        )
+
+        def drawn(each: Outline) -> dict[str, Any]:
+            return {"outline": draw_outline(each, Path(file).name, units=units).get_figure(root=True)}
+
+        figures = Outputs((), folder, drawn, "outline")
         figures.check(text.check())
         sides = shape.outline()
     print_sides(shape, sides)

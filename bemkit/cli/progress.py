@@ -22,22 +22,14 @@ _ALMOST = 0.98
 
 
 @contextmanager
-def live_progress(*, is_live: bool) -> Iterator[Callable[[StepRecord], None] | None]:
-    """Show on standard error what is going on inside a ``with`` statement.
-
-    Parameters
-    ----------
-    is_live : bool
-        Whether a person looks at a terminal; if not, nothing is shown.
+def live_progress() -> Iterator[Callable[[StepRecord], None]]:
+    """Show on standard error, a terminal, what is going on inside a ``with`` statement.
 
     Yields
     ------
-    callable or None
+    callable
         What to hand to a run as its callback: it prints a line for each step of the solver above the bar.
     """
-    if not is_live:
-        yield None
-        return
     console = Console(stderr=True, highlight=False)
     columns = TextColumn("{task.description}"), _PlannedBar(bar_width=24), TimeElapsedColumn(), _TimeLeft()
     # what goes to standard output stays there

@@ -1,9 +1,6 @@
-"""What ``bemkit outline`` reads, prints and draws: the sides of a body."""
+"""What ``bemkit outline`` reads and prints: the sides of a body."""
 
 from __future__ import annotations
-
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -16,12 +13,7 @@ from bemkit.geometry.files.shape_file import DrawingFile, MeshFile, is_drawing
 from bemkit.geometry.outline import Outline, Side
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.vectors import norms
-from bemkit.results.drawing import new_figure
 from bemkit.results.outputs import plain_table, stdout_console
-from bemkit.scene.unit_names import UnitNames
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _SEEN = np.linspace(0.5 / 64, 1.0 - 0.5 / 64, 64)
 
@@ -62,12 +54,3 @@ def print_sides(shape: Shape, sides: Outline) -> None:
 
 def _kind(side: Side) -> str:
     return "line" if side.curve.is_straight else "arc" if isinstance(side.curve, Arc) else "curve"
-
-
-def sides_figure(sides: Outline, file: str, units: UnitNames | None) -> Figure:
-    """Return a picture of the sides with their names."""
-    from bemkit.pictures.outline import draw_outline
-
-    figure = new_figure(7.0, 5.2)
-    draw_outline(sides, Path(file).name, figure.add_subplot(), units=units)
-    return figure

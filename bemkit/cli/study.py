@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli.exit_codes import NOT_CONVERGED
 from bemkit.cli.options import StudyProgress, reserve, shown_progress
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, STDOUT, Outputs, TextFile, json_text, plain_table, stdout_console
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 DEFAULT_COMMAND = "errors"
 DEFAULT_REPEAT = 3
 DEFAULT_MEASURES = "energy,sigma_n,displacement,transitions"
-NOT_CONVERGED = 1
 
 
 class StudyGroup(click.Group):

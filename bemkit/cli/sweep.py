@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bemkit.cli.exit_codes import NOT_CONVERGED
 from bemkit.cli.options import StudyProgress, reserve
 from bemkit.errors import concerning
 from bemkit.results.outputs import JSON_START, Outputs, TextFile, csv_text
@@ -14,7 +15,6 @@ from bemkit.results.outputs import JSON_START, Outputs, TextFile, csv_text
 if TYPE_CHECKING:
     from bemkit.studies.sweep.table import Sweep
 
-NOT_CONVERGED = 1
 DEFAULT_SHOWN = "force_tangential"
 
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bemkit.pictures.contact_axes import axes_with_strip, cut_peaks
 from bemkit.pictures.traction_curves import boundary_curve
-from bemkit.results.drawing import BLUE, VERMILION, axes_or_new, label_values
+from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, label_values
 from bemkit.results.solution import Solution
 from bemkit.scene.unit_names import UnitNames, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _FREE, _PARTS = "#F2F2F2", ("#C6DBEA", "#F3D9B1")
 _READABLE = 0.06

@@ -5,27 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest
 from bemkit.operators.stopwatch import announce
 from bemkit.pictures.boundary_traction import draw_boundary_traction
-from bemkit.pictures.contact_curves import draw_contact_clearance, draw_contact_displacement, draw_contact_traction
+from bemkit.pictures.contact_curves import (
+    draw_contact_clearance,
+    draw_contact_displacement,
+    draw_contact_traction,
+    draw_friction_cone,
+)
 from bemkit.pictures.contact_map import draw_contact_map
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
-from bemkit.pictures.friction_cone import draw_friction_cone
-from bemkit.pictures.load_history import draw_friction_loop, draw_work, has_friction
+from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
-from bemkit.pictures.status_over_time import draw_status_over_time
 from bemkit.pictures.stress import STRESSES, draw_stress
 from bemkit.pictures.zoom import draw_zoom, is_short
 from bemkit.results.assembly_solution import AssemblySolution
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from bemkit.results.drawing import Axes, Figure
 
 MOST_CONTACTS = 6
 """Contacts up to which each has pictures of its own where none is named."""
@@ -41,19 +40,30 @@ class Picture:
         Also of its file, without ending.
     shows : str
         What, in a few words.
-    draw : callable (result) -> mapping of str to Axes
-        By endings of file names: one, empty, or one for each contact if there are several.
+    draw : callable (result) -> Axes, or (result, part) -> Axes
+        The latter of pictures along contacts.
     why_not : callable (result) -> str
         Why there is no such picture, empty if there is one.
     is_default : callable (result) -> bool
         Whether it is drawn where no picture is named; asked only where there is one.
+    is_along_contacts : bool
+        Whether each contact has one.
     """
 
     name: str
     shows: str
-    draw: Callable[[Result], Mapping[str, Axes]]
-    why_not: Callable[[Result], str]
-    is_default: Callable[[Result], bool]
+    draw: Callable[..., Axes]
+    why_not: Callable[[Result], str] = lambda result: ""
+    is_default: Callable[[Result], bool] = lambda result: True
+    is_along_contacts: bool = False
+
+    def axes(self, result: Result) -> dict[str, Axes]:
+        """Draw it, and return what was drawn by endings of file names: one, empty, or a number for each contact."""
+        if not self.is_along_contacts:
+            return {"": self.draw(result)}
+        parts = result.contact.parts
+        endings = [f"-{number}" for number in range(1, len(parts) + 1)] if len(parts) > 1 else [""]
+        return {ending: self.draw(result, part) for ending, part in zip(endings, parts, strict=True)}
 
 
 def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figure]:
@@ -81,7 +91,7 @@ def figures(result: Result, what: Sequence[str] | None = None) -> dict[str, Figu
         if reason := picture.why_not(result):
             raise InputError(f"there is no picture {picture.name!r} of {result.title!r}: {reason}")
         announce(f"draw {picture.name}")
-        for ending, axes in picture.draw(result).items():
+        for ending, axes in picture.axes(result).items():
             found[picture.name + ending] = axes.get_figure(root=True)
     return found  # type: ignore[return-value]
 
@@ -96,18 +106,6 @@ def find_picture(name: str) -> Picture:
     if name not in PICTURES:
         raise InputError(f"{name!r} is no picture: the pictures are {', '.join(PICTURES)}{closest(name, [*PICTURES])}")
     return PICTURES[name]
-
-
-def _always(result: Result) -> bool:
-    return True
-
-
-def _never(result: Result) -> bool:
-    return False
-
-
-def _possible(result: Result) -> str:
-    return ""
 
 
 def _without_contact(result: Result) -> str:
@@ -131,83 +129,54 @@ def _has_few_contacts(result: Result) -> bool:
     return len(result.contact.parts) <= MOST_CONTACTS
 
 
-def _once(draw: Callable[[Result], Axes]) -> Callable[[Result], Mapping[str, Axes]]:
-    return lambda result: {"": draw(result)}
+def _has_friction(result: Result) -> bool:
+    return result.loading is not None and has_friction(result.loading)
 
 
-def _of_contacts(draw: Callable[[Result, str], Axes]) -> Callable[[Result], Mapping[str, Axes]]:
-    def drawn(result: Result) -> dict[str, Axes]:
-        parts = result.contact.parts
-        return {_ending(number, parts): draw(result, part) for number, part in enumerate(parts, start=1)}
-
-    return drawn
+def _never(result: Result) -> bool:
+    return False
 
 
-def _ending(number: int, parts: Sequence[str]) -> str:
-    return f"-{number}" if len(parts) > 1 else ""
+_contact = partial(Picture, why_not=_without_contact, is_default=_has_few_contacts, is_along_contacts=True)
 
 
-def _is_several(result: Result) -> bool:
-    return isinstance(result, AssemblySolution)
-
-
-def _contact(name: str, shows: str, draw: Callable[[Result, str], Axes], default: Callable[[Result], bool]) -> Picture:
-    return Picture(name, f"{shows} along each contact", _of_contacts(draw), _without_contact, default)
-
-
-def _draw_tractions(result: Result) -> Axes:
-    if isinstance(result, AssemblySolution):
-        raise InputError("tractions along the whole boundary are those of one body")
-    return draw_boundary_traction(result)
+def _stress(name: str) -> Picture:
+    shows = f"{STRESSES[name].symbol.replace('$', '').replace(chr(92), '')} inside the bodies"
+    is_default = name == "von-mises"
+    return Picture(name, shows, partial(draw_stress, measure=name), _without_inside, lambda result: is_default)
 
 
 _ALL = (
-    Picture("deformation", "bodies before and after, supports, loads", _once(draw_deformation), _possible, _always),
+    Picture("deformation", "bodies before and after, supports, loads", draw_deformation),
+    Picture("zoom", "the zone of contact from near by", draw_zoom, _without_contact, is_short),
     Picture(
-        "zoom",
-        "the zone of contact from near by",
-        _once(draw_zoom),
+        "contacts",
+        "status and pressure in the plane",
+        draw_contact_map,
         _without_contact,
-        lambda result: is_short(result),
+        lambda result: isinstance(result, AssemblySolution),
     ),
-    Picture("contacts", "status and pressure in the plane", _once(draw_contact_map), _without_contact, _is_several),
     Picture(
         "boundary-traction",
         "tractions along the whole boundary",
-        _once(_draw_tractions),
+        draw_boundary_traction,
         _of_several_bodies,
         lambda result: bool(_without_contact(result)),
     ),
-    _contact("displacement", "displacements and gap", draw_contact_displacement, _has_few_contacts),
-    _contact("traction", "tractions and friction bound", draw_contact_traction, _has_few_contacts),
-    _contact("status", "pressure and clearance", draw_contact_clearance, _has_few_contacts),
-    _contact("friction-cone", "friction over pressure,", draw_friction_cone, _never),
-    *(
-        Picture(
-            name,
-            f"{measure.symbol.replace('$', '').replace(chr(92), '')} inside the bodies",
-            _once(partial(draw_stress, measure=name)),
-            _without_inside,
-            _always if name == "von-mises" else _never,
-        )
-        for name, measure in STRESSES.items()
-    ),
-    Picture("scene", "bodies, supports, loads and obstacles alone", _once(draw_scene), _possible, _never),
-    Picture("convergence", "violations over the solver's steps", _once(draw_convergence), _possible, _never),
-    Picture(
-        "friction-loop",
-        "friction over displacement",
-        _once(draw_friction_loop),
-        _without_history,
-        lambda result: result.loading is not None and has_friction(result.loading),
-    ),
-    Picture("work", "work and energy over time", _once(draw_work), _without_history, _always),
-    Picture(
+    _contact("displacement", "displacements and gap along each contact", draw_contact_displacement),
+    _contact("traction", "tractions and friction bound along each contact", draw_contact_traction),
+    _contact("status", "pressure and clearance along each contact", draw_contact_clearance),
+    _contact("friction-cone", "friction over pressure, along each contact", draw_friction_cone, is_default=_never),
+    *map(_stress, STRESSES),
+    Picture("scene", "bodies, supports, loads and obstacles alone", draw_scene, is_default=_never),
+    Picture("convergence", "violations over the solver's steps", draw_convergence, is_default=_never),
+    Picture("friction-loop", "friction over displacement", draw_friction_loop, _without_history, _has_friction),
+    Picture("work", "work and energy over time", draw_work, _without_history),
+    _contact(
         "status-over-time",
         "status over the time of a load history along each contact",
-        _of_contacts(draw_status_over_time),
-        _without_history,
-        _has_few_contacts,
+        draw_status_over_time,
+        why_not=_without_history,
     ),
 )
 PICTURES: Mapping[str, Picture] = {picture.name: picture for picture in _ALL}

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.pictures.shown import Result
-from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, axes_or_new
+from bemkit.results.drawing import BLUE, GREY, ORANGE, VERMILION, Axes, axes_or_new
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 STATUS_COLOURS: Mapping[str, str] = MappingProxyType({"separated": "#D9D9D9", "slip": ORANGE, "stick": BLUE})
 _STATUS_TEXT: Mapping[str, str] = MappingProxyType({"separated": "#333333", "slip": "#000000", "stick": "#FFFFFF"})

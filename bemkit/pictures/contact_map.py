@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.pictures.contact_axes import STATUS_COLOURS
@@ -11,11 +9,8 @@ from bemkit.pictures.contact_nodes import contact_directions, node_points
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_initial, plane_axes, set_frame
 from bemkit.pictures.shown import Result, Shown, shown
-from bemkit.results.drawing import legend_below
+from bemkit.results.drawing import Axes, legend_below
 from bemkit.scene.unit_names import UnitNames, amount
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _TOOTH, _SHARE = 0.1, 1.0 / 3.0
 """Length of the longest tooth: share of the picture, or of a body where there are many."""

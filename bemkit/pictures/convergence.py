@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.pictures.shown import Result
-from bemkit.results.drawing import BLUE, VERMILION, axes_or_new, show_grid
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, show_grid
 
 
 def draw_convergence(solution: Result, axes: Axes | None = None) -> Axes:

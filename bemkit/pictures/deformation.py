@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.pictures.loads import draw_loads
@@ -12,11 +10,8 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_bodies, draw_initial, draw_symmetry_lines, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Drawable, Result, Shown, shown
 from bemkit.pictures.supports import draw_supports
-from bemkit.results.drawing import legend_below
+from bemkit.results.drawing import Axes, legend_below
 from bemkit.scene.unit_names import UnitNames
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def draw_deformation(

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.pictures.plane import draw_arrows
+from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown, ShownBody
-from bemkit.pictures.stations import Stations, stations
-from bemkit.results.drawing import VERMILION
+from bemkit.results.drawing import VERMILION, Axes
 from bemkit.scene.body_forces import Gravity
 from bemkit.scene.conditions import Pressure, Traction
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _SPACING, _LONGEST = 0.04, 0.1
 """Distance of arrows, and length of the longest, in sizes of the picture."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,12 +15,10 @@ from bemkit.errors import InputError
 from bemkit.formulas import evaluate_field
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
+from bemkit.pictures.plane import set_frame
 from bemkit.pictures.shown import Shown
-from bemkit.results.drawing import GREY
+from bemkit.results.drawing import GREY, Axes
 from bemkit.scene.conditions import Contact
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _EDGE, _HATCH = "#555555", "#888888"
 _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
@@ -52,7 +50,7 @@ def draw_obstacles(axes: Axes, shown: Shown) -> None:
                 for band in bands:
                     axes.plot(*band[: len(band) // 2].T, color=_EDGE, linewidth=1.0, zorder=0.5)
                 drawn.append(obstacle)
-    _set_frame(axes, frame)
+    set_frame(axes, frame, margin=0.0)
 
 
 def facing_bands(obstacle: Obstacle, mesh: BoundaryMesh, elements: IntArray, thickness: float) -> list[FloatArray]:
@@ -99,7 +97,7 @@ def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
             frame = np.stack(
                 [np.minimum(frame[:, 0], places.min(axis=0)), np.maximum(frame[:, 1], places.max(axis=0))], axis=1
             )
-    _set_frame(axes, frame)
+    set_frame(axes, frame, margin=0.0)
 
 
 def outline_of(obstacle: object, frame: FloatArray) -> list[FloatArray]:
@@ -177,8 +175,3 @@ def _draw(axes: Axes, loops: list[FloatArray], style: dict[str, Any], label: str
 
 def _frame(axes: Axes) -> FloatArray:
     return np.array([axes.get_xlim(), axes.get_ylim()])
-
-
-def _set_frame(axes: Axes, frame: FloatArray) -> None:
-    axes.set_xlim(*frame[0])
-    axes.set_ylim(*frame[1])

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.vectors import norms, turned_right
-from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, axes_or_new, show_grid
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, axes_or_new, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 _SEEN = np.linspace(0.0, 1.0, 65)

@@ -1,19 +1,19 @@
-"""Axes in which bodies are drawn: equal scales, a frame, bodies before and after."""
+"""Axes in which bodies are drawn: equal scales, a frame, bodies before and after, places for symbols."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.pictures.shown import Shown, ShownBody
-from bemkit.results.drawing import BLUE, GREY, axes_or_new
+from bemkit.results.drawing import BLUE, GREY, Axes, axes_or_new
 from bemkit.scene.unit_names import UnitNames, with_unit
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.path import Path
 
 BODY = "#DCEBF5"
@@ -126,3 +126,33 @@ def joined_frame(*points: FloatArray) -> FloatArray:
     """Return the frame (2, 2) around points (n, 2)."""
     every = np.concatenate(points)
     return np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
+
+
+class Stations(NamedTuple):
+    """Points of the undeformed boundary, how they are drawn, and unit normals out of the body, all (n, 2)."""
+
+    points: FloatArray
+    drawn: FloatArray
+    normals: FloatArray
+
+
+def stations(body: ShownBody, elements: IntArray, spacing: float, factor: float) -> Stations:
+    """Return places about evenly spaced along elements, one at least.
+
+    Parameters
+    ----------
+    body : ShownBody
+    elements : (m,) array
+    spacing, factor : float
+        Distance [m] of neighbours, and by how much displacements are enlarged.
+    """
+    elements = along_boundary(body.mesh, elements)
+    ends = np.cumsum(body.mesh.lengths[elements])
+    n = max(1, round(ends[-1] / spacing))
+    s = (np.arange(n) + 0.5) * ends[-1] / n
+    place = np.searchsorted(ends, s).clip(max=ends.size - 1)
+    elements = elements[place]
+    xi = (1.0 - 2.0 * (ends[place] - s) / body.mesh.lengths[elements])[:, None]
+    points = body.mesh.points(elements, xi)
+    drawn = points + factor * body.displacement_at(elements, xi)
+    return Stations(points[:, 0], drawn[:, 0], body.mesh.normals_at(elements, xi)[:, 0])

@@ -15,7 +15,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.model.assembled.placed import place
-from bemkit.results.assembly_solution import AssemblySolution, BodyResult
+from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.part_forces import RigidResult
 from bemkit.results.solution import Solution
@@ -132,7 +132,7 @@ def shown(subject: Drawable) -> Shown:
             body = _body(subject.scene, subject.mesh, subject.boundary.displacement)
             return Shown(subject.title, subject.units, (body,), (), subject.contact)
         case AssemblySolution():
-            bodies = tuple(_body_of(body) for body in subject.bodies.values())
+            bodies = tuple(_body(body.scene, body.mesh, body.boundary.displacement) for body in subject.bodies.values())
             rigid = tuple((body, subject.rigid[body.name]) for body in subject.assembly.rigid)
             return Shown(subject.title, subject.units, bodies, rigid, subject.contact)
         case Scene():
@@ -142,10 +142,6 @@ def shown(subject: Drawable) -> Shown:
             bodies = tuple(_body(placed.scene, placed.mesh) for placed in place(subject))
             rigid = tuple((body, RigidResult(body.name, *(0.0,) * 6)) for body in subject.rigid)
             return Shown(subject.title, subject.units, bodies, rigid, ContactTable.empty())
-
-
-def _body_of(body: BodyResult) -> ShownBody:
-    return _body(body.scene, body.mesh, body.boundary.displacement)
 
 
 def _body(scene: Scene, mesh: BoundaryMesh, displacement: FloatArray | None = None) -> ShownBody:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +16,8 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_initial, inside, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
 from bemkit.pictures.stress_points import StressPoints, stress_points
+from bemkit.results.drawing import Axes
 from bemkit.scene.unit_names import UnitNames, amount, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)

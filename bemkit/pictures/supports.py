@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.pictures.plane import draw_arrows
+from bemkit.pictures.plane import Stations, draw_arrows, stations
 from bemkit.pictures.shown import Shown
-from bemkit.pictures.stations import Stations, stations
-from bemkit.results.drawing import GREEN
+from bemkit.results.drawing import GREEN, Axes
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _SPACING, _SIZE = 0.035, 0.012
 """Distance of symbols, and their radius, in sizes of the picture."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,8 @@ from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, shown
 from bemkit.results.contact_table import ContactTable
-from bemkit.results.drawing import VERMILION, legend_below
+from bemkit.results.drawing import VERMILION, Axes, legend_below
 from bemkit.scene.unit_names import UnitNames
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SHORT = 0.4
 """Size of a zone of contact, relative to the bodies, below which it is worth a picture of its own."""

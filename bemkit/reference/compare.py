@@ -106,7 +106,7 @@ class Answer:
     zones: tuple[Zone, ...]
 
     def __post_init__(self) -> None:
-        for name in ("u_n", "u_t", "sigma_n", "sigma_t"):
+        for name in COLUMNS:
             read_only(getattr(self, name))
 
 
@@ -222,7 +222,8 @@ def over_resolved(scene: Scene, most_elements: int) -> Reference:
     OverResolutionError
         If there are no two converged solutions.
     """
-    solutions = sorted((s for s in _fine_solutions(scene, most_elements) if s.is_certified), key=_n_points)
+    solutions = [each for each in _fine_solutions(scene, most_elements) if each.is_certified]
+    solutions.sort(key=lambda solution: len(solution.boundary.points))
     if len(solutions) < 2:
         raise OverResolutionError(
             f"no two converged solutions with up to {most_elements} quadratic elements: give more, or another scene"
@@ -245,10 +246,6 @@ def _fine_solutions(scene: Scene, most_elements: int) -> list[Solution]:
         return list(run_adaptive(replace(scene, discretisation=HpGalerkin(), mesh=options)))
     scene, counts = replace(scene, discretisation=QuadraticGalerkin()), (most_elements // 2, most_elements)
     return [run(replace(scene, mesh=MeshOptions(elements=n, grading=Algebraic(3.0)))) for n in counts]
-
-
-def _n_points(solution: Solution) -> int:
-    return len(solution.boundary.points)
 
 
 def _along(solution: Solution, places: Places) -> FloatArray:

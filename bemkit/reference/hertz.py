@@ -8,10 +8,11 @@ half-width / radius for cylinders, and of half-width / size for bodies of anothe
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 
@@ -32,37 +33,36 @@ def pair_modulus(one: Material, other: Material) -> float:
     return 1.0 / (1.0 / one.plane_modulus + 1.0 / other.plane_modulus)
 
 
-class LineContact(Protocol):
+@dataclass(frozen=True)
+class LineContact(ABC):
     """A symmetric contact zone under a load.
 
-    Attributes
+    Parameters
     ----------
     load : float [N/m]
-    half_width : float [m]
-        Contact covers -half_width < x < half_width.
     """
 
-    @property
-    def load(self) -> float:
-        """Load [N/m]."""
-        ...
+    load: float
+
+    def __post_init__(self) -> None:
+        check_positive(**vars(self))
 
     @property
+    @abstractmethod
     def half_width(self) -> float:
-        """Half-width of the zone [m]."""
-        ...
+        """Half-width of the zone [m]: contact covers -half_width < x < half_width."""
 
+    @abstractmethod
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure [Pa] at places [m], zero outside of the zone."""
-        ...
 
     def under(self, load: float) -> Self:
         """Return the same bodies under another load [N/m]."""
-        ...
+        return replace(self, load=load)
 
 
 @dataclass(frozen=True)
-class HertzLine:
+class HertzLine(LineContact):
     """Two cylinders, or one on a flat.
 
     Parameters
@@ -78,12 +78,8 @@ class HertzLine:
     [Johnson1985] section 4.2(c): a^2 = 4 P R / (pi E*), p = p0 sqrt(1 - (x/a)^2), p0 = 2 P / (pi a).
     """
 
-    load: float
     radius: float
     modulus: float
-
-    def __post_init__(self) -> None:
-        check_positive(load=self.load, radius=self.radius, modulus=self.modulus)
 
     @property
     def half_width(self) -> float:
@@ -98,10 +94,6 @@ class HertzLine:
     def pressure(self, x: FloatArray) -> FloatArray:
         """Return the pressure [Pa]."""
         return np.asarray(self.peak_pressure * np.sqrt(np.maximum(1.0 - (np.asarray(x) / self.half_width) ** 2, 0.0)))
-
-    def under(self, load: float) -> Self:
-        """Return the same bodies under another load."""
-        return replace(self, load=load)
 
     def approach(self, depth: float, material: Material) -> float:
         """Return how much nearer the middle of the zone comes [m] to a point of one half-plane below it.
@@ -119,7 +111,7 @@ class HertzLine:
 
 
 @dataclass(frozen=True)
-class BluntWedge:
+class BluntWedge(LineContact):
     """A symmetric wedge with a sharp edge.
 
     Parameters
@@ -135,12 +127,8 @@ class BluntWedge:
     [Johnson1985] section 5.2(a): p = E* slope / pi arcosh(a / |x|), P = E* a slope.
     """
 
-    load: float
     slope: float
     modulus: float
-
-    def __post_init__(self) -> None:
-        check_positive(load=self.load, slope=self.slope, modulus=self.modulus)
 
     @property
     def half_width(self) -> float:
@@ -153,13 +141,9 @@ class BluntWedge:
             ratio = np.maximum(self.half_width / np.abs(np.asarray(x, dtype=float)), 1.0)
         return np.asarray(self.modulus * self.slope / np.pi * np.arccosh(ratio))
 
-    def under(self, load: float) -> Self:
-        """Return the same bodies under another load."""
-        return replace(self, load=load)
-
 
 @dataclass(frozen=True)
-class RoundedPunch:
+class RoundedPunch(LineContact):
     """A punch with a flat face and rounded edges: parabolas that begin where the flat ends.
 
     Parameters
@@ -181,13 +165,9 @@ class RoundedPunch:
     [CiavarellaHillsMonno1998].
     """
 
-    load: float
     flat: float
     radius: float
     modulus: float
-
-    def __post_init__(self) -> None:
-        check_positive(load=self.load, flat=self.flat, radius=self.radius, modulus=self.modulus)
 
     @cached_property
     def half_width(self) -> float:
@@ -207,10 +187,6 @@ class RoundedPunch:
         towards = np.where(angle == end, 2.0 * np.sin(end) * np.log(np.sin(end)), towards)
         values = (np.pi - 2.0 * end) * np.cos(angle) + towards
         return np.asarray(np.where(inside < 1.0, self.modulus * a / (2.0 * np.pi * self.radius) * values, 0.0))
-
-    def under(self, load: float) -> Self:
-        """Return the same bodies under another load."""
-        return replace(self, load=load)
 
     def _load_on(self, a: float) -> float:
         end = float(np.arcsin(min(self.flat / a, 1.0)))

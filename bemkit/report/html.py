@@ -6,11 +6,10 @@ import re
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 from xml.etree import ElementTree
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from bemkit.results.drawing import Figure
 
 Element: TypeAlias = "ElementTree.Element[str]"
 Content: TypeAlias = "Element | str"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bemkit.errors import BemkitError
 from bemkit.pictures.catalogue import find_picture
@@ -16,13 +16,11 @@ from bemkit.report.html import Element, element, facts, image, render, table
 from bemkit.report.pictures import has_pictures
 from bemkit.report.sections import badge, headline_rows, plan_section
 from bemkit.results.assembly_solution import AssemblySolution
+from bemkit.results.drawing import Axes
 from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import SolvedSteps
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _DOTS_PER_INCH = 72
 _MOST_STEPS = 12

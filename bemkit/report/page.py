@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 
 from bemkit.atomic_files import check_target
@@ -23,32 +24,6 @@ from bemkit.report.sections import (
 from bemkit.results.outputs import begins_with, write_text
 
 _START = "<!DOCTYPE html>"
-_STYLE = """
-:root { color-scheme: light dark; --ink: #1b1f24; --page: #ffffff; --faint: #57606a; --line: #d0d7de; --tint: #f6f8fa; }
-@media (prefers-color-scheme: dark) {
-  :root { --ink: #e6edf3; --page: #0d1117; --faint: #9ba7b4; --line: #3d444d; --tint: #161b22; }
-}
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1rem; max-width: 72rem; color: var(--ink); background: var(--page);
-  font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: break-word; }
-h1 { font-size: 1.6rem; line-height: 1.25; } h2 { font-size: 1.25rem; margin-top: 2.2rem;
-  border-bottom: 1px solid var(--line); }
-a { color: inherit; } nav ul { display: flex; flex-wrap: wrap; gap: .25rem 1.2rem; padding: 0; list-style: none; }
-.badge { padding: .1rem .6rem; border-radius: 1rem; color: #ffffff; }
-.good { background: #1a7f37; } .doubtful { background: #9a6700; } .bad { background: #cf222e; }
-.scroll { overflow-x: auto; margin: 1rem 0; } table { border-collapse: collapse; font-size: .9rem; }
-caption { text-align: left; color: var(--faint); padding-bottom: .3rem; }
-th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-thead th { background: var(--tint); } .number { text-align: right; font-variant-numeric: tabular-nums; }
-pre { overflow-x: auto; padding: .8rem; background: var(--tint); border: 1px solid var(--line); font-size: .85rem; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 27rem), 1fr)); gap: 1rem; }
-figure { margin: 0; break-inside: avoid; } figcaption { color: var(--faint); font-size: .9rem; }
-img { width: 100%; height: auto; background: #ffffff; border: 1px solid var(--line); }
-@media print { :root { --ink: #000000; --page: #ffffff; --faint: #333333; --line: #999999; --tint: #ffffff; }
-  nav { display: none; } body { max-width: none; font-size: 10pt; } .scroll, pre { overflow: visible; }
-  pre { white-space: pre-wrap; } .badge { border: 1px solid; color: #000000; background: none; }
-  tr, h2 { break-inside: avoid; } h2 { break-after: avoid; } }
-"""
 
 
 def report(result: Result) -> str:
@@ -91,7 +66,7 @@ def report(result: Result) -> str:
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("title", f"{result.title} \u2013 bemkit report"),
-        element("style", _STYLE),
+        element("style", _style()),
     )
     return f"{_START}\n{render(element('html', head, body, lang='en'))}\n"
 
@@ -112,6 +87,10 @@ def save_report(path: str | Path, result: Result) -> Path:
 def check_report(path: str | Path) -> Path:
     """Find out whether a report can be written, and return its path; OutputFileError if not."""
     return check_target(Path(path), "report", lambda existing: begins_with(existing, _START))
+
+
+def _style() -> str:
+    return (resources.files("bemkit") / "report" / "page.css").read_text("utf-8")
 
 
 def _pictures(result: Result) -> list[Element]:

@@ -28,8 +28,8 @@ def picture_elements(result: Result) -> Iterator[Element]:
     for picture in chosen:
         announce(f"draw {picture.name}")
         parts = result.contact.parts
-        for number, axes in enumerate(picture.draw(result).values()):
-            part = parts[number] if "each contact" in picture.shows else None
+        for number, axes in enumerate(picture.axes(result).values()):
+            part = parts[number] if picture.is_along_contacts else None
             caption = _caption(picture, part)
             figure = axes.get_figure(root=True)
             alternative = f"{caption}. {_in_words(result, part)}"

@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 import bemkit as bk
+from bemkit.cli.options import shown_progress
 from bemkit.cli.progress import _Display, _PlannedBar, _TimeLeft, live_progress
 from bemkit.operators.stopwatch import PROGRESS, announce
 from bemkit.scene.toml import with_overrides
@@ -136,10 +137,10 @@ def test_a_study_shows_that_it_begins_and_then_its_tasks(arguments: tuple[str, .
 
 def test_nothing_is_shown_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
     level = PROGRESS.level
-    with live_progress(is_live=False) as callback:
+    with shown_progress(quiet=False) as callback:
         assert callback is None
         announce("solve")
-    with live_progress(is_live=True):
+    with live_progress():
         assert PROGRESS.handlers
         print("data")
     assert (PROGRESS.handlers, PROGRESS.level) == ([], level)

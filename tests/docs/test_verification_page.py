@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from bemkit.studies.verification.case import Case
-from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.case import CASES, Case
 from tests.docs.pages import read, section, table
 
 PAGE = section(read("verification.md"), "All rows")

@@ -9,8 +9,7 @@ import pytest
 
 import bemkit as bk
 from bemkit.geometry.spaces import dof_points
-from bemkit.pictures.magnification import LINE, magnification
-from bemkit.pictures.overlap import drawn_overlap
+from bemkit.pictures.magnification import LINE, drawn_overlap, magnification
 from bemkit.pictures.shown import Shown, shown
 from bemkit.results.contact_table import ContactTable
 

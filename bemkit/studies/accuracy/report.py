@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.text import Text
 
 from bemkit.reference.compare import MEASURES, Reference
-from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, Figure, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.accuracy.records import ErrorRecord, by_series, fitted_rate, orders, pareto_front
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WIDE = 100
 """Width of a terminal from which on stages, memory and estimates are shown; the files hold them in any case."""

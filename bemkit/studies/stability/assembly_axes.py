@@ -4,54 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
-from bemkit.contact.laws import Coulomb
 from bemkit.errors import InputError
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
-from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
-from bemkit.studies.stability.axes import Axis
-from bemkit.studies.stability.case import PRECISION, Case, precision_elsewhere, without_own_laws
+from bemkit.studies.stability.axes import Axis, changed, friction, moved, similar
+from bemkit.studies.stability.case import PRECISION, Case
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 _SIMILAR = "results equal to 1e-9 after scaling"
 _FREE = "right answer or named error"
 
 
-def _similar(baseline: AssemblySolution, value: float, *, factor: str) -> Case:
-    similarity = replace(AssemblySimilarity(), **{factor: value})  # type: ignore[arg-type]  # one of its numbers
-    return _similar_case(baseline, value, similarity, PRECISION)
+def _against(similarity: AssemblySimilarity) -> Callable[[Assembly], str]:
+    """Return what says why an assembly has no similar one."""
 
+    def reason(assembly: Assembly) -> str:
+        try:
+            similarity.apply(assembly)
+        except InputError as error:
+            return str(error)
+        return ""
 
-def _moved(baseline: AssemblySolution, value: float) -> Case:
-    distance = value * max(body.mesh.diameter for body in baseline.solved_bodies)
-    precision = precision_elsewhere(baseline, distance)
-    return _similar_case(baseline, value, AssemblySimilarity(shift=(0.8 * distance, -0.6 * distance)), precision)
-
-
-def _similar_case(baseline: AssemblySolution, value: float, similarity: AssemblySimilarity, precision: float) -> Case:
-    scene = _changed(baseline, similarity.apply)
-    return Case(value, scene, similarity, precision=precision, drift_limit=precision)
-
-
-def _changed(baseline: AssemblySolution, change: Callable[[Assembly], Assembly]) -> Assembly:
-    """Return what was asked, all its steps with the contacts that were found, after a change of each step."""
-    contacts = baseline.assembly.contacts
-    return with_changed_steps(
-        baseline.stated, lambda step: change(step.with_contacts(contacts) if step.touching else step)
-    )
-
-
-def _against(assembly: Assembly, *, similarity: AssemblySimilarity) -> str:
-    """Return why an assembly has no similar one; empty if it has."""
-    try:
-        similarity.apply(assembly)
-    except InputError as error:
-        return str(error)
-    return ""
+    return reason
 
 
 def _stiffened(baseline: AssemblySolution, value: float) -> Case:
@@ -62,19 +39,7 @@ def _stiffened(baseline: AssemblySolution, value: float) -> Case:
 
     # displacements of the soft bodies hold eps of themselves, forces of stiff pairs as much times the ratio
     precision = PRECISION * max(1.0, value, 1.0 / value) ** 0.5
-    return Case(value, _changed(baseline, stiffened), precision=precision)
-
-
-def _friction(baseline: AssemblySolution, value: float) -> Case:
-    def rubbed(assembly: Assembly) -> Assembly:
-        return replace(
-            assembly,
-            bodies=tuple(replace(body, parts=without_own_laws(body.parts)) for body in assembly.bodies),
-            contacts=tuple(replace(pair, law=None) for pair in assembly.contacts),
-            law=Coulomb(value),
-        )
-
-    return Case(value, _changed(baseline, rubbed))
+    return Case(value, changed(baseline, stiffened), precision=precision)
 
 
 def _elements(baseline: AssemblySolution, value: float) -> Case:
@@ -90,32 +55,32 @@ def _elements(baseline: AssemblySolution, value: float) -> Case:
     def of_step(assembly: Assembly) -> Assembly:
         return replace(assembly, mesh=mesh, bodies=tuple(divided(body) for body in assembly.bodies))
 
-    return Case(value, _changed(baseline, of_step))
+    return Case(value, changed(baseline, of_step))
 
 
 _DECADES = tuple(10.0**k for k in (-9, -6, -3, 3, 6, 9))
 
 ASSEMBLY_AXES: tuple[Axis[AssemblySolution], ...] = (
-    Axis("stress", "factor of all moduli and loads", _SIMILAR, _DECADES, partial(_similar, factor="stress")),
-    Axis("size", "factor of all lengths", _SIMILAR, _DECADES, partial(_similar, factor="length")),
+    Axis("stress", "factor of all moduli and loads", _SIMILAR, _DECADES, similar(AssemblySimilarity, "stress")),
+    Axis("size", "factor of all lengths", _SIMILAR, _DECADES, similar(AssemblySimilarity, "length")),
     Axis(
         "turn",
         "turn of everything [degrees]",
         _SIMILAR,
         (30.0, 45.0, 90.0, 137.0, 180.0),
-        partial(_similar, factor="turn"),
-        against_assembly=partial(_against, similarity=AssemblySimilarity(turn=30.0)),
+        similar(AssemblySimilarity, "turn"),
+        reason_against=_against(AssemblySimilarity(turn=30.0)),
     ),
     Axis(
         "position",
         "distance from the origin / diameter",
         "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
         (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
-        _moved,
-        against_assembly=partial(_against, similarity=AssemblySimilarity(shift=(1.0, 0.0))),
+        moved(AssemblySimilarity),
+        reason_against=_against(AssemblySimilarity(shift=(1.0, 0.0))),
     ),
     Axis("stiffness", "factor of Young's modulus of the first body", _FREE, (*_DECADES[1:-1], 1e-8, 1e8), _stiffened),
-    Axis("friction", "friction coefficient", _FREE, (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 3.0, 10.0, 100.0), _friction),
+    Axis("friction", "friction coefficient", _FREE, (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 3.0, 10.0, 100.0), friction),
     Axis(
         "elements",
         "number of elements / that of the scene",

@@ -24,6 +24,7 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part, Pressure, Traction
+from bemkit.scene.load_history import with_changed_steps
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.scene import Scene
@@ -31,7 +32,8 @@ from bemkit.scene.transform import AffineMap, transformed_scene, with_gap_offset
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
-from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, without_own_laws
+from bemkit.studies.stability.case import PRECISION, Case, Similarity, precision_elsewhere, with_friction
+from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 
 Baseline = TypeVar("Baseline", Solution, AssemblySolution)
 
@@ -51,10 +53,8 @@ class Axis(Generic[Baseline]):
     make : callable (baseline solution, value) -> Case
     reference : float, optional
         Value whose row the others are compared with; the given scene if left out.
-    beside_half_planes, beside_periodic : str
-        Why the axis says nothing of half-planes, or of periodic ones; empty if it does.
-    against_assembly : callable (Assembly) -> str
-        The same of an assembly.
+    reason_against : callable (scene or assembly) -> str
+        Why the axis says nothing of it; empty if it does.
     """
 
     name: str
@@ -63,18 +63,7 @@ class Axis(Generic[Baseline]):
     values: tuple[float, ...]
     make: Callable[[Baseline, float], Case]
     reference: float | None = None
-    beside_half_planes: str = ""
-    beside_periodic: str = ""
-    against_assembly: Callable[[Assembly], str] = lambda _: ""
-
-    def reason_against(self, scene: Scene | Assembly) -> str:
-        """Return why the axis says nothing of a scene; empty if it does."""
-        if isinstance(scene, Assembly):
-            return self.against_assembly(scene)
-        surface = scene.shape.outline().surface
-        if surface is None:
-            return ""
-        return self.beside_half_planes or (self.beside_periodic if surface.is_periodic else "")
+    reason_against: Callable[[Any], str] = lambda scene: ""
 
     @property
     def is_logarithmic(self) -> bool:
@@ -83,15 +72,14 @@ class Axis(Generic[Baseline]):
         return min(self.values) >= 0.0 and max(size) / min(size) > 100.0
 
 
-def find_axes(names: Sequence[str], axes: Sequence[Axis[Any]] | None = None) -> tuple[Axis[Any], ...]:
-    """Return those of some axes, by default of one body, that have the given names; all if there are no names.
+def find_axes(names: Sequence[str], axes: Sequence[Axis[Any]]) -> tuple[Axis[Any], ...]:
+    """Return those of some axes that have the given names; all if there are no names.
 
     Raises
     ------
     UnknownAxisError
         The message lists the names.
     """
-    axes = AXES if axes is None else axes
     known = {axis.name: axis for axis in axes}
     for name in names:
         if name not in known:
@@ -107,28 +95,54 @@ _BLOCK_FRICTION = 0.5
 _REFERENCE_GRADING = 1e6
 
 
-def _similar(baseline: Solution, value: float, *, factor: str) -> Case:
-    length, modulus, stress = (value if name == factor else 1.0 for name in ("length", "modulus", "stress"))
-    return _similar_case(baseline, value, Similarity(length, modulus, stress), PRECISION)
+def changed(baseline: Baseline, change: Callable[[Any], Any]) -> Scene | Assembly:
+    """Return what was asked after a change of the scene, or of each step of an assembly with the contacts found."""
+    if isinstance(baseline, Solution):
+        result: Scene = change(baseline.scene)
+        return result
+    contacts = baseline.assembly.contacts
+    return with_changed_steps(
+        baseline.stated, lambda step: change(step.with_contacts(contacts) if step.touching else step)
+    )
 
 
-def _moved(baseline: Solution, value: float) -> Case:
-    distance = value * baseline.mesh.diameter
-    precision = precision_elsewhere(baseline, distance)
-    return _similar_case(baseline, value, Similarity(shift=(0.8 * distance, -0.6 * distance)), precision)
+def _similar_case(
+    baseline: Baseline, value: float, similarity: Similarity | AssemblySimilarity, precision: float = PRECISION
+) -> Case:
+    keeps_steps = isinstance(baseline, Solution) and precision == PRECISION
+    scene = changed(baseline, similarity.apply)
+    return Case(value, scene, similarity, precision=precision, drift_limit=precision, keeps_steps=keeps_steps)
+
+
+def similar(kind: type[Similarity | AssemblySimilarity], factor: str) -> Callable[[Baseline, float], Case]:
+    """Return what makes a case in which one factor is the value."""
+
+    def make(baseline: Baseline, value: float) -> Case:
+        number: dict[str, Any] = {factor: value}
+        return _similar_case(baseline, value, kind(**number))
+
+    return make
+
+
+def moved(kind: type[Similarity | AssemblySimilarity]) -> Callable[[Baseline, float], Case]:
+    """Return what makes a case as far from the origin as the value says, in diameters."""
+
+    def make(baseline: Baseline, value: float) -> Case:
+        distance = value * max(body.mesh.diameter for body in baseline.solved_bodies)
+        similarity = kind(shift=(0.8 * distance, -0.6 * distance))
+        return _similar_case(baseline, value, similarity, precision_elsewhere(baseline, distance))
+
+    return make
+
+
+def friction(baseline: Baseline, value: float) -> Case:
+    """Return the case in which all contacts have one friction coefficient."""
+    return Case(value, changed(baseline, partial(with_friction, coefficient=value)))
 
 
 def _degenerate(baseline: Solution, value: float) -> Case:
     critical = degenerate_diameters(baseline.mesh, baseline.scene.material)[0]
-    similarity = Similarity(length=value * float(critical) / baseline.mesh.diameter)
-    return _similar_case(baseline, value, similarity, PRECISION)
-
-
-def _similar_case(baseline: Solution, value: float, similarity: Similarity, precision: float) -> Case:
-    scene = similarity.apply(baseline.scene)
-    return Case(
-        value, scene, similarity, precision=precision, drift_limit=precision, keeps_steps=precision == PRECISION
-    )
+    return _similar_case(baseline, value, Similarity(length=value * float(critical) / baseline.mesh.diameter))
 
 
 def _poisson(baseline: Solution, value: float) -> Case:
@@ -136,14 +150,6 @@ def _poisson(baseline: Solution, value: float) -> Case:
     # short of 1/2 the bulk modulus, 1 / (1 - 2 nu) times the shear modulus, multiplies round-off
     precision = PRECISION + (8.0 * np.finfo(float).eps / (0.5 - value) if value < 0.5 else 0.0)
     return Case(value, replace(baseline.scene, material=material), precision=precision)
-
-
-def _friction(baseline: Solution, value: float) -> Case:
-    return Case(value, _with_friction(baseline.scene, value))
-
-
-def _with_friction(scene: Scene, coefficient: float) -> Scene:
-    return replace(scene, parts=without_own_laws(scene.parts), law=Coulomb(coefficient))
 
 
 def _gap(baseline: Solution, value: float) -> Case:
@@ -184,7 +190,7 @@ def _pushed(baseline: Solution, value: float) -> Case:
 
 
 def _pushed_half_plane(baseline: Solution, value: float) -> Case:
-    scene, force = _with_friction(baseline.scene, _BLOCK_FRICTION), baseline.force_normal
+    scene, force = with_friction(baseline.scene, _BLOCK_FRICTION), baseline.force_normal
     far = FarField(force_x=_BLOCK_FRICTION * value * force, force_y=force, turn=0.0)
     parts = tuple(part for part in scene.parts if isinstance(part.condition, Contact))
     # where gaps are measured along the surface's normal, friction alone acts along it
@@ -201,17 +207,9 @@ def _stretched(baseline: Solution, value: float) -> Case:
     )
 
 
-def _newton(baseline: Solution, rho: float) -> Case:
-    return _with_solver(baseline, rho, SemismoothNewton(rho=rho))
-
-
-def _augmented(baseline: Solution, rho: float) -> Case:
-    return _with_solver(baseline, rho, AugmentedLagrangian(rho_n=rho, rho_t=rho))
-
-
-def _with_solver(baseline: Solution, rho: float, solver: ContactSolver) -> Case:
+def _penalised(solver: Callable[[float], ContactSolver]) -> Callable[[Solution, float], Case]:
     # answers with a certificate of 1e-9 differ by that times the compliance of what is certified
-    return Case(rho, replace(baseline.scene, solver=solver), drift_limit=1e-6)
+    return lambda baseline, rho: Case(rho, replace(baseline.scene, solver=solver(rho)), drift_limit=1e-6)
 
 
 def _elements(baseline: Solution, value: float) -> Case:
@@ -257,9 +255,18 @@ def degenerate_diameters(mesh: BoundaryMesh, material: Material) -> FloatArray:
     return np.sort(np.exp(1.0 / (factor * eigenvalues)))
 
 
+def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Scene], str]:
+    """Return what gives a reason against half-planes, or against periodic ones."""
+
+    def given(scene: Scene) -> str:
+        surface = scene.shape.outline().surface
+        return reason if surface is not None and (surface.is_periodic or not only_periodic) else ""
+
+    return given
+
+
 _UNITS = "same sets, same linear solves, results equal to 1e-9 after scaling"
 _FREE = "right answer or named error"
-_DRIFTS = f"{_FREE}; drift proportional to 1/2 - nu near 1/2"
 _INDEPENDENT = "same answer for every rho, or named status"
 _DECADES = tuple(10.0**k for k in (-12, -9, -6, -3, 3, 6, 9, 12, 15))
 _SIZES = tuple(10.0**k for k in range(-9, 10, 3) if k)
@@ -275,15 +282,15 @@ _SHARES = (0.125, 0.25, 0.5, 1.0, 2.0)
 _GRADINGS = (1e2, 1e4, _REFERENCE_GRADING, 1e8, 1e10, 1e12)
 
 AXES: tuple[Axis[Solution], ...] = (
-    Axis("youngs-modulus", "factor of Young's modulus", _UNITS, _DECADES, partial(_similar, factor="modulus")),
-    Axis("load", "factor of all loads and gaps", _UNITS, _DECADES, partial(_similar, factor="stress")),
-    Axis("size", "factor of all lengths", _UNITS, _SIZES, partial(_similar, factor="length")),
+    Axis("youngs-modulus", "factor of Young's modulus", _UNITS, _DECADES, similar(Similarity, "modulus")),
+    Axis("load", "factor of all loads and gaps", _UNITS, _DECADES, similar(Similarity, "stress")),
+    Axis("size", "factor of all lengths", _UNITS, _SIZES, similar(Similarity, "length")),
     Axis(
         "position",
         "distance from the origin / diameter",
         "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
         (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
-        _moved,
+        moved(Similarity),
     ),
     Axis(
         "degenerate-size",
@@ -291,12 +298,14 @@ AXES: tuple[Axis[Solution], ...] = (
         _UNITS,
         _NEAR_DEGENERATE,
         _degenerate,
-        beside_half_planes="the flexibility of a half-plane, measured by its strip, is singular at no size",
+        reason_against=_of_half_planes(
+            "the flexibility of a half-plane, measured by its strip, is singular at no size"
+        ),
     ),
     Axis(
         "poisson-ratio", "Poisson's ratio", f"{_FREE}; drift proportional to 1/2 - nu near 1/2", _RATIOS, _poisson, 0.5
     ),
-    Axis("friction", "friction coefficient", _FREE, _COEFFICIENTS, _friction),
+    Axis("friction", "friction coefficient", _FREE, _COEFFICIENTS, friction),
     Axis("gap", "gap added / largest displacement", _FREE, _OFFSETS, _gap),
     Axis("load-direction", "turn of all loads [degrees]", _FREE, _ANGLES, _turned),
     Axis("sliding", "push / friction available, loose body", "solved below 1, refused above", _PUSHES, _pushed, 0.0),
@@ -306,10 +315,22 @@ AXES: tuple[Axis[Solution], ...] = (
         _FREE,
         _STRETCHES,
         _stretched,
-        beside_half_planes="a half-plane has no thickness to compare its length with",
+        reason_against=_of_half_planes("a half-plane has no thickness to compare its length with"),
     ),
-    Axis("rho-newton", "rho / (E'/L), semismooth Newton", _INDEPENDENT, _PENALTIES, _newton),
-    Axis("rho-augmented", "rho / (E'/L), augmented Lagrangian", _INDEPENDENT, _PENALTIES, _augmented),
+    Axis(
+        "rho-newton",
+        "rho / (E'/L), semismooth Newton",
+        _INDEPENDENT,
+        _PENALTIES,
+        _penalised(lambda rho: SemismoothNewton(rho=rho)),
+    ),
+    Axis(
+        "rho-augmented",
+        "rho / (E'/L), augmented Lagrangian",
+        _INDEPENDENT,
+        _PENALTIES,
+        _penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)),
+    ),
     Axis(
         "elements",
         "number of elements / that of the scene",
@@ -324,7 +345,7 @@ AXES: tuple[Axis[Solution], ...] = (
         _GRADINGS,
         _graded,
         _REFERENCE_GRADING,
-        beside_periodic="the elements of a periodic half-plane are equal",
+        reason_against=_of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True),
     ),
 )
 """Every axis, in the order of the report."""

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bemkit.contact.laws import Coulomb
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.results.solved_problem import SolvedProblem
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.conditions import Contact, Part
+from bemkit.scene.load_history import AnyScene
 from bemkit.scene.scene import Scene
 from bemkit.scene.transform import AffineMap, transformed_scene
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
@@ -34,12 +36,21 @@ def precision_elsewhere(solution: SolvedProblem, distance: float) -> float:
     return PRECISION + 4.0 * np.finfo(float).eps * distance * loss
 
 
-def without_own_laws(parts: Sequence[Part]) -> tuple[Part, ...]:
-    """Return parts whose contacts have no friction law of their own."""
-    return tuple(
-        replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
-        for part in parts
-    )
+def with_friction(scene: AnyScene, coefficient: float) -> AnyScene:
+    """Return a scene or an assembly with one friction coefficient, and no laws of single contacts."""
+
+    def parts(own: Sequence[Part]) -> tuple[Part, ...]:
+        return tuple(
+            replace(part, condition=Contact(part.condition.obstacle)) if isinstance(part.condition, Contact) else part
+            for part in own
+        )
+
+    law = Coulomb(coefficient)
+    if isinstance(scene, Assembly):
+        bodies = tuple(replace(body, parts=parts(body.parts)) for body in scene.bodies)
+        contacts = tuple(replace(pair, law=None) for pair in scene.contacts)
+        return replace(scene, bodies=bodies, contacts=contacts, law=law)
+    return replace(scene, parts=parts(scene.parts), law=law)
 
 
 @dataclass(frozen=True)

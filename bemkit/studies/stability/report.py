@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.text import Text
 
-from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, new_figure, show_grid
+from bemkit.results.drawing import BLUE, GREEN, GREY, ORANGE, SKY, VERMILION, Figure, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.stability.axes import Axis
 from bemkit.studies.stability.records import StabilityRecord, Verdict, cells
 from bemkit.studies.stability.trials import Outcome, Trial
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _STYLES = {"right": "green", "coarse": "yellow", "ambiguous": "yellow", "named": "cyan", "wrong": "bold red"}
 

@@ -147,13 +147,9 @@ def energy_fault(step: Solution | AssemblySolution) -> str:
         return f"friction acts along slip, which gives {work.friction_gain / size:.1e} of the work"
     if work.dissipation < 0.0:
         return f"friction gave back {-work.dissipation:.1e}"
-    is_lost = abs(missing) > allowed
-    return f"{missing / size:.1e} of the work is missing" if _balances(step) and is_lost else ""
-
-
-def _balances(step: Solution | AssemblySolution) -> bool:
-    """Tell whether work and energy agree to round-off: stiffnesses of collocation are not symmetric."""
-    return all(body.scene.discretisation.is_symmetric for body in step.solved_bodies)
+    # stiffnesses of collocation are not symmetric: work and energy do not agree to round-off
+    is_balanced = all(body.scene.discretisation.is_symmetric for body in step.solved_bodies)
+    return f"{missing / size:.1e} of the work is missing" if is_balanced and abs(missing) > allowed else ""
 
 
 def _work_of_motion(step: Solution | AssemblySolution) -> float:

@@ -102,23 +102,18 @@ RESULTS = tuple(entry.name for entry in fields(SweepRow) if entry.name != "value
 def row_of(values: tuple[float, ...], found: Attempt[Solution | AssemblySolution]) -> SweepRow:
     """Return the row of a scene that was solved, or was not."""
     solution = found.solution
-    if solution is None:
-        numbers, n_elements, n_contact, linear_solves = dict.fromkeys(_MEASURED, math.nan), 0, 0, 0
-    else:
-        numbers = _numbers(solution) if solution.is_certified else dict.fromkeys(_MEASURED, math.nan)
-        n_elements = solution.mesh.n_elements if isinstance(solution, Solution) else solution.n_elements
-        n_contact, linear_solves = solution.contact.n_contact, solution.linear_solves
+    certified = solution if solution is not None and solution.is_certified else None
     return SweepRow(
         values=values,
         status=found.status,
-        certified=int(solution is not None and solution.is_certified),
-        n_elements=n_elements,
-        n_contact=n_contact,
-        linear_solves=linear_solves,
+        certified=int(certified is not None),
+        n_elements=0 if solution is None else solution.n_elements,
+        n_contact=0 if solution is None else solution.contact.n_contact,
+        linear_solves=0 if solution is None else solution.linear_solves,
         seconds=found.seconds,
-        transitions=_places(solution) if solution is not None and solution.is_certified else "",
+        transitions="" if certified is None else _places(certified),
         message="" if found.is_converged else found.message,
-        **numbers,
+        **(dict.fromkeys(_MEASURED, math.nan) if certified is None else _numbers(certified)),
     )
 
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from rich.text import Text
 
-from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, new_figure, show_grid
+from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, Figure, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.studies.sweep.records import UNITS
 from bemkit.studies.sweep.table import Sweep
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _SHOWN = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure")
 _WIDE = ("largest_slip", "estimated_error", "n_elements", "linear_solves", "seconds")

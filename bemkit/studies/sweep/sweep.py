@@ -18,9 +18,9 @@ from bemkit.runs.run import run
 from bemkit.runs.shared_body import SharedBody
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
+from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
-from bemkit.studies.sweep.grid import all_rows
-from bemkit.studies.sweep.keys import Key, VariedScene
+from bemkit.studies.sweep.grid import Key, all_rows, check_number, with_values
 from bemkit.studies.sweep.records import FILE, SweepRow, row_of
 from bemkit.studies.sweep.table import Sweep
 
@@ -87,19 +87,20 @@ def run_sweep(
 ) -> Sweep:
     """Solve a scene under all combinations of some of its numbers; see `sweep`."""
     keys, grid = all_rows(vary)
-    varied = VariedScene(scene)
-    varied.check(keys)
+    text = scene_to_toml(scene)  # which functions of Python cannot be part of
+    for key in keys:
+        check_number(scene, key)
     names = tuple(key.text for key in keys)
-    labels = {"scene": varied.text, "keys": json.dumps(names), "starts": "cold" if cold else "near"}
+    labels = {"scene": text, "keys": json.dumps(names), "starts": "cold" if cold else "near"}
     with reserved(FILE.check(file)):
         finished = FILE.finished(file, labels)
-        tasks = sweep_tasks(varied, keys, grid, finished=finished, cold=cold)
+        tasks = sweep_tasks(scene, keys, grid, finished=finished, cold=cold)
         by_key = {row.key: row for row in FILE.keep(file, compute(tasks, finished=finished), finished, labels)}
     return Sweep(scene, names, tuple(by_key[values] for values in grid))
 
 
 def sweep_tasks(
-    varied: VariedScene,
+    scene: Scene | Assembly,
     keys: Sequence[Key],
     grid: Sequence[Values],
     *,
@@ -117,7 +118,7 @@ def sweep_tasks(
     refused: dict[Values, BemkitError] = {}
     for values in grid:
         try:
-            scenes[values] = varied.with_values(dict(zip(keys, values, strict=True)))
+            scenes[values] = with_values(scene, dict(zip(keys, values, strict=True)))
         except BemkitError as error:
             refused[values] = error.with_traceback(None)
     if not scenes:
@@ -129,23 +130,20 @@ def sweep_tasks(
     has_one_load = all(key.is_of_law for key in keys if key.keeps_bodies)
     tasks = []
     for of_body, rows in groups.items():
-        body = _shared([scenes[values] for values in rows], has_one_load=has_one_load, cold=cold)
+        shared = [scenes[values] for values in rows]
+        # a single scene shares nothing, nor do meshes that follow each solution
+        body = None
+        if len(rows) > 1 and shared[0].mesh.accuracy is None:
+            body = SharedBody(shared, has_one_load=has_one_load, starts_cold=cold)
         left = [values for values in rows if values not in finished]
         for values in rows:
-            solve = partial(run, scenes[values]) if body is None else partial(body.run, scenes[values])
+            solve = partial(run if body is None else body.run, scenes[values])
             done = body.release if body is not None and left and values == left[-1] else None
             tasks.append(Task(values, _label(keys, values), partial(_solved_row, values, solve, done), of_body))
-    tasks += [
-        Task(values, _label(keys, values), partial(_refused_row, values, str(refused[values]))) for values in refused
-    ]
+    for values, reason in refused.items():
+        row = partial(row_of, values, Attempt(None, str(reason), 0.0))
+        tasks.append(Task(values, _label(keys, values), row))
     return tuple(tasks)
-
-
-def _shared(scenes: Sequence[Scene | Assembly], *, has_one_load: bool, cold: bool) -> SharedBody | None:
-    """Return the body that scenes share; None of a single scene, and of meshes that follow each solution."""
-    if len(scenes) == 1 or scenes[0].mesh.accuracy is not None:
-        return None
-    return SharedBody(scenes, has_one_load=has_one_load, starts_cold=cold)
 
 
 def _solved_row(
@@ -155,10 +153,6 @@ def _solved_row(
     if done is not None:
         done()
     return row
-
-
-def _refused_row(values: Values, message: str) -> SweepRow:
-    return row_of(values, Attempt(None, message, 0.0))
 
 
 def _label(keys: Sequence[Key], values: Values) -> str:

@@ -1,19 +1,29 @@
-"""A problem with a known answer, and what of it is compared."""
+"""A problem with a known answer, what of it is compared, and all such problems.
+
+Their scenes and the bounds of errors stand in `cases/*.toml`. Of each case there are
+
+* ``source``: key of ``docs/references.md``;
+* ``validity``, ``resolutions``, ``n_quick``, ``title``: see `Case`; by default the title is that of the scene;
+* ``scene``: a table like a scene file, or the name of a shipped scene, with elements of the ``degree``, if it is given;
+* ``bounds``, ``orders``: of each row, by the names of `bemkit.studies.verification.measures`; see `Quantity`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from importlib import resources
+from types import MappingProxyType
 from typing import Any
 
 from bemkit.errors import InputError
-from bemkit.reference import Reference, answer_of, errors_of
-from bemkit.results.assembly_solution import AssemblySolution
-from bemkit.results.solution import Solution
-from bemkit.runs.run import run
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.scene import Scene
-from bemkit.scene.toml import with_overrides
+from bemkit.scene.toml import load_scene, scene_from_table
+from bemkit.studies.verification.measures import ROWS, Measure, of_shipped
+from bemkit.studies.verification.solves import SOLVES, Solve, at_resolution
+
+_FILES = ("elastic", "obstacles", "pairs", "half_planes")
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,7 @@ class Quantity:
     """
 
     name: str
-    measure: Callable[[Any], float]
+    measure: Measure
     bounds: tuple[float, ...]
     expected: float = 0.0
     order: float | None = None
@@ -72,7 +82,7 @@ class Case:
     title: str
     source: str
     validity: str
-    solve: Callable[[float], Solution | AssemblySolution]
+    solve: Solve
     resolutions: tuple[float, ...]
     quantities: tuple[Quantity, ...]
     n_quick: int = 2
@@ -86,22 +96,31 @@ class Case:
                 )
 
 
-def at_resolution(scene: Scene | Assembly) -> Callable[[float], Solution | AssemblySolution]:
-    """Return what solves a scene with a number of elements, or to an accuracy."""
+def _case(name: str, table: Mapping[str, Any]) -> Case:
+    """Make the case of a table in a file."""
+    given, orders = table["scene"], table.get("orders", {})
+    scene = load_scene(given) if isinstance(given, str) else scene_from_table(given)
+    rows = ROWS[name]() if name in ROWS else of_shipped(given)
+    quantities = tuple(
+        Quantity(row, rows[row][0], tuple(bounds), rows[row][1], orders.get(row))
+        for row, bounds in table["bounds"].items()
+    )
+    return Case(
+        title=table.get("title", scene.title),
+        source=table["source"],
+        validity=table["validity"],
+        solve=SOLVES[name](scene) if name in SOLVES else at_resolution(scene, table.get("degree")),
+        resolutions=tuple(table["resolutions"]),
+        quantities=quantities,
+        n_quick=table.get("n_quick", 2),
+    )
 
-    def solve(resolution: float) -> Solution | AssemblySolution:
-        if resolution < 1.0:
-            return run(with_overrides(scene, accuracy=resolution))
-        return run(with_overrides(scene, elements=int(resolution)))
 
-    return solve
+def _cases() -> dict[str, Callable[[], Case]]:
+    folder = resources.files("bemkit") / "studies" / "verification" / "cases"
+    tables = [tomllib.loads((folder / f"{name}.toml").read_text("utf-8")) for name in _FILES]
+    return {name: partial(_case, name, case) for table in tables for name, case in table.items()}
 
 
-def field_errors(reference: Reference, **bounds: tuple[float, ...]) -> tuple[Quantity, ...]:
-    """Return rows that compare with a reference, by the names of `bemkit.reference.MEASURES`, with their bounds."""
-
-    def of(name: str) -> Callable[[Solution], float]:
-        return lambda solution: errors_of(answer_of(solution, reference.places), reference)[name]
-
-    words = {"sigma_n": "normal traction, L2", "sigma_t": "shear traction, L2", "displacement": "displacement, L2"}
-    return tuple(Quantity(words.get(name, name), of(name), each) for name, each in bounds.items())
+CASES: Mapping[str, Callable[[], Case]] = MappingProxyType(_cases())
+"""The problems, by name, each made when it is needed."""

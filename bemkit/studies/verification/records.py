@@ -147,13 +147,10 @@ class Verification:
 
 def rows_of(cases: dict[str, Case], records: Sequence[VerificationRecord]) -> tuple[VerifiedRow, ...]:
     """Return the rows of some cases, in their order."""
-    rows = []
-    for name, case in cases.items():
-        for quantity in case.quantities:
-            own = [record for record in records if (record.case, record.quantity) == (name, quantity.name)]
-            rows.append(
-                VerifiedRow(
-                    name, case, quantity, tuple(sorted(own, key=lambda r: case.resolutions.index(r.resolution)))
-                )
-            )
-    return tuple(rows)
+    by_key = {record.key: record for record in records}
+
+    def of(name: str, case: Case, quantity: Quantity) -> VerifiedRow:
+        keys = ((name, quantity.name, resolution) for resolution in case.resolutions)
+        return VerifiedRow(name, case, quantity, tuple(by_key[key] for key in keys if key in by_key))
+
+    return tuple(of(name, case, quantity) for name, case in cases.items() for quantity in case.quantities)

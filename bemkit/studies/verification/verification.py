@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -15,8 +15,7 @@ from bemkit.formulas import closest
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
 from bemkit.studies.engine import Attempt, Task, attempt, compute
-from bemkit.studies.verification.case import Case, Quantity
-from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.case import CASES, Case, Quantity
 from bemkit.studies.verification.records import FILE, Verification, VerificationRecord, rows_of
 from bemkit.version import __version__
 
@@ -70,17 +69,17 @@ def verify(
     """
     chosen = {name: cases[name]() for name in selected(names, tuple(cases))}
     finished = FILE.finished(file, LABELS)
-    tasks = []
+    tasks, wanted = [], set[Hashable]()
     for name, case in chosen.items():
         for resolution in case.resolutions[: case.n_quick if quick else None]:
-            keys = [(name, quantity.name, resolution) for quantity in case.quantities]
-            if not all(key in finished for key in keys):
-                tasks.append(
-                    Task((name, resolution), f"{name}, {resolution:g}", partial(compare, name, case, resolution))
-                )
-    known = {key for name, case in chosen.items() for key in _keys(name, case, quick=quick)}
-    records = [record for key, record in finished.items() if key in known]
-    records += FILE.keep(file, _flat(run(tasks)), finished, LABELS)
+            keys = {(name, quantity.name, resolution) for quantity in case.quantities}
+            wanted |= keys
+            if not keys <= finished.keys():
+                label = f"{name}, {resolution:g}"
+                tasks.append(Task((name, resolution), label, partial(compare, name, case, resolution)))
+    records = [record for key, record in finished.items() if key in wanted]
+    computed = (record for comparison in run(tasks) for record in comparison.records)
+    records += FILE.keep(file, computed, finished, LABELS)
     return Verification(rows_of(chosen, records))
 
 
@@ -124,14 +123,3 @@ def _measured(quantity: Quantity, solution: Solution | AssemblySolution | None) 
         return float(quantity.measure(solution)), ""
     except (LookupError, ArithmeticError, ValueError) as error:
         return np.nan, f"the solution lacks what is compared ({type(error).__name__}: {error})"
-
-
-def _keys(name: str, case: Case, *, quick: bool) -> Iterator[tuple[str, str, float]]:
-    for resolution in case.resolutions[: case.n_quick if quick else None]:
-        for quantity in case.quantities:
-            yield name, quantity.name, resolution
-
-
-def _flat(comparisons: Iterable[Comparison]) -> Iterator[VerificationRecord]:
-    for comparison in comparisons:
-        yield from comparison.records

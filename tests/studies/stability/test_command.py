@@ -12,7 +12,7 @@ from bemkit.cli.main import commands
 from bemkit.scene.toml import load_scene
 from bemkit.studies.engine import compute, compute_with_progress
 from bemkit.studies.stability import sweep as sweep_module
-from bemkit.studies.stability.axes import find_axes
+from bemkit.studies.stability.axes import AXES, find_axes
 from bemkit.studies.stability.random_scenes import random_case
 from bemkit.studies.stability.records import FILE, StabilityRecord, cells, to_csv, to_markdown
 from bemkit.studies.stability.report import draw_axis
@@ -101,7 +101,7 @@ def test_tables_leave_out_what_does_not_exist() -> None:
     nan = float("nan")
     row = StabilityRecord("sliding", 2.0, "named", "refused", 0, nan, nan, nan, nan, nan, nan, 0.1, "it slides")
     assert cells(row) == ["2", "named", "refused", "", "", "", "", "", "", ""]
-    axes = find_axes(["sliding"])
+    axes = find_axes(["sliding"], AXES)
     assert "| 2 | named | refused |" in to_markdown(axes, [row])
     assert draw_axis(axes[0], [row]).axes[0].get_title(loc="left") == "sliding"
 

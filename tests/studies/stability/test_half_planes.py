@@ -171,7 +171,7 @@ def test_axes_say_where_they_say_nothing() -> None:
     assert names_against(WAVY) == ["degenerate-size", "aspect-ratio", "grading"]
     assert names_against(bk.load_scene("paper-1")) == []
     with pytest.raises(StabilityError, match=r"axis 'aspect-ratio' says nothing .* no thickness .*: leave it out"):
-        list(sweep(PUNCH, find_axes(["aspect-ratio"])))
+        list(sweep(PUNCH, find_axes(["aspect-ratio"], AXES)))
 
 
 @pytest.mark.parametrize("name", slow_except(["driven", "rough"], "driven"))
@@ -187,7 +187,7 @@ def test_no_row_is_wrong_along_axes_that_say_something(name: str) -> None:
 
 def test_a_half_plane_is_pushed_to_the_edge_of_sliding() -> None:
     baseline = bk.run(replace(WAVY, mesh=bk.MeshOptions(elements=64)))
-    (axis,) = find_axes(["sliding"])
+    (axis,) = find_axes(["sliding"], AXES)
     for value, verdict in ((0.5, "right"), (0.9999, "right"), (1.01, "named")):
         case = axis.make(baseline, value)
         assert solve_and_judge("sliding", case, None).verdict == verdict

@@ -45,14 +45,14 @@ SLOW = ("grading", "degenerate-size", "aspect-ratio", "load-direction", "gap", "
 
 
 def shortened(name: str) -> Axis:
-    (axis,) = find_axes([name])
+    (axis,) = find_axes([name], AXES)
     return dataclasses.replace(axis, values=EXTREMES[name])
 
 
 def test_every_axis_is_tested_here() -> None:
     assert {axis.name for axis in AXES} == set(EXTREMES)
     with pytest.raises(UnknownAxisError, match="'rho': the axes are youngs-modulus, load"):
-        find_axes(["rho"])
+        find_axes(["rho"], AXES)
 
 
 @pytest.mark.parametrize("name", slow_only(EXTREMES, *SLOW))

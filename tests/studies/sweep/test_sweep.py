@@ -13,7 +13,7 @@ import bemkit as bk
 from bemkit.errors import BemkitError
 from bemkit.runs import shared_body as shared_module
 from bemkit.studies.sweep import sweep as sweep_module
-from bemkit.studies.sweep.keys import Key, VariedScene
+from bemkit.studies.sweep.grid import Key, with_values
 from bemkit.studies.sweep.table import Sweep
 from tests.studies.sweep.tables import equal_rows
 
@@ -29,7 +29,7 @@ def check_rows(scene: bk.Scene | bk.Assembly, table: Sweep) -> None:
     assert not table.failed
     for row in table.rows:
         keys = [Key(key) for key in table.keys]
-        alone = bk.run(VariedScene(scene).with_values(dict(zip(keys, row.values, strict=True))))
+        alone = bk.run(with_values(scene, dict(zip(keys, row.values, strict=True))))
         contacts = alone.contacts
         expected = {
             "force_normal": alone.force_normal,

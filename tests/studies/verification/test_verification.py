@@ -17,8 +17,7 @@ from bemkit.cli.main import main
 from bemkit.hdf5 import ResultFileError
 from bemkit.studies.engine import Task, compute
 from bemkit.studies.verification import verification as module
-from bemkit.studies.verification.case import Case, Quantity
-from bemkit.studies.verification.cases import CASES
+from bemkit.studies.verification.case import CASES, Case, Quantity
 from bemkit.studies.verification.report import print_verification, to_markdown
 from bemkit.studies.verification.verification import Comparison, verify
 from tests.slow import slow_only

@@ -17,8 +17,7 @@ from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.fixed_point import FixedPoint
 from bemkit.solvers.ssn import SemismoothNewton
 from bemkit.studies.stability.random_assemblies import blocks, corners, round_bodies
-from bemkit.studies.stability.random_assemblies.layout import Layout
-from bemkit.studies.stability.random_assemblies.members import Members
+from bemkit.studies.stability.random_assemblies.members import Layout, Members
 from bemkit.studies.stability.random_assemblies.similar import AssemblySimilarity
 from bemkit.studies.stability.random_scenes.draw import Draw, RandomCase
 from bemkit.studies.stability.random_scenes.histories import shear_of, sheared_steps

@@ -12,8 +12,7 @@ from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.scene.assembly import Touching
 from bemkit.scene.conditions import Clamped, Condition, Contact, Part, Pressure, Roller
 from bemkit.scene.copies import CircleCopies, GridCopies
-from bemkit.studies.stability.random_assemblies.layout import Layout, base
-from bemkit.studies.stability.random_assemblies.members import Members
+from bemkit.studies.stability.random_assemblies.members import Layout, Members, base
 from bemkit.studies.stability.random_scenes.draw import Draw
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Polygon, Rectangle
 from bemkit.scene.assembly import Touching
-from bemkit.studies.stability.random_assemblies.layout import Layout, base
-from bemkit.studies.stability.random_assemblies.members import Members
+from bemkit.studies.stability.random_assemblies.members import Layout, Members, base
 from bemkit.studies.stability.random_scenes.draw import Draw
 
 

@@ -1,26 +1,51 @@
-"""What the bodies of a random assembly are made of: material, mesh, weight, loads, laws, gaps between them."""
+"""What random assemblies are made of: bodies, materials, meshes, weight, supports, loads, laws, gaps between them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from bemkit.contact.further_laws import CohesiveCoulomb
 from bemkit.contact.laws import Coulomb, FrictionLaw, Frictionless, Tresca
+from bemkit.contact.obstacle import HalfPlane
 from bemkit.geometry.meshing.discretise import Algebraic, Uniform
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Shape
 from bemkit.operators.material import Material, Plane
-from bemkit.scene.assembly import ContactPair
+from bemkit.scene.assembly import ContactPair, Touching
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
-from bemkit.scene.conditions import Part, Pressure, Traction
+from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import ConstantCollocation, Discretisation, Galerkin, LinearGalerkin, QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.studies.stability.random_scenes.draw import Draw
 
 _RATIOS = (0.0, 0.2, 0.3, 0.3, 0.3, 0.4, 0.49, 0.4999, 0.5)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Bodies in their places, and what touches what."""
+
+    bodies: tuple[Body, ...]
+    contacts: tuple[ContactPair, ...] = field(default_factory=tuple)
+    touching: Touching | None = None
+
+
+def base(draw: Draw, side: str) -> tuple[Part, ...]:
+    """Draw what holds a body from below: now and then nothing."""
+    weights = {"clamped": 6.0, "given": 1.0, "rollers": 0.4, "obstacle": 0.7, "none": 0.2}
+    match draw.one_by_weight(weights):
+        case "clamped":
+            return (Part("base", Clamped(), (side,)),)
+        case "given":
+            return (Part("base", PrescribedDisplacement(0.0, draw.between(-1e-4, 1e-4)), (side,)),)
+        case "rollers":
+            return (Part("base", Roller(), (side,)),)
+        case "obstacle":
+            return (Part("base", Contact(HalfPlane((0.0, 0.0))), (side,)),)
+    return ()
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from bemkit.contact.spline import SplineObstacle
 from bemkit.errors import InputError
 from bemkit.geometry.placement import Placement
 from bemkit.geometry.shapes import Disk, ExteriorOf, PlateWithHole, Polygon, Rectangle, Ring, Sector, Shape
-from bemkit.geometry.symmetry import Symmetry
 from bemkit.scene.assembly import Assembly, ContactPair
 from bemkit.scene.body import Body
 from bemkit.scene.body_forces import BodyForce, Gravity, Rotation
@@ -58,6 +57,10 @@ class AssemblySimilarity:
     def _motion(self) -> Placement:
         return Placement(self.shift, self.turn)
 
+    @property
+    def _scaling(self) -> AffineMap:
+        return AffineMap((self.length, self.length))
+
     def points(self, points: FloatArray) -> FloatArray:
         """Map points (..., 2)."""
         return self._motion.forward(self.length * points)
@@ -91,11 +94,8 @@ class AssemblySimilarity:
             contacts=tuple(self._pair(pair) for pair in assembly.contacts),
             touching=touching,
             law=self._law(assembly.law),
-            symmetry=None if assembly.symmetry is None else self._lines(assembly.symmetry),
+            symmetry=None if assembly.symmetry is None else self._scaling.transformed(assembly.symmetry),
         )
-
-    def _lines(self, symmetry: Symmetry) -> Symmetry:
-        return AffineMap((self.length, self.length)).transformed(symmetry)
 
     def _pair(self, pair: ContactPair) -> ContactPair:
         law = None if pair.law is None else self._law(pair.law)
@@ -198,7 +198,7 @@ class AssemblySimilarity:
     def _part(self, part: Part) -> Part:
         where = part.where
         if where is not None and self.length != 1.0:  # regions are in the coordinates of the shape
-            where = TransformedRegion(where, AffineMap((self.length, self.length)))
+            where = TransformedRegion(where, self._scaling)
         return replace(part, where=where, condition=self._condition(part.condition))
 
     def _condition(self, condition: Condition) -> Condition:

@@ -10,15 +10,14 @@ import pytest
 import bemkit as bk
 from bemkit.scene.places import PlaceError
 from bemkit.studies.engine import StudyError
-from bemkit.studies.sweep.grid import all_rows, read_variation
-from bemkit.studies.sweep.keys import Key, VariedScene
+from bemkit.studies.sweep.grid import Key, all_rows, check_number, read_variation, with_values
 
 SCENE = bk.load_scene("paper-1")
 BODIES = bk.load_scene("two-cylinders")
 
 
 def changed(scene: bk.Scene | bk.Assembly, key: str, value: float) -> bk.Scene | bk.Assembly:
-    return VariedScene(scene).with_values({Key(key): value})
+    return with_values(scene, {Key(key): value})
 
 
 def test_numbers_of_a_scene_are_changed_and_nothing_else() -> None:
@@ -63,7 +62,7 @@ def test_numbers_of_several_bodies_are_changed() -> None:
 )
 def test_keys_that_lead_to_no_number_are_named(scene: bk.Scene | bk.Assembly, key: str, message: str) -> None:
     with pytest.raises(PlaceError, match=message):
-        VariedScene(scene).check([Key(key)])
+        check_number(scene, Key(key))
 
 
 def test_values_that_a_scene_refuses_are_named_with_their_key() -> None:
