@@ -70,7 +70,9 @@ class Level(Generic[AnyScene]):
         """Divide outlines of whose solution nothing is known."""
         keys, scenes, touching = _divided_bodies(asked)
         partitions = (
-            scene.mesh.first_partition(scene.shape.outline(), scene.selections, parts, scene.symmetry)
+            scene.mesh.first_partition(
+                scene.shape.outline(), scene.selections, parts, scene.symmetry, takes_layers=scene.takes_layers
+            )
             for scene, parts in zip(scenes, touching, strict=True)
         )
         return cls(asked, tuple(partitions), keys, touching)

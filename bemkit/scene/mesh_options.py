@@ -13,6 +13,8 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.meshing.discretise import Grading, Uniform, discretise
+from bemkit.geometry.meshing.division import divide
+from bemkit.geometry.meshing.layers import looking_partition
 from bemkit.geometry.meshing.partition import Partition, first_partition
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.symmetry import Symmetry
@@ -115,8 +117,24 @@ class MeshOptions:
         parts: Mapping[str, Selection],
         contact: Collection[str],
         symmetry: Symmetry | None = None,
+        *,
+        takes_layers: bool = False,
     ) -> Partition:
-        """Divide an outline for the first time if the accuracy decides; `contact` names the contact parts."""
+        """Divide an outline for the first time if the accuracy decides.
+
+        Parameters
+        ----------
+        outline : Outline
+        parts : mapping of str to Selection
+        contact : collection of str
+            Names of the contact parts.
+        symmetry : Symmetry, optional
+        takes_layers : bool
+            Whether the next mesh is made anew in layers: then this one only looks for places where the status changes.
+        """
+        if takes_layers and contact:
+            base = divide(outline, parts)
+            return looking_partition(base if symmetry is None else base.half(symmetry), contact, FIRST_ELEMENTS)
         return first_partition(outline, parts, FIRST_ELEMENTS, even=contact, symmetry=symmetry)
 
     def divide(
@@ -125,10 +143,12 @@ class MeshOptions:
         parts: Mapping[str, Selection],
         contact: Collection[str],
         symmetry: Symmetry | None = None,
+        *,
+        takes_layers: bool = False,
     ) -> BoundaryMesh:
-        """Divide an outline, for the first time if the accuracy decides; `contact` names the contact parts."""
+        """Divide an outline, if the accuracy decides as `first_partition` does."""
         if self.elements is None:
-            return self.first_partition(outline, parts, contact, symmetry).mesh
+            return self.first_partition(outline, parts, contact, symmetry, takes_layers=takes_layers).mesh
         return discretise(
             outline,
             n_elements=self.elements,

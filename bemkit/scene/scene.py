@@ -214,6 +214,11 @@ class Scene(ShownInNotebooks):
             return laws[0]
         return PiecewiseLaw(laws, nodes)
 
+    @property
+    def takes_layers(self) -> bool:
+        """Whether meshes that follow an accuracy are few elements in geometric layers."""
+        return self.discretisation.takes_layers and self.n_steps == 1
+
     def build_mesh(self) -> BoundaryMesh:
         """Divide the boundary into elements, with one mesh part for each part of the scene.
 
@@ -223,7 +228,8 @@ class Scene(ShownInNotebooks):
             If parts overlap or are empty, or there are too few elements, or the scene lacks its symmetry.
         """
         names = [part.name for part in self.contact_parts]
-        mesh = self.mesh.divide(self.shape.outline(), self.selections, names, self.symmetry)
+        outline, layers = self.shape.outline(), self.takes_layers
+        mesh = self.mesh.divide(outline, self.selections, names, self.symmetry, takes_layers=layers)
         if self.symmetry is not None:
             check_symmetry(self, mesh)
         return mesh

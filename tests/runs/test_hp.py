@@ -15,10 +15,12 @@ from bemkit.geometry.meshing.layers import (
     FACTOR,
     STEEPEST,
     layered_partition,
+    looking_partition,
     origins,
     refined_partition,
     shortest_length,
 )
+from bemkit.geometry.outline import Selection
 from bemkit.reference import answer_of, errors_of, find_reference
 from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.hp import LayeredMeshes, _settled
@@ -162,6 +164,29 @@ def test_layers_stand_at_ends_and_not_on_symmetry_lines() -> None:
     half = layered_partition(whole.half(bk.Symmetry(x=1.0)), {})
     # the halves of bottom and top have one layer, at their corner
     assert sorted(len(s) - 1 for s in half.parameters) == [3, 3, 4]
+
+
+def test_the_first_look_is_even_on_contact_parts_and_has_layers_at_their_ends() -> None:
+    base = divide(bk.Rectangle(2.0, 1.0).outline(), {"floor": Selection(("bottom",))})
+    floor, *others = looking_partition(base, {"floor"}, 40).parameters
+    lengths = np.diff(floor)
+    np.testing.assert_allclose(lengths[2:-2], lengths[2], rtol=1e-12)
+    np.testing.assert_allclose(lengths[[0, -1]], FACTOR * lengths[2], rtol=1e-12)
+    assert lengths.size == 14  # a share of 40 by the roots of lengths, and two layers
+    assert [len(s) - 1 for s in others] == [4, 4, 4]
+    floor = looking_partition(base.half(bk.Symmetry(x=1.0)), {"floor"}, 40).parameters[0]
+    lengths = np.diff(floor)
+    assert np.isclose(lengths, lengths[2]).sum() == lengths.size - 2  # no layer on the symmetry line
+
+
+def test_a_first_look_is_taken_where_layers_follow() -> None:
+    """The plan says so, too; quadratic elements, whose density follows, take more of them."""
+    quadratic = dataclasses.replace(
+        bk.load_scene("paper-1"), discretisation=bk.QuadraticGalerkin(), mesh=bk.MeshOptions(accuracy=1e-3)
+    )
+    layered = dataclasses.replace(quadratic, discretisation=bk.HpGalerkin())
+    assert risen("paper-1", 3e-5)[0].mesh.n_elements == layered.build_mesh().n_elements
+    assert layered.build_mesh().n_elements < 0.6 * quadratic.build_mesh().n_elements
 
 
 def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:

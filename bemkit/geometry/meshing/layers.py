@@ -7,15 +7,16 @@ exponential convergence together with a rising degree [BabuskaGuo1986]. Where an
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.meshing.discretise import share_elements
 from bemkit.geometry.meshing.division import Division, Piece
-from bemkit.geometry.meshing.partition import Partition
+from bemkit.geometry.meshing.partition import LEAST, Partition
 from bemkit.geometry.vectors import norms
 
 FACTOR = 0.2
@@ -33,6 +34,26 @@ NEXT_MOTION = 0.1
 """How far places where the contact status changes move from one mesh to the next, relative to the mesh before."""
 LARGEST_TURN = np.pi / 4.0
 """Angle by which a curve may turn on one element."""
+
+
+def looking_partition(base: Division, even: Collection[str], n_elements: int) -> Partition:
+    """Divide an outline of whose solution nothing is known, to find where the contact status changes.
+
+    Parameters
+    ----------
+    base : Division
+        The outline cut at corners and ends of parts.
+    even : collection of str
+        Parts with elements of equal length besides a layer at their ends: on a contact boundary anything may happen
+        anywhere. Other pieces take two elements and a layer at their ends.
+    n_elements : int
+        Shared among all pieces like the square roots of their lengths: what an even piece gets of them.
+    """
+    shares = np.sqrt(base.piece_lengths)
+    counts = share_elements(max(n_elements, LEAST * shares.size), shares)
+    n_even = np.where([piece.part in even for piece in base.pieces], counts, 2)
+    n_layers = FIRST_LAYERS[0] * _singular_ends(base)
+    return _balanced(base, base, [_first_layers(*ends) for ends in np.vstack([n_layers, n_even]).T.tolist()])
 
 
 def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]]) -> Partition:
@@ -140,9 +161,10 @@ def is_at_end(partition: Partition) -> BoolArray:
     return result
 
 
-def _first_layers(n_left: int, n_right: int) -> FloatArray:
-    left, right = (0.5 * FACTOR ** np.arange(n, 0, -1.0) for n in (n_left, n_right))
-    return np.concatenate([[0.0], left, [0.5], 1.0 - right[::-1], [1.0]])
+def _first_layers(n_left: int, n_right: int, n_even: int = 2) -> FloatArray:
+    """Return the ends of elements of equal length, the first and the last of them cut into layers."""
+    left, right = (FACTOR ** np.arange(n, 0, -1.0) / n_even for n in (n_left, n_right))
+    return np.concatenate([[0.0], left, np.arange(1.0, n_even) / n_even, 1.0 - right[::-1], [1.0]])
 
 
 def _fractions(piece: Piece, parameters: FloatArray) -> FloatArray:
