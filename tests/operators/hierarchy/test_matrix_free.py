@@ -74,7 +74,7 @@ def test_graded_meshes() -> None:
     system = iterated(mesh, frame)
     answers = solved(system, clamped(mesh)), solved(system_of(mesh, frame, True, 1e-12), clamped(mesh))
     assert np.abs(answers[0][1] - answers[1][1]).max() < 1e-8 * np.abs(answers[1][1]).max()
-    assert system.steps[0] <= 30
+    assert system.steps[0] <= 13  # with kinks in the prolongations of tractions 15
 
 
 @pytest.mark.parametrize("most", slow_except((1600, 6400), 1600))
@@ -85,9 +85,9 @@ def test_steps_do_not_grow_with_the_number_of_elements(most: int) -> None:
         system = iterated(mesh, np.tile(np.eye(2), (n, 1, 1)), 1e-9)
         solved(system, clamped(mesh))
         steps.append(system.steps[0])
-    # without groups 34 at 400 elements and 38 at 1600
-    assert 10 < min(steps)
-    assert max(steps) <= 22
+    # without groups 34 at 400 elements and 38 at 1600, with kinks in the prolongations of tractions 14 and 18
+    assert 8 < min(steps)
+    assert max(steps) <= 13
 
 
 def test_responses_begin_with_the_last_one() -> None:
@@ -177,14 +177,17 @@ def test_the_hierarchy_inverts_the_single_layer_on_waves() -> None:
     is_traction = np.tile([True, False], (n, 1))
     inverse = TractionHierarchy.of(is_traction, np.roll(np.arange(n), -1), np.full(n, 1.0 / n), constants)
     ratios = []
-    for number in (4, 16, 64):
+    for number in (4, 16, 64, 128, 192):
         wave = np.cos(2.0 * np.pi * number * np.arange(n) / n)
         kappa = 3.0 - 4.0 * MATERIAL.poisson_ratio
         caused = constants.single * np.pi * kappa / (2.0 * np.pi * number) * wave
-        ratios.append(float(inverse.apply(caused) @ wave / (wave @ wave)))
-    # equivalent to the inverse within a factor of two, at all frequencies
-    assert 0.5 < min(ratios)
-    assert max(ratios) < 2.0
+        found = inverse.apply(caused)
+        ratios.append(float(found @ wave / (wave @ wave)))
+        # with kinks in the prolongations 0.94
+        assert found @ wave > 0.995 * np.linalg.norm(found) * np.linalg.norm(wave)
+    # a twentieth from the inverse at all frequencies; with the finest level as heavy as the others a fifth
+    assert 0.94 < min(ratios)
+    assert max(ratios) < 1.06
 
 
 @pytest.mark.parametrize(
