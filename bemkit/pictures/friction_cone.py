@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bemkit.pictures.contact_axes import LIMIT, STATUS_COLOURS, traction_scale
+from bemkit.pictures.crowds import marked
 from bemkit.pictures.shown import Result
 from bemkit.results.drawing import axes_or_new, ignore_round_off, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
@@ -44,9 +45,9 @@ def draw_friction_cone(
         axes.plot(pressure[nodes], -bound, **style)
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
-        chosen = own & (words == word)
-        if chosen.any():
-            x, y = pressure[chosen], table.sigma_t[chosen]
+        chosen = np.stack([pressure, table.sigma_t], axis=1)[own & (words == word)]
+        if len(chosen):
+            x, y = chosen[marked(chosen, chosen[:, 0], scale)].T
             axes.scatter(x, y, s=18.0, color=colour, edgecolors="black", linewidths=0.4, zorder=3, label=word)
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     show_grid(axes)
