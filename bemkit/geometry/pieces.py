@@ -237,14 +237,10 @@ def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None
 
     Halves go first, a batch at a time: curves that coincide are found out after one descent to round-off.
     """
-    waiting = [(a, b, is_joint)]
+    waiting = _batches(a, b, is_joint)
     n_halved = 0
     while waiting:
         a, b, is_joint = waiting.pop()
-        if len(a) > _BATCH:
-            rest = np.arange(_BATCH, len(a))
-            waiting.append((a.take(rest), b.take(rest), is_joint[_BATCH:]))
-            a, b, is_joint = a.take(np.arange(_BATCH)), b.take(np.arange(_BATCH)), is_joint[:_BATCH]
         is_open = ~np.where(is_joint, _neighbours_part(a, b), _keep_apart(a, b))
         rows = np.flatnonzero(is_open)
         if not len(rows):
@@ -255,8 +251,15 @@ def _settle(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[int, int] | None
         if is_final.any() or n_halved > _MOST_HALVED:
             row = int(np.argmax(is_final))
             return int(a.owner[row]), int(b.owner[row])
-        waiting.append(_halve_pairs(a, b, is_joint))
+        waiting += _batches(*_halve_pairs(a, b, is_joint))
     return None
+
+
+def _batches(a: Pieces, b: Pieces, is_joint: BoolArray) -> list[tuple[Pieces, Pieces, BoolArray]]:
+    """Cut pairs into batches, the first one last."""
+    rows = np.arange(len(a))
+    cut = [rows[begin : begin + _BATCH] for begin in range(0, len(a), _BATCH)]
+    return [(a.take(each), b.take(each), is_joint[each]) for each in reversed(cut)]
 
 
 def _halve_pairs(a: Pieces, b: Pieces, is_joint: BoolArray) -> tuple[Pieces, Pieces, BoolArray]:

@@ -15,13 +15,11 @@ from bemkit.pictures.contact_axes import (
     near,
     traction_scale,
 )
+from bemkit.pictures.crowds import MANY, marked
 from bemkit.pictures.shown import Result
 from bemkit.pictures.traction_curves import traction_curve
 from bemkit.results.drawing import BLUE, VERMILION, Axes, axes_or_new, ignore_round_off, label_values, show_grid
 from bemkit.scene.unit_names import UnitNames, with_unit
-
-MOST_DOTS = 300
-"""Contact nodes of a part that are seen one by one: more would only thicken lines."""
 
 
 def draw_contact_displacement(
@@ -47,7 +45,7 @@ def draw_contact_displacement(
     axes, units = contact_axes(axes, solution, part, units, "Displacements on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, gap = contact.s[chosen], contact.gap[chosen]
-    marker = "o" if s.size <= MOST_DOTS else ""
+    marker = "o" if s.size <= MANY else ""
     axes.plot(s, contact.u_n[chosen], label="normal $u_n$", marker=marker, markersize=2.0, **FIRST)
     axes.plot(s, contact.u_t[chosen], label="tangential $u_t$", **SECOND)
     if np.any(np.isfinite(gap) & (gap != 0.0)):
@@ -63,14 +61,15 @@ def draw_contact_traction(
 
     Lines are the tractions of the discretisation: steps where they are constant on each element, straight or curved
     where they are of higher degree. Dots are the values at contact nodes, where the conditions of contact hold, if
-    there are no more than `MOST_DOTS`. Peaks that would flatten all else are cut, and the picture says so.
+    there are no more than `bemkit.pictures.crowds.MANY`. Peaks that would flatten all else are cut, and the picture
+    says so.
     """
     axes, units = contact_axes(axes, solution, part, units, "Tractions on the contact boundary")
     contact, chosen = solution.contact, solution.contact.rows(part)
     s, curve = contact.s[chosen], traction_curve(solution, part)
     axes.plot(curve.s, curve.normal, label=r"normal $\sigma_n$", **FIRST)
     axes.plot(curve.s, curve.tangential, label=r"tangential $\sigma_t$", **SECOND)
-    if s.size <= MOST_DOTS:
+    if s.size <= MANY:
         axes.plot(s, contact.sigma_n[chosen], linestyle="", marker="o", markersize=2.5, color=BLUE)
         axes.plot(s, contact.sigma_t[chosen], linestyle="", marker="o", markersize=2.0, color=VERMILION)
     if solution.friction_bound is not None:
@@ -126,9 +125,9 @@ def draw_friction_cone(
         axes.plot(pressure[nodes], -bound, **style)
     words = np.array(table.status_words())
     for word, colour in STATUS_COLOURS.items():
-        chosen = own & (words == word)
-        if chosen.any():
-            x, y = pressure[chosen], table.sigma_t[chosen]
+        chosen = np.stack([pressure, table.sigma_t], axis=1)[own & (words == word)]
+        if len(chosen):
+            x, y = chosen[marked(chosen, chosen[:, 0], scale)].T
             axes.scatter(x, y, s=18.0, color=colour, edgecolors="black", linewidths=0.4, zorder=3, label=word)
     axes.axhline(0.0, color="black", linewidth=0.6, zorder=0)
     show_grid(axes)

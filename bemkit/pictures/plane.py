@@ -66,7 +66,8 @@ def fill(axes: Axes, body: ShownBody, loops: list[FloatArray], frame: FloatArray
     """Fill the inside of a body; holes run the other way round and stay open."""
     from matplotlib.patches import PathPatch
 
-    axes.add_patch(PathPatch(inside(body, loops, frame), facecolor=BODY, edgecolor="none", zorder=1))
+    # no patch that sets limits: these would be sought along each of a million elements
+    axes.add_artist(PathPatch(inside(body, loops, frame), facecolor=BODY, edgecolor="none", zorder=1))
 
 
 def inside(body: ShownBody, loops: list[FloatArray], frame: FloatArray) -> Path:

@@ -103,7 +103,8 @@ def draw_stress(
     every = np.concatenate(values)
     extreme = float(every[np.argmax(np.abs(every))])
     title = f"{chosen.symbol}, up to {amount(extreme, 'stress', units)}\n{scene.title}"
-    axes = plane_axes(axes, scene.frame, title[0].upper() + title[1:], units)
+    axes = plane_axes(axes, scene.frame, "", units)
+    axes.set_title(title[0].upper() + title[1:], parse_math="$" not in scene.title, fontsize=11)
     largest = largest_shown(np.concatenate([each.points for each in found]), every, spacing)
     levels = _levels(largest, chosen.is_positive)
     for body, points, value in zip(scene.bodies, found, values, strict=True):

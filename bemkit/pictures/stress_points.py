@@ -18,6 +18,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.geometry.vectors import turned_right
 from bemkit.operators.material import Material
+from bemkit.pictures.crowds import seen_apart
 from bemkit.results.interior import interior_fields, whole_boundary
 from bemkit.results.solved_body import SolvedBody
 
@@ -25,6 +26,8 @@ _STEP = 0.7
 """Distance of the first points inside from the boundary, in lengths of their elements."""
 _SMALLEST = 1.0 / 8.0
 """Distance from the boundary, by the spacing far from it, below which points are not seen apart."""
+_CROWDED = 0.25
+"""Distance of points of a layer, by that from the boundary, below which one of them stands for all."""
 _GROWTH = 2.0
 """Of the distances from the boundary, from one layer of points to the next."""
 _PER_ELEMENT = 2
@@ -71,7 +74,7 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray, *, moved:
     inner = inner[fields.is_inside(inner)]
     corners, at_corners = _at_nodes(mesh, stresses.reshape(mesh.n_elements, n, 2, 2))
     points, at_points = np.concatenate([on_boundary, corners]), np.concatenate([stresses, at_corners])
-    seen = _seen(points, at_points, _SMALLEST * spacing)
+    seen = seen_apart(points, np.abs(at_points).max(axis=(1, 2)), _SMALLEST * spacing)
     if moved:
         own = values_on_elements(space, displacement)
         inside, at_ends = (
@@ -86,13 +89,6 @@ def stress_points(body: SolvedBody, spacing: float, frame: FloatArray, *, moved:
     return StressPoints(
         np.concatenate([points[seen], at_inner]), np.concatenate([at_points[seen], fields.stress(inner)])
     )
-
-
-def _seen(points: FloatArray, stresses: FloatArray, distance: float) -> IntArray:
-    """Return of points (n, 2) that are closer to each other than a distance the one with the largest stress."""
-    largest = np.argsort(-np.abs(stresses).max(axis=(1, 2)), kind="stable")
-    _, first = np.unique(np.round(points[largest] / distance), axis=0, return_index=True)
-    return np.sort(largest[first])
 
 
 def _on_boundary(
@@ -161,10 +157,12 @@ def _inner_points(
     layers = []
     depth = np.maximum(_STEP * lengths, _SMALLEST * spacing)
     while (going := depth < 1.5 * spacing).any():
-        points = on_boundary[going] - depth[going, None] * normals[going]
-        apart, _ = tree.query(points)
-        is_kept = apart > _STEP * depth[going]
-        layers.append(_thinned(points[is_kept], depth[going][is_kept]))
+        points, inward = on_boundary[going] - depth[going, None] * normals[going], depth[going]
+        few = _apart(points, _CROWDED * inward)  # each distance to the boundary takes long
+        points, inward = points[few], inward[few]
+        is_kept = tree.query(points)[0] > _STEP * inward
+        points, inward = points[is_kept], inward[is_kept]
+        layers.append(points[_apart(points, inward)])
         depth = np.where(going, _GROWTH * depth, np.inf)
     inner = np.concatenate([np.zeros((0, 2)), *layers])
     low, high = (frame[:, 0], frame[:, 1]) if is_exterior else (on_boundary.min(axis=0), on_boundary.max(axis=0))
@@ -177,9 +175,9 @@ def _inner_points(
     return np.concatenate([inner, grid])
 
 
-def _thinned(points: FloatArray, distance: FloatArray) -> FloatArray:
-    """Return one of those points (n, 2) that are closer to each other than distances (n,), about."""
+def _apart(points: FloatArray, distance: FloatArray) -> IntArray:
+    """Return which of points (n, 2) that are closer to each other than distances (n,), about, stand for all of them."""
     cell = 2.0 ** np.floor(np.log2(distance))
     keys = np.column_stack([np.round(points / cell[:, None]), cell])
     _, first = np.unique(keys, axis=0, return_index=True)
-    return points[np.sort(first)]
+    return np.sort(first)

@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
 from bemkit.pictures.contact_nodes import Nodes, contact_nodes, is_closed, node_points
+from bemkit.pictures.crowds import marked
 from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
 from bemkit.pictures.plane import draw_arrows, draw_bodies, joined_frame, plane_axes, set_frame
@@ -69,13 +70,15 @@ def _zone(contact: ContactTable) -> FloatArray | None:
 
 def _draw_nodes(axes: Axes, nodes: Nodes, words: Any, size: float) -> None:
     """Mark the contact nodes by their status, where they are drawn, with the tractions on their body."""
-    largest = float(np.hypot(*nodes.tractions.T).max(initial=0.0))
+    sizes = np.hypot(*nodes.tractions.T)
+    largest = float(sizes.max(initial=0.0))
     if largest > 0.0:
-        arrows = _LONGEST * size * nodes.tractions / largest
-        seen = np.hypot(*arrows.T) > _LEAST * _LONGEST * size
-        draw_arrows(axes, nodes.drawn[seen] - arrows[seen], arrows[seen], VERMILION, "traction on the body")
+        shown = marked(nodes.drawn, sizes, size)
+        shown = shown[sizes[shown] > _LEAST * largest]
+        arrows = _LONGEST * size * nodes.tractions[shown] / largest
+        draw_arrows(axes, nodes.drawn[shown] - arrows, arrows, VERMILION, "traction on the body")
     for word, colour in STATUS_COLOURS.items():
-        own = words == word
-        if own.any():
-            x, y = nodes.drawn[own].T
+        own = np.flatnonzero(words == word)
+        if own.size:
+            x, y = nodes.drawn[own[marked(nodes.drawn[own], sizes[own], size)]].T
             axes.scatter(x, y, s=16.0, color=colour, edgecolors="black", linewidths=0.4, zorder=4, label=word)

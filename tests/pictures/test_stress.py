@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from scipy.spatial import KDTree
 
 import bemkit as bk
+from bemkit.geometry import Rectangle, discretise
 from bemkit.pictures import draw_stress
 from bemkit.pictures.shown import shown
 from bemkit.pictures.stress import STRESSES, largest_shown
-from bemkit.pictures.stress_points import StressPoints, stress_points
+from bemkit.pictures.stress_points import StressPoints, _inner_points, stress_points
 from tests.slow import slow_except
 
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -34,6 +36,23 @@ def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
     inner = distance > 1e-9
     assert inner.sum() > 20
     assert distance[inner].min() >= 0.999 * spacing / 8.0
+
+
+def test_of_many_elements_few_points_are_measured_from_the_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From far away nearly all elements are equally near, and each search takes long."""
+    mesh, measured = discretise(Rectangle(1.0, 1.0).outline(), n_elements=8000), []
+
+    class Counting(KDTree):
+        def query(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[override]
+            measured.append(len(x))
+            distance, nearest = super().query(x)
+            return distance, nearest
+
+    monkeypatch.setattr("bemkit.pictures.stress_points.KDTree", Counting)
+    frame = np.array([[0.0, 1.0], [0.0, 1.0]])
+    found = _inner_points(mesh.centres, mesh.normals, mesh.lengths, 0.1, frame, is_exterior=False)
+    assert 400 < len(found)
+    assert max(measured) < 0.3 * mesh.n_elements
 
 
 @pytest.mark.parametrize(
@@ -132,6 +151,8 @@ def test_each_measure_has_a_scale_and_a_largest_value(measure: str) -> None:
     (scale,) = axes.child_axes
     assert STRESSES[measure].symbol in scale.get_ylabel()
     assert (scale.get_ylim()[0] == 0.0) == STRESSES[measure].is_positive
+    assert axes.title.get_parse_math()  # of symbols, but not of a title that would be no formula
+    assert not draw_stress(replace(solution, scene=replace(solution.scene, title="5 $"))).title.get_parse_math()
 
 
 def test_several_bodies_share_a_scale_and_the_axes_are_returned() -> None:

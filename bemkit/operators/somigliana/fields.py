@@ -21,6 +21,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from bemkit.errors import InputError
+from bemkit.geometry.curves import MovedCurve
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
@@ -125,7 +126,9 @@ class InteriorFields:
         self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
         self._locator = Locator(mesh)
         self._curved = CurvedElements(mesh, mesh.centre)
-        self._panels = Panels(mesh.transformed(shift=(float(mesh.centre[0]), float(mesh.centre[1]))))
+        centre = (float(mesh.centre[0]), float(mesh.centre[1]))
+        curves = tuple(MovedCurve(curve, centre, 1.0) for curve in mesh.curves)
+        self._panels = Panels(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))
 
     def is_inside(self, points: FloatArray) -> BoolArray:
         """Return the (n,) mask of the (n, 2) points [m] that lie strictly inside the body."""
