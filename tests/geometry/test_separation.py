@@ -65,7 +65,7 @@ def test_no_point_of_a_segment_is_nearer_than_the_distance(p, a, b, fraction: fl
 
 
 def test_pairs_are_settled_batch_by_batch_each_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("bemkit.geometry.validity.self_intersection._BATCH", 4)
+    monkeypatch.setattr("bemkit.geometry.pieces._BATCH", 4)
     taken = []
 
     def take(pieces: Pieces, index: IntArray) -> Pieces:
