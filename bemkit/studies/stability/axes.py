@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import resources
 from math import radians
 from typing import Any, Generic, TypeVar
 
@@ -92,7 +94,7 @@ class UnknownAxisError(InputError):
 
 
 _BLOCK_FRICTION = 0.5
-_REFERENCE_GRADING = 1e6
+_REFERENCE_GRADING = 1e6  # as in axes.toml
 
 
 def changed(baseline: Baseline, change: Callable[[Any], Any]) -> Scene | Assembly:
@@ -265,87 +267,52 @@ def _of_half_planes(reason: str, *, only_periodic: bool = False) -> Callable[[Sc
     return given
 
 
-_UNITS = "same sets, same linear solves, results equal to 1e-9 after scaling"
-_FREE = "right answer or named error"
-_INDEPENDENT = "same answer for every rho, or named status"
-_DECADES = tuple(10.0**k for k in (-12, -9, -6, -3, 3, 6, 9, 12, 15))
-_SIZES = tuple(10.0**k for k in range(-9, 10, 3) if k)
-_NEAR_DEGENERATE = (0.5, 0.99, 1.0 - 1e-6, 1.0, 1.0 + 1e-6, 1.01, 2.0)
-_RATIOS = (-0.5, 0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.499999, 0.4999999, 0.5)
-_COEFFICIENTS = (0.0, 0.01, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0, 1000.0)
-_OFFSETS = (-1e3, -1.0, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999999, 1.0, 1.000001, 2.0, 1e3)
-_ANGLES = (0.0, 1.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0, 135.0, 180.0, -15.0, -45.0, -90.0)
-_PUSHES = (0.0, 0.5, 0.9, 0.99, 1.0 - 1e-4, 1.0, 1.0 + 1e-4, 1.01, 1.1, 2.0, 100.0)
-_STRETCHES = tuple(10.0**k for k in (-3, -2, -1, 0, 1, 2, 3))
-_PENALTIES = tuple(10.0**k for k in range(-8, 13, 2))
-_SHARES = (0.125, 0.25, 0.5, 1.0, 2.0)
-_GRADINGS = (1e2, 1e4, _REFERENCE_GRADING, 1e8, 1e10, 1e12)
+def read_axes(
+    group: str,
+    makes: Mapping[str, Callable[[Any, float], Case]],
+    reasons: Mapping[str, Callable[[Any], str]],
+) -> tuple[Axis[Any], ...]:
+    """Return the axes of a group in ``axes.toml``, with what makes their cases and what says why to leave them out."""
+    text = (resources.files("bemkit") / "studies" / "stability" / "axes.toml").read_text("utf-8")
+    return tuple(
+        Axis(
+            name=name,
+            label=table["label"],
+            promise=table["promise"],
+            values=tuple(table["values"]),
+            make=makes[name],
+            reference=table.get("reference"),
+            reason_against=reasons.get(name, lambda scene: ""),
+        )
+        for name, table in tomllib.loads(text)[group].items()
+    )
 
-AXES: tuple[Axis[Solution], ...] = (
-    Axis("youngs-modulus", "factor of Young's modulus", _UNITS, _DECADES, similar(Similarity, "modulus")),
-    Axis("load", "factor of all loads and gaps", _UNITS, _DECADES, similar(Similarity, "stress")),
-    Axis("size", "factor of all lengths", _UNITS, _SIZES, similar(Similarity, "length")),
-    Axis(
-        "position",
-        "distance from the origin / diameter",
-        "results equal up to the round-off of gaps, 4 eps distance; refused beyond 1e7",
-        (1.0, 1e2, 1e4, 1e6, 1e8, 1e12),
-        moved(Similarity),
-    ),
-    Axis(
-        "degenerate-size",
-        "diameter / diameter at which V with log|r| is singular",
-        _UNITS,
-        _NEAR_DEGENERATE,
-        _degenerate,
-        reason_against=_of_half_planes(
+
+AXES: tuple[Axis[Solution], ...] = read_axes(
+    "one-body",
+    {
+        "youngs-modulus": similar(Similarity, "modulus"),
+        "load": similar(Similarity, "stress"),
+        "size": similar(Similarity, "length"),
+        "position": moved(Similarity),
+        "degenerate-size": _degenerate,
+        "poisson-ratio": _poisson,
+        "friction": friction,
+        "gap": _gap,
+        "load-direction": _turned,
+        "sliding": _pushed,
+        "aspect-ratio": _stretched,
+        "rho-newton": _penalised(lambda rho: SemismoothNewton(rho=rho)),
+        "rho-augmented": _penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)),
+        "elements": _elements,
+        "grading": _graded,
+    },
+    {
+        "degenerate-size": _of_half_planes(
             "the flexibility of a half-plane, measured by its strip, is singular at no size"
         ),
-    ),
-    Axis(
-        "poisson-ratio", "Poisson's ratio", f"{_FREE}; drift proportional to 1/2 - nu near 1/2", _RATIOS, _poisson, 0.5
-    ),
-    Axis("friction", "friction coefficient", _FREE, _COEFFICIENTS, friction),
-    Axis("gap", "gap added / largest displacement", _FREE, _OFFSETS, _gap),
-    Axis("load-direction", "turn of all loads [degrees]", _FREE, _ANGLES, _turned),
-    Axis("sliding", "push / friction available, loose body", "solved below 1, refused above", _PUSHES, _pushed, 0.0),
-    Axis(
-        "aspect-ratio",
-        "stretch along x",
-        _FREE,
-        _STRETCHES,
-        _stretched,
-        reason_against=_of_half_planes("a half-plane has no thickness to compare its length with"),
-    ),
-    Axis(
-        "rho-newton",
-        "rho / (E'/L), semismooth Newton",
-        _INDEPENDENT,
-        _PENALTIES,
-        _penalised(lambda rho: SemismoothNewton(rho=rho)),
-    ),
-    Axis(
-        "rho-augmented",
-        "rho / (E'/L), augmented Lagrangian",
-        _INDEPENDENT,
-        _PENALTIES,
-        _penalised(lambda rho: AugmentedLagrangian(rho_n=rho, rho_t=rho)),
-    ),
-    Axis(
-        "elements",
-        "number of elements / that of the scene",
-        "right answer; drift is the discretisation error",
-        _SHARES,
-        _elements,
-    ),
-    Axis(
-        "grading",
-        "largest / smallest element",
-        "solution unchanged to 1e-6 from 1e6 on",
-        _GRADINGS,
-        _graded,
-        _REFERENCE_GRADING,
-        reason_against=_of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True),
-    ),
+        "aspect-ratio": _of_half_planes("a half-plane has no thickness to compare its length with"),
+        "grading": _of_half_planes("the elements of a periodic half-plane are equal", only_periodic=True),
+    },
 )
 """Every axis, in the order of the report."""
