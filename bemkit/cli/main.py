@@ -22,15 +22,15 @@ from bemkit.results.streams import PipeClosedError, guarded_streams
 from bemkit.version import __version__
 
 _COMMANDS = {
-    "cite": ("cite", "Name the works behind a scene or a result."),
+    "cite": ("listings", "Name the works behind a scene or a result."),
     "critical-friction": ("critical_friction", "Find the friction at which sliding states lose uniqueness."),
     "outline": ("outline", "Show the sides of a part from a file; write a scene to start from."),
     "plan": ("plan", "Say what a scene needs and what it leaves out, without solving it."),
     "plot": ("plot", "Draw a result or a scene."),
     "report": ("report", "Write a page on a result or a scene."),
     "run": ("run", "Solve a scene."),
-    "scenes": ("scenes", "List the scenes that come with bemkit."),
-    "schema": ("schema", "Print the JSON schema of scene files, for editors."),
+    "scenes": ("listings", "List the scenes that come with bemkit."),
+    "schema": ("listings", "Print the JSON schema of scene files, for editors."),
     "show": ("show", "Show a result file."),
     "stability": ("stability", "Drive a scene to its extremes, or solve random ones, and judge the answers."),
     "study": ("study", "Measure error against run time; make the tables of the paper."),

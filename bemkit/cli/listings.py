@@ -1,13 +1,36 @@
-"""The command ``bemkit cite``."""
+"""The commands ``bemkit scenes``, ``schema`` and ``cite``: what there is to read, to write and to name."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
 
 from bemkit.cli.options import shown_progress
 from bemkit.results.streams import print_data
+
+
+@click.command()
+def scenes() -> None:
+    """List the scenes that are shipped with bemkit."""
+    with shown_progress(quiet=False):
+        from bemkit.scene.toml import shipped_scenes
+
+        titles = shipped_scenes()
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        print(f"{name:<{width}}  {title}")
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON schema of scene files, by which editors check them while they are written."""
+    with shown_progress(quiet=False):
+        from bemkit.scene.schema import scene_schema
+
+        text = json.dumps(scene_schema(), indent=1, ensure_ascii=False, allow_nan=False)
+    print_data(text + "\n")
 
 
 @click.command()
