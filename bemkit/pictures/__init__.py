@@ -8,6 +8,7 @@ from bemkit.pictures.contact_curves import draw_contact_displacement as draw_con
 from bemkit.pictures.contact_curves import draw_contact_traction as draw_contact_traction
 from bemkit.pictures.contact_curves import draw_friction_cone as draw_friction_cone
 from bemkit.pictures.contact_map import draw_contact_map as draw_contact_map
+from bemkit.pictures.contact_map import draw_zoom as draw_zoom
 from bemkit.pictures.convergence import draw_convergence as draw_convergence
 from bemkit.pictures.deformation import draw_deformation as draw_deformation
 from bemkit.pictures.deformation import draw_scene as draw_scene
@@ -17,4 +18,3 @@ from bemkit.pictures.load_history import draw_status_over_time as draw_status_ov
 from bemkit.pictures.load_history import draw_work as draw_work
 from bemkit.pictures.outline import draw_outline as draw_outline
 from bemkit.pictures.stress import draw_stress as draw_stress
-from bemkit.pictures.zoom import draw_zoom as draw_zoom

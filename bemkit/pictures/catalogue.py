@@ -16,13 +16,12 @@ from bemkit.pictures.contact_curves import (
     draw_contact_traction,
     draw_friction_cone,
 )
-from bemkit.pictures.contact_map import draw_contact_map
+from bemkit.pictures.contact_map import draw_contact_map, draw_zoom, is_short
 from bemkit.pictures.convergence import draw_convergence
 from bemkit.pictures.deformation import draw_deformation, draw_scene
 from bemkit.pictures.load_history import draw_friction_loop, draw_status_over_time, draw_work, has_friction
 from bemkit.pictures.shown import Result
 from bemkit.pictures.stress import STRESSES, draw_stress
-from bemkit.pictures.zoom import draw_zoom, is_short
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.drawing import Axes, Figure
 

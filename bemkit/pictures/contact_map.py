@@ -1,19 +1,31 @@
-"""All contacts at once: status by colour, pressure by the length of a comb."""
+"""Contacts in the plane: all at once, and the zone of contact from near by with the tractions of its nodes."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from bemkit.arrays import FloatArray
 from bemkit.pictures.contact_axes import STATUS_COLOURS
-from bemkit.pictures.contact_nodes import contact_directions, node_points
+from bemkit.pictures.contact_nodes import Nodes, contact_directions, contact_nodes, is_closed, node_points
+from bemkit.pictures.crowds import marked
+from bemkit.pictures.magnification import magnification
 from bemkit.pictures.obstacles import draw_obstacles, draw_rigid_bodies
-from bemkit.pictures.plane import draw_initial, plane_axes, set_frame
+from bemkit.pictures.plane import draw_arrows, draw_bodies, draw_initial, joined_frame, plane_axes, set_frame
 from bemkit.pictures.shown import Result, Shown, shown
-from bemkit.results.drawing import Axes, legend_below
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.drawing import VERMILION, Axes, legend_below
 from bemkit.scene.unit_names import UnitNames, amount
 
 _TOOTH, _SHARE = 0.1, 1.0 / 3.0
 """Length of the longest tooth: share of the picture, or of a body where there are many."""
+SHORT = 0.4
+"""Size of a zone of contact, relative to the bodies, below which it is worth a picture of its own."""
+_LONGEST, _LEAST = 0.25, 0.01
+"""Length of the longest arrow in sizes of the zone, and share of it below which there is none."""
+_NODES_AROUND = 3.0
+"""Distances of neighbouring nodes that the frame holds around a zone of a single node."""
 
 
 def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
@@ -54,3 +66,61 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
 def _longest_tooth(scene: Shown) -> float:
     diameters = [body.mesh.diameter for body in scene.bodies if not body.mesh.is_exterior]
     return float(min(_TOOTH * scene.size, _SHARE * np.median(diameters or [np.inf])))
+
+
+def is_short(solution: Result) -> bool:
+    """Tell whether the contact that is closed takes a small share of the picture of all bodies."""
+    scene = shown(solution)
+    frame = _zone(scene.contact)
+    return frame is not None and float(np.hypot(*np.ptp(frame, axis=1))) < SHORT * scene.size
+
+
+def draw_zoom(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
+    """Draw the zone of contact from near by, with the tractions on the contact nodes as arrows.
+
+    Parameters
+    ----------
+    solution : Solution or AssemblySolution
+        With contact; where nothing touches, the whole contact boundary is shown.
+    axes, units : optional
+        As for `bemkit.pictures.deformation.draw_deformation`.
+    """
+    scene = shown(solution)
+    frame = _zone(scene.contact)
+    if frame is None:
+        frame = joined_frame(node_points(scene.contact))
+    size = max(float(np.ptp(frame, axis=1).max()), _NODES_AROUND * float(scene.contact.weight.max()))
+    middle = frame.mean(axis=1)
+    frame = np.stack([middle - 0.8 * size, middle + 0.8 * size], axis=1)
+    factor = magnification(scene, size)
+    axes = plane_axes(axes, frame, f"Zone of contact\n{scene.title}", units or scene.units)
+    draw_bodies(axes, scene, factor)
+    set_frame(axes, frame, margin=0.0)
+    draw_rigid_bodies(axes, scene, factor)
+    set_frame(axes, frame, margin=0.0)
+    draw_obstacles(axes, scene)
+    _draw_nodes(axes, contact_nodes(solution, scene, factor), np.array(scene.contact.status_words()), size)
+    legend_below(axes)
+    return axes
+
+
+def _zone(contact: ContactTable) -> FloatArray | None:
+    """Return the frame of the nodes that touch, None if there are none."""
+    closed = is_closed(contact)
+    return joined_frame(node_points(contact)[closed]) if closed.any() else None
+
+
+def _draw_nodes(axes: Axes, nodes: Nodes, words: Any, size: float) -> None:
+    """Mark the contact nodes by their status, where they are drawn, with the tractions on their body."""
+    sizes = np.hypot(*nodes.tractions.T)
+    largest = float(sizes.max(initial=0.0))
+    if largest > 0.0:
+        shown = marked(nodes.drawn, sizes, size)
+        shown = shown[sizes[shown] > _LEAST * largest]
+        arrows = _LONGEST * size * nodes.tractions[shown] / largest
+        draw_arrows(axes, nodes.drawn[shown] - arrows, arrows, VERMILION, "traction on the body")
+    for word, colour in STATUS_COLOURS.items():
+        own = np.flatnonzero(words == word)
+        if own.size:
+            x, y = nodes.drawn[own[marked(nodes.drawn[own], sizes[own], size)]].T
+            axes.scatter(x, y, s=16.0, color=colour, edgecolors="black", linewidths=0.4, zorder=4, label=word)

@@ -13,9 +13,9 @@ import bemkit as bk
 from bemkit.geometry.shapes import HalfPlaneBody
 from bemkit.geometry.spaces import dof_points
 from bemkit.pictures import draw_deformation, draw_scene, draw_zoom, figures
+from bemkit.pictures.contact_map import is_short
 from bemkit.pictures.magnification import LINE, exaggeration, magnification
 from bemkit.pictures.shown import at_mesh_nodes, shown
-from bemkit.pictures.zoom import is_short
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.runs.run import run
 from bemkit.scene.plane_motion import FarField
