@@ -77,10 +77,9 @@ class DensityMeshes:
         errors = StepErrors.of(solutions[-1])
         densities = self._densities(level, errors)
         own = [float(densities[key].sum()) for key in level.keys.values()]
-        bodies = errors.worst.solved_bodies
-        spread = (SPREAD if bodies[0].mesh.surface is None else HALF_PLANE_SPREAD) if any(level.touching) else 0.0
+        spread = (SPREAD if errors.surface is None else HALF_PLANE_SPREAD) if any(level.touching) else 0.0
         is_accurate = self.error(solutions[-1]) <= self.accuracy
-        n_elements = int(next_size(errors.worst.n_elements, sum(own) / (1.0 - spread), is_accurate=is_accurate))
+        n_elements = next_size(errors.worst.n_elements, sum(own) / (1.0 - spread), is_accurate=is_accurate)
         partitions = [
             better_partition(
                 member.partition,
@@ -89,7 +88,7 @@ class DensityMeshes:
                 cuts=zone_cuts(member.partition, member.ends),
                 spread_over=touching,
                 spread=spread,
-                idle=_idle_elements(member.bodies[0]),
+                idle=None if errors.surface is None else _idle_elements(member.bodies[0]),
             )
             for member, density, touching in zip(level.members(errors.worst), densities, level.touching, strict=True)
         ]

@@ -88,8 +88,10 @@ class StepErrors(Generic[AnySolution]):
 
     @cached_property
     def surface(self) -> SurfaceErrors | None:
-        """Errors of the tractions of a half-plane; None of other bodies."""
-        errors = [body.surface_errors for step in self.steps for body in step.solved_bodies]
+        """Errors of the tractions of a half-plane that is the only body; None of other bodies."""
+        if len(self.worst.solved_bodies) > 1:
+            return None
+        errors = [step.solved_bodies[0].surface_errors for step in self.steps]
         known = [each for each in errors if each is not None]
         own = self.worst.solved_bodies[0].surface_errors
         return None if own is None else own.at_worst(known)

@@ -34,6 +34,11 @@ def test_fast_cases_are_met() -> None:
     assert len(kirsch.errors) == 2
 
 
+@pytest.mark.parametrize("name", ["receding-pair", "cattaneo-mindlin"])
+def test_meshes_of_several_bodies_follow_the_solution(name: str) -> None:
+    assert not bk.verify([name], quick=True).missed
+
+
 @pytest.mark.slow
 def test_all_cases_are_met() -> None:
     found = bk.verify()
