@@ -289,6 +289,11 @@ class HierarchicalFactor:
         return self._of_border(self._loaded(-1, 0))[:, 0]
 
     @property
+    def is_current(self) -> bool:
+        """Whether the factors are those of the laws: `update` has come and met no error."""
+        return not self._stale
+
+    @property
     def n_bytes(self) -> int:
         """Memory of all factors [bytes]."""
         return sum(each.n_bytes for level in self._levels for each in level if each is not None)
