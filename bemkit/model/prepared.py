@@ -7,7 +7,7 @@ p and displacements by p L / E'.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import zip_longest
 
@@ -241,7 +241,9 @@ def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared,
     """Work out what scenes that follow each other in time say on a mesh, in the units of the largest load."""
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
     first = prepare(steps[0], mesh, units)
-    return (first, *(first.under(step) for step in steps[1:]))
+    later = tuple(first.under(step) for step in steps[1:])
+    first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
+    return (first, *later)
 
 
 def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> Prepared:

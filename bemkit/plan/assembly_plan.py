@@ -12,9 +12,9 @@ from bemkit.model.assembled.placed import PlacedBody, groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver, prepare_assembly_steps
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem
+from bemkit.operators.steklov_poincare.needs import CONTACT_STEPS, BodyCase, BodyNeeds, PlanItem, seconds_of
 from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
-from bemkit.plan.plan import CONTACT_STEPS, Plan, Sizes, friction_item, further_meshes, last_items, seconds_of
+from bemkit.plan.plan import LEAST_SECONDS, Plan, Sizes, friction_item, further_meshes, last_items
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 
@@ -58,7 +58,7 @@ def plan_assembly(steps: Sequence[PreparedAssembly]) -> Plan:
         sizes=sizes,
         work=sum((each.work for each in needs), OperationCounts(contact_unknowns=sizes.n_contact_unknowns)),
         memory=int(kept + max(contact, *(each.memory - each.kept for each in needs))),
-        seconds=seconds_of(sum(each.evaluations for each in needs), flops),
+        seconds=LEAST_SECONDS + seconds_of(sum(each.evaluations for each in needs), flops),
         items=tuple(_items(first, sizes, len(steps), is_dense=is_dense)),
         warnings=tuple(dict.fromkeys(warning for each in needs for warning in each.warnings)),
     )

@@ -20,19 +20,24 @@ from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.solvers import LinearSolver
 from bemkit.operators.rigid_modes import admissible_modes
-from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanItem, physical_memory
+from bemkit.operators.steklov_poincare.needs import (
+    CONTACT_STEPS,
+    BodyCase,
+    BodyNeeds,
+    PlanItem,
+    physical_memory,
+    seconds_of,
+)
 from bemkit.operators.stopwatch import announce
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.registry import BODY_FORCES
 from bemkit.scene.scene import Scene
 
 _BYTES = 8
-CONTACT_STEPS = 8
-"""Steps of Newton's method for a contact problem; they hardly depend on its size."""
 _FLOPS_PER_NUMBER = 30.0
 """A number that is only moved through memory takes as long as so many flops of a factorisation."""
-_SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP, _LEAST_SECONDS = 2e-8, 1e-10, 0.1
-"""Of a common computer: for a closed-form integral, for a flop of a factorisation, and for a scene of any size."""
+LEAST_SECONDS = 0.1
+"""Of a common computer, for a scene of any size."""
 _MANY = 10_000
 """Elements that are divided and planned in a moment, whether they fit or not."""
 _FEW = 4_000
@@ -298,17 +303,12 @@ def _memory(sizes: Sizes, needs: BodyNeeds) -> int:
     return max(needs.memory, needs.kept + int(_BYTES * (r * r + r * c + 4.2 * rows)))
 
 
-def seconds_of(evaluations: float, flops: float) -> float:
-    """Return the run time [s] of a common computer for closed-form integrals and flops."""
-    return _LEAST_SECONDS + _SECONDS_PER_EVALUATION * evaluations + _SECONDS_PER_FLOP * flops
-
-
 def _seconds(sizes: Sizes, needs: BodyNeeds, n_steps: int) -> float:
     c, u = sizes.n_contact_unknowns, sizes.n_displacements
     if needs.is_matrix_free:
         c = u = 0
     of_step = 2.0 / 3.0 * c**3 + _FLOPS_PER_NUMBER * (60.0 * c * c + u * u) if c else 0.0
-    return seconds_of(needs.evaluations, needs.flops + CONTACT_STEPS * n_steps * of_step)
+    return LEAST_SECONDS + seconds_of(needs.evaluations, needs.flops + CONTACT_STEPS * n_steps * of_step)
 
 
 def announce_plan(plan: Plan) -> None:
@@ -344,8 +344,9 @@ def check_elements(scene: Scene) -> None:
     if n_elements is None or n_elements <= max(_MANY, few) or is_periodic:
         return
     plan, growth = _plan_of(scene, few), n_elements / few
-    if plan.is_compressed:
-        memory = plan.memory + int((growth - 1.0) * (_plan_of(scene, 2 * few).memory - plan.memory))
+    if plan.is_compressed:  # on meshes where what does not grow is all there
+        one, two = (_plan_of(scene, factor * few).memory for factor in (2, 4))
+        memory = one + int((0.5 * growth - 1.0) * (two - one))
     else:
         memory = int(growth**2 * plan.memory)
     _check(int(growth * plan.sizes.n_elements), memory, plan.is_compressed)

@@ -17,6 +17,8 @@ from bemkit.contact.problem import ContactProblem
 from bemkit.errors import InputError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor
 from bemkit.operators.hierarchy.system import HierarchicalSystem
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
@@ -168,6 +170,33 @@ def test_a_response_factors_what_has_changed_alone() -> None:
     one[0] = True
     body.respond(held.replaced(one, separated(problem.n_contact)))
     assert factor.n_factored == 1 < first == factor.compression.tree.n_leaves
+
+
+def test_a_body_is_compressed_and_factored_once_for_all_load_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    compressed, factored = [], []
+    compress, update = Compression.of.__func__, HierarchicalFactor.update  # type: ignore[attr-defined]
+
+    def of(cls: type, *arguments: object) -> Compression:
+        compressed.append(compress(cls, *arguments))
+        result: Compression = compressed[-1]
+        return result
+
+    def updated(factor: HierarchicalFactor, laws: ElementLaws) -> None:
+        update(factor, laws)
+        factored.append(factor.n_factored)
+
+    monkeypatch.setattr(Compression, "of", classmethod(of))
+    monkeypatch.setattr(HierarchicalFactor, "update", updated)
+    place = "parts.left-load.condition.x"
+    steps = bk.Step(1.0, {place: 0.0}), bk.Step(3.0, {place: "0.5*(t - 1)"}, increments=2)
+    scenes = [replace(scene, steps=steps) for scene in in_both_ways(paper(1), 960)]
+    solution, dense = (bk.run(scene) for scene in scenes)
+    assert len(compressed) == 1  # though nothing presses from the left in the first step
+    n_leaves = compressed[0].tree.n_leaves
+    assert factored[0] == n_leaves
+    assert max(factored[1:]) <= 0.5 * n_leaves  # where contact is
+    np.testing.assert_array_equal(solution.contact.status, dense.contact.status)
+    assert solution.force_tangential == pytest.approx(dense.force_tangential, rel=1e-9)
 
 
 def test_the_certificate_finds_states_that_are_no_responses() -> None:

@@ -13,6 +13,7 @@ from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
 from bemkit.contact.condensation.reduction import CondensedBody
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
+from bemkit.operators.hierarchy.factor import HierarchicalFactor
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.hierarchical_galerkin import HierarchicalGalerkin
@@ -111,6 +112,25 @@ def test_estimated_errors_and_the_meshes_that_follow_them_are_those_of_dense_equ
     assert compressed.n_elements == dense.n_elements
     # the error itself is a small difference of tractions that agree to 1e-9
     assert compressed.estimated_error == pytest.approx(dense.estimated_error, rel=1e-6)
+
+
+def test_tractions_are_those_of_the_last_answer_without_another_factorisation() -> None:
+    model = build_model(prepare(scene := in_both_ways(paper(1), 240, 1)[0], scene.build_mesh()))
+    assert isinstance(model.elastic, HierarchicalGalerkin)
+    other = HierarchicalGalerkin(model.elastic.mesh, model.elastic.material, model.elastic.options)
+    fields = model.body.recover(model.problem.sticking_state)
+    factored = []
+    with pytest.MonkeyPatch.context() as patch:
+        update = HierarchicalFactor.update
+        patch.setattr(HierarchicalFactor, "update", lambda *each: (factored.append(each), update(*each)))
+        tractions = model.elastic.element_tractions(*fields)
+        assert not factored
+        again = other.element_tractions(*fields)
+        elsewhere = model.elastic.element_tractions(2.0 * fields[0], 2.0 * fields[1])
+    assert len(factored) == 2
+    size = np.abs(again).max()
+    np.testing.assert_allclose(tractions, again, atol=1e-8 * size)
+    np.testing.assert_allclose(elsewhere, 2.0 * again, atol=1e-8 * size)
 
 
 def test_without_contact_all_of_the_body_is_solved_for() -> None:

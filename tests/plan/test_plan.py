@@ -184,7 +184,7 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("degree", "n_elements"), [(0, 3000), (0, 10_000), (1, 3000), (2, 1500)])
+@pytest.mark.parametrize(("degree", "n_elements"), [(0, 3000), (0, 10_000), (0, 100_000), (1, 3000), (2, 1500)])
 def test_the_largest_memory_of_compressed_equations_is_foreseen(degree: int, n_elements: int) -> None:
     """With and without compiled kernels; degree 0 are the constant elements of collocation."""
     discretisation = bk.Galerkin(degree) if degree else bk.ConstantCollocation()

@@ -23,6 +23,15 @@ PUNCH_STEPS = (
     bk.Step(3.0, {"rigid.punch.x": "1e-3*sin(pi*(t - 1))"}, increments=4),
 )
 PUNCH = replace(driven(x=0.0, force_y=-1e-3), law=bk.SlipWeakening(0.3, 0.2, 1e-3), steps=PUNCH_STEPS)
+COMPRESSED = replace(
+    bk.load_scene("paper-1"),
+    mesh=bk.MeshOptions(elements=240),
+    linear_solver=bk.Hierarchical(),
+    steps=(
+        bk.Step(1.0, {"parts.left-load.condition.x": 0.0}),
+        bk.Step(5.0, {"parts.left-load.condition.x": "0.25*(t - 1)"}, increments=4),
+    ),
+)
 
 
 class Killed(BaseException):
@@ -76,6 +85,21 @@ def test_a_killed_run_is_continued_to_the_same_bits(
             assert one.as_dict() == two.as_dict()
             np.testing.assert_array_equal(one.contact.status, two.contact.status)
             np.testing.assert_array_equal(one.slip, two.slip)
+
+
+def test_compressed_equations_solve_the_steps_that_are_left_to_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever loads they have been solved under before."""
+    whole = bk.run(COMPRESSED)
+    with monkeypatch.context() as patch:
+        kill_after(patch, 3)
+        with pytest.raises(Killed):
+            bk.run_to_file(COMPRESSED, tmp_path / "killed.h5")
+    resumed = bk.run_to_file(COMPRESSED, tmp_path / "killed.h5")
+    assert resumed.plan.is_compressed
+    for name, column in whole.contact.columns().items():
+        np.testing.assert_array_equal(resumed.contact.columns()[name], column)
 
 
 SHORT = replace(LOOP, steps=(LOOP.steps[0], replace(LOOP.steps[1], increments=2)), mesh=bk.MeshOptions(accuracy=0.01))

@@ -12,14 +12,15 @@ tractions). They are passed through all clusters beside the skeletons and solved
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.skeletons import Skeleton
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.threads import for_each_chunk
@@ -132,7 +133,8 @@ class HierarchicalFactor:
     border : Border
     may_change : frozenset of int
         Leaves whose conditions change by themselves. Clusters without any are merged once, and keep no scattering
-        matrices: if something changes there all the same, the whole cluster is factored again.
+        matrices: if something changes there all the same, the whole cluster is factored again, but for loads that were
+        expected, and sums of them.
 
     Notes
     -----
@@ -148,15 +150,28 @@ class HierarchicalFactor:
     _levels: list[list[_Cluster | None]] = field(default_factory=list)
     _stale: set[int] = field(default_factory=set)
     _changing: list[set[int]] = field(default_factory=list)
+    _loads: KnownLoads = field(init=False)
+    _stays: BoolArray = field(init=False)
+    _is_reloaded: bool = False
 
     def __post_init__(self) -> None:
-        n_levels = self.compression.tree.n_levels
-        self._levels = [[None] * 2 ** (n_levels - level) for level in range(n_levels + 1)]
-        self._stale = set(range(self.compression.tree.n_leaves))
-        self._changing = [{leaf >> level for leaf in self.may_change} for level in range(n_levels + 1)]
+        tree = self.compression.tree
+        self._levels = [[None] * 2 ** (tree.n_levels - level) for level in range(tree.n_levels + 1)]
+        self._stale = set(range(tree.n_leaves))
+        self._changing = [{leaf >> level for leaf in self.may_change} for level in range(tree.n_levels + 1)]
+        self._stays = np.ones(self.compression.columns.n_elements, bool)
+        for leaf in self.may_change:
+            self._stays[tree.places(0, leaf)] = False
+        self._loads = KnownLoads(self._stays)
+
+    def expect(self, given: Iterable[FloatArray]) -> None:
+        """Say, before the first `update`, what laws will give; see `KnownLoads`."""
+        self._loads = KnownLoads(self._stays, given)
 
     def update(self, laws: ElementLaws) -> None:
         """Take over the conditions on all elements, and factor every leaf where they have changed, and what is above.
+
+        Where only loads have changed that were expected, their leaves are not factored, but what changes above them.
 
         Raises
         ------
@@ -164,11 +179,13 @@ class HierarchicalFactor:
             If the conditions do not determine the unknowns.
         """
         tree = self.compression.tree
-        if self.laws is not None:
-            differs = np.any(laws.factors != self.laws.factors, axis=(1, 2)) | np.any(
-                laws.given != self.laws.given, axis=1
-            )
-            self._stale |= set(tree.leaves_of(np.flatnonzero(differs)).tolist())
+        before = ElementLaws(np.full((1, 4, 2), np.nan), np.zeros((1, 4))) if self.laws is None else self.laws
+        is_other_load = np.any(laws.given != before.given, axis=1)
+        differs = np.any(laws.factors != before.factors, axis=(1, 2)) | (is_other_load & ~self._stays)
+        if np.any(is_other_load & self._stays):
+            differs |= self._loads.take(laws.given, before.given)
+            self._is_reloaded = True
+        self._stale |= set(tree.leaves_of(np.flatnonzero(differs)).tolist())
         self.laws, self.n_updates = laws, self.n_updates + 1
         changed = sorted(self._merged_with(self._stale))
         self.n_factored = len(changed)
@@ -179,16 +196,25 @@ class HierarchicalFactor:
 
         def factor_leaf(leaf: int) -> _Cluster:
             places = tree.places(0, leaf)
-            return self._leaf(leaf, laws.factors[places], laws.given[places].reshape(-1, 1))
+            given = laws.given[:, :, None] if leaf in self.may_change else self._loads.each
+            return self._leaf(leaf, laws.factors[places], given[places].reshape(4 * (places.stop - places.start), -1))
 
         for leaf, factors in zip(changed, for_each_chunk(factor_leaf, changed, n_integrals=n_integrals), strict=True):
             self._levels[0][leaf] = factors
         for level in range(1, tree.n_levels + 1):
-            changed = sorted({cluster // 2 for cluster in changed})
+            changed = sorted({cluster // 2 for cluster in changed} | self._above_loads(level))
             merge = partial(self._parent, level)
             for cluster, merged in zip(changed, for_each_chunk(merge, changed, n_integrals=n_integrals), strict=True):
                 self._levels[level][cluster] = merged
-        self._stale = set()
+        self._stale, self._is_reloaded = set(), False
+
+    def _above_loads(self, level: int) -> set[int]:
+        """Return the clusters of a level that stand above loads which have changed, and change by themselves."""
+        if not self._is_reloaded:
+            return set()
+        return {
+            cluster for cluster in self._changing[level] if {2 * cluster, 2 * cluster + 1} - self._changing[level - 1]
+        }
 
     def _merged_with(self, leaves: set[int]) -> set[int]:
         """Return some leaves, and those in one cluster with them that has been merged for good."""
@@ -211,7 +237,7 @@ class HierarchicalFactor:
         leaves : (n_leaves,) array
             Ascending.
         """
-        parts = self._descend(self.errors()[:, None], leaves, self._cluster)
+        parts = self._descend(self.errors()[:, None], leaves, self._loaded)
         return np.concatenate([np.zeros((0, 1)), *parts])[:, 0].reshape(-1, 2)
 
     def responses(self, leaf: int, given: FloatArray, leaves: IntArray) -> FloatArray:
@@ -260,8 +286,12 @@ class HierarchicalFactor:
 
     def errors(self) -> FloatArray:
         """Return the unknowns (n_border,) of the boundary as a whole."""
-        root = self._cluster(-1, 0)
-        return self._of_border(root)[:, 0]
+        return self._of_border(self._loaded(-1, 0))[:, 0]
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the factors are those of the laws: `update` has come and met no error."""
+        return not self._stale
 
     @property
     def n_bytes(self) -> int:
@@ -292,11 +322,11 @@ class HierarchicalFactor:
         return _Cluster(outgoing_of_unknowns @ response, alone, response, at_rest)
 
     def _parent(self, level: int, cluster: int) -> _Cluster:
-        pair = self._cluster(level - 1, 2 * cluster), self._cluster(level - 1, 2 * cluster + 1)
-        merged = self._merged(level, cluster, *pair)
-        if cluster not in self._changing[level]:
-            for each in pair:
-                each.scattering = np.zeros((0, 0))
+        changes = cluster in self._changing[level]
+        one, two = map(partial(self._loaded if changes else self._cluster, level - 1), (2 * cluster, 2 * cluster + 1))
+        merged = self._merged(level, cluster, one, two)
+        if not changes:
+            one.scattering = two.scattering = np.zeros((0, 0))
         return merged
 
     def _merged(self, level: int, cluster: int, one: _Cluster, two: _Cluster) -> _Cluster:
@@ -348,6 +378,14 @@ class HierarchicalFactor:
         factored = self._levels[level][cluster]
         assert factored is not None  # `update` comes first, and children before their parents
         return factored
+
+    def _loaded(self, level: int, cluster: int) -> _Cluster:
+        """Return a cluster under the loads at hand: one that is merged for good knows those expected one by one."""
+        factored = self._cluster(level, cluster)
+        if cluster in self._changing[level]:
+            return factored
+        shares = self._loads.shares[:, None]
+        return replace(factored, alone=factored.alone @ shares, at_rest=factored.at_rest @ shares)
 
     def _skeleton(self, level: int, cluster: int) -> Skeleton | None:
         """Return the skeleton of a cluster, none of the root."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,6 +94,10 @@ class HierarchicalSystem:
     def n_answers(self) -> int:
         """How often conditions were asked for; what is known everywhere belongs to the last ones."""
         return self.factor.n_updates
+
+    def expect(self, given: Iterable[FloatArray]) -> None:
+        """Say, before the first `state`, what `laws` will give, (n_elements, 4) each: sums of that cost little then."""
+        self.factor.expect(given)
 
     def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements, (n, 4), in their frames.

@@ -18,7 +18,7 @@ from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes, turning
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, free_modes, turning
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 
@@ -199,8 +199,11 @@ class LoadedSystem:
 
     @classmethod
     def of(cls, map: HierarchicalMap, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
-        """Compress the equations of a body."""
+        """Compress the equations of a body, under its later loads, too."""
         is_loaded, is_moved = _loaded(conditions, force)
+        for given in conditions.later:
+            is_loaded |= np.any(given.force != 0.0, axis=1)
+            is_moved |= np.any(given.displacement != 0.0, axis=1)
         may_be_loaded = is_loaded | ~conditions.is_free.all(axis=1)
         may_move = is_moved | ~conditions.is_fixed.all(axis=1)
         system = map.system(conditions, may_be_loaded, may_move)
@@ -210,15 +213,19 @@ class LoadedSystem:
         motions = np.ascontiguousarray(motions.transpose(1, 2, 0))
         at_rest = np.zeros(motions.shape[2])
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
-        loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest)
-        return loaded.moved(at_rest)
+        loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
+        if conditions.later and isinstance(map.options, Hierarchical):
+            later = (loaded.under(given.displacement, given.force_in(conditions.frame)) for given in conditions.later)
+            system.expect(each.known.given for each in (loaded, *later))
+        return loaded
 
     def under(self, displacement: FloatArray, force: FloatArray) -> LoadedSystem:
         """Return the same body under other given displacements, in the frames, and forces in x and y."""
         conditions = replace(self.conditions, displacement=displacement)
         is_loaded, is_moved = _loaded(conditions, force)
         if np.any(is_loaded & ~self.may_be_loaded) or np.any(is_moved & ~self.may_move):
-            return LoadedSystem.of(self.map, conditions, force)
+            before = GivenData.of(self.conditions, self.force, self.conditions.displacement)
+            return LoadedSystem.of(self.map, replace(conditions, later=(*conditions.later, before)), force)
         return replace(self, conditions=conditions, force=force).moved(-self.travel)
 
     @property

@@ -1,6 +1,6 @@
 """Whether boundary equations are compressed over a tree, and what that takes, foreseen from sizes alone.
 
-Times and memory are those of a square with 1e4 to 1e5 elements (`tests/benchmarks/large.py` measures what is estimated
+Times and memory are those of a square with 1e3 to 1e6 elements (`tests/benchmarks/large.py` measures what is estimated
 here); they hardly depend on the shape.
 """
 
@@ -23,11 +23,13 @@ from bemkit.operators.linear.solvers import (
 )
 from bemkit.operators.steklov_poincare.matrix_free_needs import why_stored
 from bemkit.operators.steklov_poincare.needs import (
+    CONTACT_STEPS,
     BodyCase,
     BodyNeeds,
     PlanItem,
     collocation_needs,
     galerkin_needs,
+    seconds_of,
 )
 
 _DIRECT: LinearSolver = DenseCholesky()
@@ -39,10 +41,8 @@ _LEAST_COMPRESSIBILITY = 1e-8
 """1/2 less Poisson's ratio: below, clusters of the tree, which are solved before these equations, lose the digits."""
 _SHARE = 0.5
 """Predicted share of the time of the dense equations below which they are compressed."""
-_EVALUATION, _FLOP, _FLOP_OF_LARGE = 2e-8, 1e-10, 2e-11
-"""Seconds of a closed-form integral, of a flop on small blocks, and of one in the factorisation of a large matrix."""
-_CONTACT_STEPS, _SHARE_OF_STEP = 8.0, 0.1
-"""Contact steps of a load step, and what each takes of the compressed equations, by their factorisation."""
+_FLOPS_OF_LARGE = 0.2
+"""Of the factorisation of a large matrix, flops on small blocks that take as long as one."""
 
 
 @dataclass(frozen=True)
@@ -53,26 +53,36 @@ class _Costs:
     ----------
     evaluations, compiled : float
         In numpy, and compiled.
-    flops : float
+    flops, of_step : float
+        Of the first factorisation, and of a contact step.
     n_bytes, of_contact : float
         Memory, and that of an element in contact besides, where both tractions and displacements are.
+    of_top : float
+        Memory besides for the largest clusters, whose ranks hardly depend on the number of elements.
     in_numpy : float
-        Both relative to this, where integrals are arrays of several times their size.
+        Memory besides where integrals are arrays, up to `_MOST_IN_NUMPY` in all.
     """
 
     evaluations: float
     compiled: float
     flops: float
+    of_step: float
     n_bytes: float
     of_contact: float
+    of_top: float
     in_numpy: float
 
 
-_COLLOCATION = _Costs(40e3, 6e3, 1.6e6, 8.8e3, 3.5e3, 1.33)
-_GALERKIN = {1: _Costs(250e3, 100e3, 4e6, 38e3, 0.0, 1.1), 2: _Costs(500e3, 190e3, 8e6, 69e3, 0.0, 1.1)}
-"""By the degree of the displacements. Tractions on the elements take a second factorisation in the end."""
-_BYTES_OF_TOP = 16e6
-"""Working memory for the largest clusters, whose ranks hardly depend on the number of elements."""
+_COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.8e3, 3.5e3, 16e6, 6.5e3)
+_GALERKIN = {
+    1: _Costs(250e3, 100e3, 4e6, 0.4e6, 27e3, 0.0, 40e6, 0.0),
+    2: _Costs(500e3, 190e3, 8e6, 0.8e6, 54e3, 0.0, 55e6, 0.0),
+}
+"""By the degree of the displacements."""
+_MOST_IN_NUMPY = 38e6
+"""Bytes of the integrals that exist at the same time."""
+_FLOPS_OF_STEP = 2e8
+"""Of a contact step on a mesh of any size, besides what grows with it."""
 _BYTES_OF_STATE, _FLOPS_OF_STATE = 40.0, 2e3
 """Of a stiffness, for each pair of retained directions: tractions, displacements and the stiffness itself."""
 _DIGITS = 10.0
@@ -177,8 +187,8 @@ def _gain(
         return ChosenLinearSolver(_DIRECT, "asked for", requested)
     options = Hierarchical()
     compressed = _needs(case, options, costs)
-    of_dense = _FLOP_OF_LARGE * (dense.flops + _CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
-    share = _seconds(compressed) / (_EVALUATION * dense.evaluations + of_dense)
+    of_dense = _FLOPS_OF_LARGE * (dense.flops + CONTACT_STEPS * 2.0 / 3.0 * case.n_retained**3)
+    share = compressed.seconds / seconds_of(dense.evaluations, of_dense)
     if share < _SHARE:
         return ChosenLinearSolver(_DIRECT, f"about {share:.2g} of the time of dense equations", options)
     if compressed.memory < memory < dense.memory:
@@ -222,7 +232,7 @@ def hierarchical_needs(case: BodyCase, *, takes_slopes: bool) -> BodyNeeds:
 def _tree_items(case: BodyCase, options: Hierarchical, costs: _Costs) -> tuple[PlanItem, PlanItem, PlanItem]:
     """Say how the tree is solved, which kernels are used, and what the others would cost."""
     is_compiled = compiled.functions() is not None
-    here, there = (_seconds(_needs(case, options, costs, is_compiled=each)) for each in (is_compiled, not is_compiled))
+    here, there = (_needs(case, options, costs, is_compiled=each).seconds for each in (is_compiled, not is_compiled))
     others = f"{'numpy' if is_compiled else 'compiled ones'} would take about {there:.3g} s instead of {here:.3g} s"
     return (
         PlanItem("linear solver of the body", True, "LU of the clusters of the tree; no matrix of the whole body"),
@@ -231,19 +241,18 @@ def _tree_items(case: BodyCase, options: Hierarchical, costs: _Costs) -> tuple[P
     )
 
 
-def _seconds(needs: BodyNeeds) -> float:
-    return _EVALUATION * needs.evaluations + _FLOP * needs.flops
-
-
 def _needs(case: BodyCase, options: Hierarchical, costs: _Costs, *, is_compiled: bool | None = None) -> BodyNeeds:
     n, digits = case.mesh.n_elements, -math.log10(options.tolerance) / _DIGITS
     n_both = int(np.count_nonzero(case.conditions.is_retained.any(axis=1)))
     if is_compiled is None:
         is_compiled = compiled.is_installed()  # whether it works takes a while to find out
-    of_elements = (1.0 if is_compiled else costs.in_numpy) * (costs.n_bytes * n + costs.of_contact * n_both)
-    memory = int(digits * (_BYTES_OF_TOP + of_elements))
+    of_integrals = 0.0 if is_compiled else min(costs.in_numpy * n, _MOST_IN_NUMPY)
+    memory = int(digits * (costs.of_top + of_integrals + costs.n_bytes * n + costs.of_contact * n_both))
     evaluations = digits * n * (costs.compiled if is_compiled else costs.evaluations)
-    flops = digits * costs.flops * n * (1.0 + (_SHARE_OF_STEP * _CONTACT_STEPS * len(case.loads) if n_both else 0.0))
+    flops = costs.flops * n
+    if n_both:
+        flops += CONTACT_STEPS * len(case.loads) * (_FLOPS_OF_STEP + costs.of_step * n)
+    flops *= digits
     if case.is_condensed:
         memory += int(_BYTES_OF_STATE * case.n_retained**2)
         flops += _FLOPS_OF_STATE * case.n_retained**2

@@ -24,6 +24,10 @@ from bemkit.operators.rigid_modes import admissible_modes
 from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions
 
 _BYTES = 8
+CONTACT_STEPS = 8
+"""Steps of Newton's method for a contact problem; they hardly depend on its size."""
+_SECONDS_PER_EVALUATION, _SECONDS_PER_FLOP = 2e-8, 1e-10
+"""Of a common computer: for a closed-form integral, and for a flop of a factorisation."""
 _OWN_SOLVER = ChosenLinearSolver(DenseCholesky(), "the map has a linear solver of its own")
 
 
@@ -129,6 +133,16 @@ class BodyNeeds:
     flops: float = 0.0
     warnings: tuple[str, ...] = ()
     is_matrix_free: bool = False
+
+    @property
+    def seconds(self) -> float:
+        """Run time of a common computer [s]."""
+        return seconds_of(self.evaluations, self.flops)
+
+
+def seconds_of(evaluations: float, flops: float) -> float:
+    """Return the run time of a common computer for closed-form integrals and flops [s]."""
+    return _SECONDS_PER_EVALUATION * evaluations + _SECONDS_PER_FLOP * flops
 
 
 def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:

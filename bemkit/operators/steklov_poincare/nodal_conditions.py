@@ -78,6 +78,8 @@ class NodalConditions:
     driven : tuple of int
         Rigid motions (0 along x, 1 along y, 2 the turn) that a body at rest far away makes nevertheless, because forces
         drive it there; none unless it is a half-plane.
+    later : tuple of GivenData
+        What load steps after this one give.
     """
 
     frame: FloatArray
@@ -85,6 +87,7 @@ class NodalConditions:
     displacement: FloatArray
     is_retained: BoolArray
     driven: tuple[int, ...] = ()
+    later: tuple[GivenData, ...] = ()
 
     @property
     def is_free(self) -> BoolArray:
@@ -113,6 +116,10 @@ class GivenData:
         """Return the data of nodal forces in x and y, and of displacements in the frames."""
         local = np.einsum("nkc,nc->nk", conditions.frame, force)
         return cls(np.where(conditions.is_free, local, 0.0), np.where(conditions.is_fixed, displacement, 0.0))
+
+    def force_in(self, frame: FloatArray) -> FloatArray:
+        """Return the forces (n_nodes, 2) in x and y, by the frames (n_nodes, 2, 2) of the nodes."""
+        return np.einsum("nkc,nk->nc", frame, self.force)
 
     @property
     def n_loaded(self) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -221,3 +223,29 @@ def test_clusters_that_do_not_change_keep_no_scattering_matrices_and_may_change_
         nowhere_else.append(system.factor.n_factored)
     assert system.factor.n_bytes < 0.9 * every.factor.n_bytes
     assert every.factor.n_factored <= 2 < nowhere_else[-1] < n_leaves
+
+
+@pytest.mark.parametrize("most", [8, 1])
+def test_loads_that_are_expected_and_their_sums_factor_nothing(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bemkit.operators.hierarchy.known_loads._MOST", most)
+    mesh = mesh_of("rectangle", 700)
+    conditions, force, kept = conditions_of(mesh, 3)
+    conditions = replace(conditions, displacement=np.zeros((mesh.n_elements, 2)))
+    in_contact = np.arange(mesh.n_elements) < 80
+    system, fresh = (system_of(mesh, conditions.frame, True, 1e-9, each) for each in (in_contact, None))
+    loads = np.stack([force, np.where(mesh.centres[:, :1] > 0.0, force, 0.0), np.cos(5.0 * mesh.centres) * force])
+    shares = np.array([(1, 0, 0), (0.5, 0, 0), (1, 1, 0), (2, -3, 0), (0, 0, 0), (0, 0.1, 1), (1, 0, 0)])
+    laws = [laws_of(system, mesh, conditions, np.tensordot(share, loads, 1), 0.0 * kept) for share in shares]
+    system.expect(each.given for each in laws[:3])
+    factored = []
+    for each in laws:
+        for solver in (system, fresh):
+            solver.state(each, NOWHERE, NOTHING)
+        for found, expected in zip(system.everywhere(), fresh.everywhere(), strict=True):
+            # round-off of loads that take each other away, by what responses are larger than loads
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+        factored.append(system.factor.n_factored)
+    n_leaves, reached = system.factor.compression.tree.n_leaves, len(system.factor.may_change)
+    assert factored[0] == n_leaves > 3 * reached
+    is_cheap = [count <= reached for count in factored[1:]]
+    assert is_cheap == ([True, True, True, True, False, False] if most == 8 else [False] * 6)
