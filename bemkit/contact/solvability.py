@@ -32,6 +32,9 @@ _MANY_MOTIONS = 60
 a condition for each."""
 
 
+_PRESSES = 1e-9
+"""Speed into an obstacle, relative to the largest of the only motion there is, that is no round-off."""
+
 _MEETS = 1e-7
 """Speed into an obstacle, relative to the largest of a motion, from which on a node meets it: what linear programming
 leaves."""
@@ -102,6 +105,8 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
     if force_scale == 0.0:
         return None
     touches = np.isfinite(problem.gap)
+    if motions.shape[0] == 1 and isinstance(motions, np.ndarray) and _presses(motions, load, touches):
+        return None
     best = None
     for cohesion, slope in friction_envelopes(problem):
         resistance = np.where(touches, problem.body.weights * cohesion, 0.0) / force_scale
@@ -117,6 +122,11 @@ def find_unsolvable_load(problem: ContactProblem) -> UnsolvableLoad | None:
                 who, where = problem.body.moving_bodies(moved), problem.body.partners_of(moved)
                 best = UnsolvableLoad(motion, lift, work, who, where)
     return best
+
+
+def _presses(motion: FloatArray, load: FloatArray, touches: BoolArray) -> bool:
+    """Whether the only motion (1, 2 n_contact) presses into the obstacle where it follows the load (1,)."""
+    return bool(np.any(np.sign(load) * motion[0, 0::2][touches] > _PRESSES))
 
 
 def needs_contact(problem: ContactProblem) -> bool:
@@ -194,7 +204,7 @@ def _largest_escape(motions: RigidMotions, load: FloatArray, resistance: FloatAr
     if motions.shape[0] == 1 and isinstance(motions, np.ndarray):
         normal, tangential = motions.reshape(-1, 2)[touches].T
         for sign in np.sign(load):
-            if np.all(sign * normal + slope[touches] * np.abs(tangential) <= 1e-9):
+            if np.all(sign * normal + slope[touches] * np.abs(tangential) <= _PRESSES):
                 return np.array([sign])
         return np.zeros(1)
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre, gauss_lobatto
@@ -80,7 +80,12 @@ def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatA
     -------
     (n_scalar, 2) array [m]
     """
-    mesh = space.mesh if mesh is None else mesh
+    if mesh is None and isinstance(space, LagrangeSpace):
+        return space.dof_points
+    return _points_on(space, space.mesh if mesh is None else mesh)
+
+
+def _points_on(space: BoundarySpace, mesh: BoundaryMesh) -> FloatArray:
     points = np.empty((space.n_dofs // 2, 2))
     points[space.element_dofs] = mesh.points(np.arange(mesh.n_elements), element_nodes(space))
     return points
@@ -207,10 +212,17 @@ class LagrangeSpace:
         """Whether no node is broken."""
         return self.broken is None or not bool(self.broken.any())
 
-    @property
+    @cached_property
     def n_dofs(self) -> int:
         """Number of vector dofs."""
         return 2 * (int(self.element_dofs.max()) + 1)
+
+    @cached_property
+    def dof_points(self) -> FloatArray:
+        """(n_scalar, 2) array [m], read-only: where the scalar dofs are function values."""
+        points = _points_on(self, self.mesh)
+        read_only(points)
+        return points
 
     @property
     def local_nodes(self) -> FloatArray:

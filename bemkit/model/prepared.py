@@ -187,9 +187,12 @@ class Prepared:
         """
         if self.contact.nodes.is_shared.any():
             return True
-        discretisation, motions = self.scene.discretisation, free_modes(self.space, self.conditions)
-        turns_freely = not discretisation.keeps_rotations and turning(motions).any()
-        return not discretisation.is_symmetric and bool(turns_freely or discretisation.may_be_negative(self.mesh))
+        discretisation = self.scene.discretisation
+        if discretisation.is_symmetric:
+            return False
+        if not discretisation.keeps_rotations and turning(free_modes(self.space, self.conditions)).any():
+            return True
+        return discretisation.may_be_negative(self.mesh)
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.

@@ -169,5 +169,5 @@ def resultant_imbalance(
     moment = float(np.sum(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]))
     moment += float(inside[2] - centre[0] * inside[1] + centre[1] * inside[0])
     sums = np.append(np.abs(force.sum(axis=0) + inside[:2]), abs(moment) / float(np.abs(arm).max()))
-    off = np.where(np.isin(np.arange(3), list(balanced)), sums, 0.0) / total
+    off = np.where([number in balanced for number in range(3)], sums, 0.0) / total
     return Imbalance(float(off[:2].max()), float(off[2]), round_off / total)

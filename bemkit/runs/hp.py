@@ -43,9 +43,12 @@ GAIN = 6.0
 """Factor by which a degree and the layers that come with it reduce the error."""
 LARGEST_RISE, LAST_RISE = 2, 3
 """Degrees from mesh to mesh: the places where the status changes must keep up; and where that is the last mesh."""
-FINE = 5e-3
-"""Accuracy below which the first mesh in layers is of degree 4, otherwise of 3: places where the status changes are
-then told well enough for two digits more at once."""
+FIRST_NUMBER = 2
+"""Of the first mesh in layers: of degree 4, which tells the places where the status changes, and its own error, well
+enough for two digits more at once. Degree 3 takes hardly less time."""
+NEXT_ERROR = 0.03
+"""Part of the error of contact tractions on the first mesh in layers that the next one keeps, whatever its degree:
+places where the status changes have moved away from their nodes (0.02 to 0.1 on the scenes with a reference)."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
@@ -120,14 +123,14 @@ class LayeredMeshes:
         cuts = [_settled_cuts(member) for member in members]
         fresh = [layered_partition(each.partition.base, own) for each, own in zip(members, cuts, strict=True)]
         if level.number == 0:
-            return replace(level, partitions=tuple(fresh), number=2 if self.accuracy < FINE else 1)
+            return replace(level, partitions=tuple(fresh), number=FIRST_NUMBER)
         if errors is None:
             method = solution.solved_bodies[0].scene.discretisation.method
             raise InputError(f"{method} has no error estimate: take another discretisation")
         has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
         is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
         needed = self._needed_rise(errors, is_inner) if has_moved else 0
-        is_last = has_moved and needed <= LAST_RISE
+        is_last = has_moved and needed <= LAST_RISE and not self._moves_on(level, solution)
         number = level.number + (needed if is_last else min(needed, LARGEST_RISE))
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
@@ -143,6 +146,11 @@ class LayeredMeshes:
         if has_moved and level.asked.discretisation.needs_accuracy and isinstance(solution, Solution):
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
         return replace(level, partitions=refined, number=number, degrees=degrees)
+
+    def _moves_on(self, level: Level[AnyScene], solution: AnySolution) -> bool:
+        """Whether the first mesh in layers is still too far from the places where the status changes for one more."""
+        error = solution.estimated_traction_error
+        return level.number == FIRST_NUMBER and error is not None and NEXT_ERROR * error > self.accuracy
 
     def _degrees(self, errors: _Errors, old: Partition, new: Partition, largest: int) -> tuple[int, ...]:
         """Return the degrees of new elements that come from those of a solution."""

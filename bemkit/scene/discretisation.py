@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -237,17 +238,11 @@ class Galerkin(SymmetricGalerkin):
 
         On the surface of a half-plane tractions alone are unknown functions, and displacements their means on elements.
         """
-        if mesh.surface is not None:
-            return ConstantSpace(mesh)
-        return LagrangeSpace(mesh, degree=self.largest_degree, element_degrees=self._on(mesh))
+        return _galerkin_spaces(self, mesh)[0] if mesh.surface is None else ConstantSpace(mesh)
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
-        if self.largest_degree == 1:
-            return ConstantSpace(mesh)
-        degrees = self._on(mesh)
-        own = None if degrees is None else np.maximum(degrees - 1, 1)
-        return LagrangeSpace(mesh, break_nodes(mesh), degree=self.largest_degree - 1, element_degrees=own)
+        return _galerkin_spaces(self, mesh)[1]
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
         """Say what stands in the way: a half-plane, or another degree than 1 or 2 on all elements."""
@@ -264,7 +259,7 @@ class Galerkin(SymmetricGalerkin):
         assert isinstance(options, Hierarchical)  # `why_stored` leaves no other choice
         return HierarchicalGalerkin(mesh, material, options, self.displacement_space(mesh), self.traction_space(mesh))
 
-    def _on(self, mesh: BoundaryMesh) -> IntArray | None:
+    def degrees_on(self, mesh: BoundaryMesh) -> IntArray | None:
         """Return the degrees (n_elements,) of the elements of a mesh; None if all are equal."""
         if not isinstance(self.degree, tuple):
             return None
@@ -275,6 +270,17 @@ class Galerkin(SymmetricGalerkin):
                 "element, or a single one"
             )
         return None if (degrees == degrees[0]).all() else degrees
+
+
+@lru_cache(maxsize=4)
+def _galerkin_spaces(galerkin: Galerkin, mesh: BoundaryMesh) -> tuple[BoundarySpace, BoundarySpace]:
+    """Return the spaces of displacements and tractions: few, so that what they know is found out once."""
+    degree, degrees = galerkin.largest_degree, galerkin.degrees_on(mesh)
+    displacements = LagrangeSpace(mesh, degree=degree, element_degrees=degrees)
+    if degree == 1:
+        return displacements, ConstantSpace(mesh)
+    lower = None if degrees is None else np.maximum(degrees - 1, 1)
+    return displacements, LagrangeSpace(mesh, break_nodes(mesh), degree=degree - 1, element_degrees=lower)
 
 
 @dataclass(frozen=True)

@@ -299,7 +299,9 @@ class _Run:
         """Choose among the positions that contact leaves open, unless another contact forbids it."""
         rho = self.problem.body.stiffness_scale
         state = with_least_slip(ProjectionEquations(self.problem, rho, rho), iterate.state, sets)
-        return replace(iterate, state=state) if certify(self.problem, state).is_below(self.tolerance) else iterate
+        if state is iterate.state or not certify(self.problem, state).is_below(self.tolerance):
+            return iterate
+        return replace(iterate, state=state)
 
     def _untouched(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""

@@ -246,8 +246,10 @@ def with_least_slip(equations: ProjectionEquations, state: ContactState, sets: A
         Its own.
     """
     problem = equations.problem
-    conditions = equations.linearised(equations.evaluate(state), sets)
-    free = as_rows(conditions.free_motions(problem.body.rigid_motions()))
+    motions = problem.body.rigid_motions()
+    if not motions.shape[0]:
+        return state
+    free = as_rows(equations.linearised(equations.evaluate(state), sets).free_motions(motions))
     if not free.shape[0]:
         return state
     along, weights = free[:, 1::2], problem.body.weights

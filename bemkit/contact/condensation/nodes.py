@@ -8,7 +8,8 @@ leave the body free to move, or nearly so: what is eliminated has to be held.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -59,14 +60,14 @@ class ContactNodes:
         """(n_contact, 2) unit vectors: the directions of contact, of u_n and of sigma_n."""
         return self.frame[:, 0]
 
-    @property
+    @cached_property
     def is_second(self) -> BoolArray:
         """(n_contact,) bool: the second rows of nodes that stand in two."""
         repeated = np.ones(self.nodes.size, bool)
         repeated[np.unique(self.nodes, return_index=True)[1]] = False
         return repeated
 
-    @property
+    @cached_property
     def is_shared(self) -> BoolArray:
         """(n_contact,) bool: both rows of nodes that stand in two."""
         return np.isin(self.nodes, self.nodes[self.is_second])
@@ -79,7 +80,7 @@ class ContactNodes:
 
     def take(self, rows: IntArray | BoolArray) -> ContactNodes:
         """Return some of the nodes."""
-        return ContactNodes(*(column[rows] for column in vars(self).values()))
+        return ContactNodes(*(getattr(self, column.name)[rows] for column in fields(self)))
 
 
 def contact_frame(directions: FloatArray) -> FloatArray:
@@ -204,7 +205,7 @@ def retained_tangents(motions: FloatArray, is_frictionless: BoolArray, is_bound:
     no support holds, in (n, t) components of any size. Nodes that a support holds have no tangent of their own.
     """
     is_retained = ~is_frictionless
-    if not motions.size:
+    if not motions.size or is_retained.all():
         return is_retained
     motions = _of_unit_size(motions)
     normal, tangential = motions[:, :, 0].T, motions[:, :, 1].T  # (n_contact, n_motions)
