@@ -126,13 +126,11 @@ class FastMultipole(_LinearOperator):
                 return
             for leaf in range(some.start, some.stop):
                 own = tree.order[tree.places(0, leaf)]
-                sources = np.sort(
-                    np.concatenate([tree.order[tree.places(0, k)] for k in near[first[leaf] : first[leaf + 1]]])
-                )
-                fields = element_fields(
-                    constants, elements.centres(own), counted(own, sources), *elements.ends(sources)
-                )
-                result[own] += caused(fields, *(each[sources] for each in densities))
+                for number in near[first[leaf] : first[leaf + 1]].tolist():
+                    sources = tree.order[tree.places(0, number)]
+                    at, ends = counted(own, sources), elements.ends(sources)
+                    fields = element_fields(constants, elements.centres(own), at, *ends)
+                    result[own] += caused(fields, *(each[sources] for each in densities))
 
         chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
         for_each_chunk(add_to_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2)

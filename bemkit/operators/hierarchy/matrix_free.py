@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
-from bemkit.operators.linear.gmres import gmres
+from bemkit.operators.linear.gmres import SingleArray, gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import admissible_modes, traction_free_modes
@@ -25,6 +26,10 @@ _PRODUCTS = 1e-3
 """Error of a product by the tolerance of the iteration; tractions feel it by elements on which it oscillates."""
 _FINEST = 1e-13
 """Errors of products below that are round-off."""
+
+
+Vector: TypeAlias = FloatArray | SingleArray
+"""Unknowns, or a direction of the iteration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,7 @@ class WholeBoundary:
         """Number of the rigid motions and of the closed curves."""
         return len(admissible_modes(self.elements.mesh)) + len(self.fields)
 
-    def add_errors(self, unknowns: FloatArray, equations: ComplexArray) -> None:
+    def add_errors(self, unknowns: Vector, equations: ComplexArray) -> None:
         """Add what the unknowns (n_unknowns,), factors of rigid motions and of fields, do to the equations (n,)."""
         for some in self.elements.chunks():
             centres = self.elements.centres(some)
@@ -150,11 +155,11 @@ class MatrixFreeSystem(HierarchicalSystem):
         if before is None or not laws.has_factors_of(before):
             self._begin_with(laws)
             self._inverse = None  # before another is made
-            self._inverse = Preconditioner.of(self._elements, self._material, laws, self._frame)
         elif not np.array_equal(laws.given, before.given):
             self._is_solved = False
         self._laws = laws
         if not self._is_solved:
+            self._inverse = self._inverse or Preconditioner.of(self._elements, self._material, laws, self._frame)
             self._solve(laws, self._inverse)
         return self._local(laws, elements, self._x)
 
@@ -166,8 +171,8 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
-        both = (each @ [1.0, 1j] for each in (traction, displacement))
-        return self._left(*both, self._x[2 * self._n_elements :])[0][elements]
+        t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
+        return self._left(t, u, self._x[2 * self._n_elements :])[0][elements]
 
     def _solved(self, conditions: NodeConditions) -> SolvedConditions:
         """Return what conditions make of tractions and displacements in the frames of their elements."""
@@ -181,14 +186,12 @@ class MatrixFreeSystem(HierarchicalSystem):
         """Return the units (n, 2) of the unknowns of some elements in the iteration."""
         return np.where(laws.is_traction(elements), self._traction_unit, 1.0)
 
-    def _local(self, laws: CompactLaws, elements: IntArray, x: FloatArray, *, is_change: bool = False) -> FloatArray:
+    def _local(self, laws: CompactLaws, elements: IntArray, x: Vector, *, is_change: bool = False) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements; of a change of the unknowns their change."""
         unknowns = x[: 2 * self._n_elements].reshape(-1, 2)[elements]
         return laws.state(elements, unknowns * self._units(laws, elements), is_change=is_change)
 
-    def _fields(
-        self, laws: CompactLaws, x: FloatArray, *, is_change: bool = False
-    ) -> tuple[ComplexArray, ComplexArray]:
+    def _fields(self, laws: CompactLaws, x: Vector, *, is_change: bool = False) -> tuple[ComplexArray, ComplexArray]:
         """Return complex tractions and displacements (n_elements,), in x and y; of a change their change."""
         traction, displacement = np.empty((2, self._n_elements), complex)
         for some in self._elements.chunks():
@@ -208,7 +211,7 @@ class MatrixFreeSystem(HierarchicalSystem):
             unknowns[some] = laws.unknowns(some, self._local(self._laws, some, self._x)) / self._units(laws, some)
 
     def _left(
-        self, traction: ComplexArray, displacement: ComplexArray, errors: FloatArray
+        self, traction: ComplexArray, displacement: ComplexArray, errors: Vector
     ) -> tuple[FloatArray, FloatArray]:
         """Return the equations (n_elements, 2) and those of the whole boundary, both sides, one less the other."""
         mean, slope = self._elements.reconstructed(displacement)
@@ -221,7 +224,7 @@ class MatrixFreeSystem(HierarchicalSystem):
         """Find the unknowns that fulfil the equations under laws."""
         n = 2 * self._n_elements
 
-        def preconditioned(x: FloatArray, *, is_change: bool = True) -> FloatArray:
+        def preconditioned(x: Vector, *, is_change: bool = True) -> FloatArray:
             equations, balances = self._left(*self._fields(laws, x, is_change=is_change), x[n:])
             result = inverse.apply(equations, balances)
             unknowns = result[:n].reshape(-1, 2)

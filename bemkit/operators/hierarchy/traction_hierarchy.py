@@ -108,4 +108,5 @@ def _smoothed(prolongation: csr_matrix, matrix: csr_matrix) -> csr_matrix:
     from scipy.sparse import diags_array
 
     step = diags_array(_SMOOTHING / matrix.diagonal()) @ (matrix @ prolongation)
-    return (prolongation - step).tocsr()
+    smoothed: csr_matrix = (prolongation - step).tocsr()
+    return smoothed
