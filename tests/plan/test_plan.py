@@ -200,6 +200,22 @@ def test_the_largest_memory_of_compressed_equations_is_foreseen(degree: int, n_e
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("n_elements", [3000, 10_000])
+def test_the_largest_memory_of_equations_that_are_not_stored_is_foreseen(n_elements: int) -> None:
+    """With compiled kernels and without."""
+    scene = dataclasses.replace(load_scene("paper-1"), discretisation=bk.ConstantCollocation())
+    scene = dataclasses.replace(scene, linear_solver=bk.MatrixFree())
+    bk.run(with_overrides(scene, elements=400))  # loads what is loaded on first use
+    tracemalloc.start()
+    try:
+        solution = bk.run(with_overrides(scene, elements=n_elements))
+    finally:
+        tracemalloc.stop()
+    assert any("fast multipole" in item.reason for item in solution.plan.items)
+    assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
+
+
 def test_what_does_not_fit_is_refused_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plan_of(load_scene("paper-1"))
     check_memory(plan)

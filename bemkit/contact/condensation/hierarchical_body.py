@@ -115,6 +115,7 @@ class HierarchicalBody(LinearBody):
         refuse_other_tangents(conditions, self.tangent_is_eliminated)
         if len(conditions.free_motions(self.rigid_motions())):
             raise SingularResponse("the contact conditions leave a rigid motion free")
+        self._fields.clear()
         state = self._solved(conditions)
         self._responses.append(_Response(state, conditions, self._moving.system.n_answers))
         del self._responses[:-_KEPT]

@@ -63,15 +63,33 @@ class GradientReconstruction:
         neighbours = np.empty((3, mesh.n_elements), dtype=np.intp)
         for loop in mesh.loops:
             neighbours[:, loop] = np.roll(loop, 1), loop, np.roll(loop, -1)
+        is_corner = corner_nodes(mesh, CORNER_ANGLE)[mesh.elements].T
+        return cls.between(neighbours, panels.centre[neighbours], panels.half * panels.tangent, is_corner)
+
+    @classmethod
+    def between(
+        cls, neighbours: IntArray, centre: ComplexArray, half: ComplexArray, is_corner: BoolArray
+    ) -> GradientReconstruction:
+        """Return the slopes on some elements.
+
+        Parameters
+        ----------
+        neighbours : (3, n) array
+            The element before, the element itself, and the one after it.
+        centre : (3, n) complex array [m]
+            Of these three.
+        half : (n,) complex array [m]
+            From the centre of the element to its end.
+        is_corner : (2, n) bool array
+            Whether there is a corner where the element starts, and where it ends.
+        """
         counts = np.ones(neighbours.shape, bool)
-        counts[0], counts[2] = ~corner_nodes(mesh, CORNER_ANGLE)[mesh.elements].T
+        counts[0], counts[2] = ~is_corner
         is_smooth = counts.all(axis=0) & (neighbours[0] != neighbours[2])
         counts[:, counts.sum(axis=0) == 1] = True
-        arm = panels.centre[neighbours]
-        arm = np.where(counts, arm - np.mean(arm, axis=0, where=counts), 0.0)
+        arm = np.where(counts, centre - np.mean(centre, axis=0, where=counts), 0.0)
         weights = arm.conj() / np.sum(np.square(arm.real) + np.square(arm.imag), axis=0)
-        means = _means(panels, neighbours, is_smooth)
-        return cls(neighbours[0], neighbours[2], *(weights * (panels.half * panels.tangent)), *means)
+        return cls(neighbours[0], neighbours[2], *(weights * half), *_means(centre, half, is_smooth))
 
     def add_to(self, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool) -> None:
         """Add what slopes contribute to coefficients (n_rows, n_elements) of displacements, or of their conjugates."""
@@ -95,9 +113,9 @@ class GradientReconstruction:
         return consecutive_runs(self.previous), consecutive_runs(self.following)
 
 
-def _means(panels: Panels, neighbours: IntArray, is_smooth: BoolArray) -> ComplexArray:
+def _means(centre: ComplexArray, half: ComplexArray, is_smooth: BoolArray) -> ComplexArray:
     """Return (3, n_elements) weights of the mean of b (y - x)^2, b by divided differences of the three midpoints."""
-    previous, centre, following = panels.centre[neighbours]
-    back, ahead = np.where(is_smooth, previous - centre, -1.0), np.where(is_smooth, following - centre, 1.0)
-    of_mean = np.where(is_smooth, (panels.half * panels.tangent) ** 2 / 3.0, 0.0) / (ahead - back)
+    previous, own, following = centre
+    back, ahead = np.where(is_smooth, previous - own, -1.0), np.where(is_smooth, following - own, 1.0)
+    of_mean = np.where(is_smooth, half**2 / 3.0, 0.0) / (ahead - back)
     return np.array([-of_mean / back, of_mean / back - of_mean / ahead, of_mean / ahead])

@@ -14,6 +14,7 @@ A source of volume and a uniform dilatation; both are elastic fields at every Po
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -98,18 +99,59 @@ class _Field:
     gradient: ComplexArray
 
 
+class ReciprocalField(Protocol):
+    """An elastic field w whose work with the solution is known."""
+
+    def value(self, z: ComplexArray) -> ComplexArray:
+        """Return the field at points, or a multiple of it."""
+
+    def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Return the work of tractions, displacements and gradients; see `_Field`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dilatation:
+    """The field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor.
+
+    Parameters
+    ----------
+    centre : complex [m]
+    diameter : float [m]
+    """
+
+    centre: complex
+    diameter: float
+
+    @classmethod
+    def of(cls, mesh: BoundaryMesh) -> Dilatation:
+        """Return the dilatation about the middle of a body."""
+        return cls(complex(*mesh.centre), mesh.diameter)
+
+    def value(self, z: ComplexArray) -> ComplexArray:
+        """Return the field at points."""
+        return np.asarray((z - self.centre) / self.diameter)
+
+    def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """Return the work of tractions, displacements and gradients; see `_Field`."""
+        factor = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus * self.diameter)
+        return (
+            np.sum((arcs.z - self.centre).conj() * np.abs(arcs.dz), axis=1) * factor,
+            1j * (arcs.end - arcs.start).conj() / self.diameter,
+            1j * np.sum(arcs.arm * arcs.dz.conj(), axis=1) / self.diameter,
+        )
+
+
+def fields_of(mesh: BoundaryMesh) -> list[ReciprocalField]:
+    """Return one field for each closed curve of a mesh without symmetry."""
+    loops = zip(mesh.loops, mesh.loop_areas, strict=True)
+    return [Dilatation.of(mesh) if area > 0.0 else HoleSource.of(mesh, loop) for loop, area in loops]
+
+
 def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
-    """Return the field w = (1 - 2 nu) (z - c) by the diameter of the body; its value without the factor."""
-    whole = mesh.whole
+    """Return the field of the outer curve."""
+    whole, field = mesh.whole, Dilatation.of(mesh)
     arcs = Arcs.of(whole, _POINTS_OF_LINES if whole.is_straight.all() else _POINTS)
-    z, arm, dz = arcs.z, arcs.arm, arcs.dz
-    centre, factor = _plane(mesh.centre), 1.0 - 2.0 * material.effective_poisson_ratio
-    return _Field(
-        (_plane(whole.centres) - centre) / mesh.diameter,
-        np.sum((z - centre).conj() * np.abs(dz), axis=1) * (factor / (2.0 * material.shear_modulus * mesh.diameter)),
-        1j * _plane(whole.end - whole.start).conj() / mesh.diameter,
-        1j * np.sum(arm * dz.conj(), axis=1) / mesh.diameter,
-    )
+    return _Field(field.value(_plane(whole.centres)), *field.work(arcs, material))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +243,14 @@ class Arcs:
         xi, weights = gauss_legendre(n_points)
         z, dz = _plane(mesh.points(elements, xi)), _plane(mesh.derivatives(elements, xi)) * weights
         return cls(_plane(mesh.start), _plane(mesh.end), z, z - _plane(mesh.centres)[:, None], dz)
+
+    @classmethod
+    def straight(cls, start: ComplexArray, end: ComplexArray) -> Arcs:
+        """Return straight elements from their ends."""
+        xi, weights = gauss_legendre(_POINTS)
+        half = 0.5 * (end - start)[:, None]
+        arm = half * xi
+        return cls(start, end, (start + 0.5 * (end - start))[:, None] + arm, arm, half * weights)
 
     def take(self, elements: IntArray) -> Arcs:
         """Return some of them."""

@@ -218,15 +218,13 @@ class BoundaryColumns:
         t, u, s = (each[elements] for each in densities)
         if self.curved is None and (fast := compiled.functions()) is not None:
             ends = self.start[elements], self.end[elements]
-            values: ComplexArray = fast.applied(self.constants.numbers, x, _counted(places, elements), *ends, t, u, s)
+            values: ComplexArray = fast.applied(self.constants.numbers, x, counted(places, elements), *ends, t, u, s)
             return values
         result = np.zeros(x.size, complex)
         step = max(1, _PAIRS // max(places.size, 1))
         for begin in range(0, t.size, step):
             some = slice(begin, begin + step)
-            factors = -t[some], -t[some].conj(), u[some], u[some].conj(), s[some], s[some].conj()
-            for field, factor in zip(self._element_fields(x, places, elements[some]), factors, strict=True):
-                result += field @ factor
+            result += caused(self._element_fields(x, places, elements[some]), t[some], u[some], s[some])
         return result
 
     def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
@@ -254,7 +252,7 @@ class BoundaryColumns:
         """Return what some elements, ascending, cause; see `element_fields.element_fields`."""
         if self.curved is not None:
             return self.curved.fields(x, places, elements)
-        return element_fields(self.constants, x, _counted(places, elements), self.start[elements], self.end[elements])
+        return element_fields(self.constants, x, counted(places, elements), self.start[elements], self.end[elements])
 
     def _moved(self, fields: ComplexArray, elements: IntArray, touched: IntArray) -> tuple[ComplexArray, ComplexArray]:
         """Return the factors of displacements of elements and of their conjugates, with slopes."""
@@ -271,7 +269,14 @@ class BoundaryColumns:
         return total, total_conjugate
 
 
-def _counted(places: IntArray, elements: IntArray) -> IntArray:
+def caused(fields: ComplexArray, t: ComplexArray, u: ComplexArray, s: ComplexArray) -> ComplexArray:
+    """Return T (u + s t) - U t, complex (n_points,), from the fields (6, n_points, n_elements) of `element_fields`."""
+    return np.asarray(
+        sum(field @ of for field, of in zip(fields, (-t, -t.conj(), u, u.conj(), s, s.conj()), strict=True))
+    )
+
+
+def counted(places: IntArray, elements: IntArray) -> IntArray:
     """Return where places stand among some elements, ascending; `NOWHERE` if they do not."""
     if not elements.size:
         return np.full_like(places, NOWHERE)

@@ -19,7 +19,7 @@ _MOST = 1200
 """Groups beyond which fewer are tried."""
 _WIDEST = 128
 """A group is at most so long by the length of its closed curve."""
-_GROWTHS = (0.25, 1.0, 4.0)
+_GROWTHS = (0.35, 1.0, 4.0)
 """Length of a group by its distance from the nearest place where conditions change, the best first."""
 _CORNER, _TURN = 0.3, 0.2
 """Angles [rad] between neighbours at which groups end and become short; and within one group."""
@@ -79,8 +79,8 @@ class ElementGroups:
 
 def _firsts(mesh: BoundaryMesh, loop: IntArray, kind: IntArray, growth: float) -> IntArray:
     """Return where groups begin in a loop, ascending."""
-    tangent = mesh.tangents[loop] @ np.array([1.0, 1j])
-    turn = np.angle(tangent / np.roll(tangent, 1))
+    chord = (mesh.end[loop] - mesh.start[loop]) @ np.array([1.0, 1j])
+    turn = np.angle(chord / np.roll(chord, 1))
     sharp = np.flatnonzero((kind != np.roll(kind, 1)) | (np.abs(turn) > _CORNER))
     begin = int(sharp[0]) if sharp.size else 0
     ends = np.concatenate([[0.0], np.cumsum(np.roll(mesh.lengths[loop], -begin))])

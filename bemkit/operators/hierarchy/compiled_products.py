@@ -104,34 +104,42 @@ def _own(
 
 
 @numba.njit(**OPTIONS)
-def nearby(
+def add_nearby(
     constants: FloatArray,
-    x: ComplexArray,
-    start: ComplexArray,
-    end: ComplexArray,
+    nodes: ComplexArray,
+    ends: IntArray,
+    order: IntArray,
+    bounds: IntArray,
     traction: ComplexArray,
     displacement: ComplexArray,
     slope: ComplexArray,
-    bounds: IntArray,
     first: IntArray,
     near: IntArray,
     begin: int,
     stop: int,
-) -> ComplexArray:
-    """Return T (u + s t) - U t in the leaves from `begin` to `stop` - 1; see `FastMultipole`."""
-    offset = bounds[begin]
-    result = np.zeros(bounds[stop] - offset, np.complex128)
+    result: ComplexArray,
+) -> None:
+    """Add T (u + s t) - U t in the leaves from `begin` to `stop` - 1; see `FastMultipole`."""
     for leaf in range(begin, stop):
         low, high = bounds[leaf], bounds[leaf + 1]
-        x_x, x_y = x[low:high].real.copy(), x[low:high].imag.copy()
+        x_x, x_y = np.empty(high - low), np.empty(high - low)
+        for i in range(low, high):
+            start, end = nodes[ends[order[i], 0]], nodes[ends[order[i], 1]]
+            x_x[i - low], x_y[i - low] = (
+                start.real + 0.5 * (end.real - start.real),
+                start.imag + 0.5 * (end.imag - start.imag),
+            )
         real, imaginary = np.zeros(high - low), np.zeros(high - low)
         for k in range(first[leaf], first[leaf + 1]):
-            for j in range(bounds[near[k]], bounds[near[k] + 1]):
+            for place in range(bounds[near[k]], bounds[near[k] + 1]):
+                j, i = order[place], place - low
+                start, end = nodes[ends[j, 0]], nodes[ends[j, 1]]
                 is_own = near[k] == leaf
-                before = complex(real[j - low], imaginary[j - low]) if is_own else 0j
-                _add(constants, x_x, x_y, start[j], end[j], traction[j], displacement[j], slope[j], real, imaginary)
+                before = complex(real[i], imaginary[i]) if is_own else 0j
+                _add(constants, x_x, x_y, start, end, traction[j], displacement[j], slope[j], real, imaginary)
                 if is_own:
-                    total = before + _own(constants, x[j], start[j], end[j], traction[j], displacement[j], slope[j])
-                    real[j - low], imaginary[j - low] = total.real, total.imag
-        result[low - offset : high - offset] = real + 1j * imaginary
-    return result
+                    middle = complex(x_x[i], x_y[i])
+                    total = before + _own(constants, middle, start, end, traction[j], displacement[j], slope[j])
+                    real[i], imaginary[i] = total.real, total.imag
+        for i in range(low, high):
+            result[order[i]] += complex(real[i - low], imaginary[i - low])

@@ -3,13 +3,62 @@
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 
 _PREFERRED = 0.1
 """A condition is solved for a quantity of its own direction as long as the best choice is not ten times better."""
+KNOWN = np.array(list(itertools.combinations(range(4), 2)))
+"""(6, 2): the pairs of (t_1, t_2, u_1, u_2) for which two conditions can be solved."""
+UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for pair in KNOWN.tolist()])
+"""(6, 2): the others, those along the first direction before those along the second one."""
+
+
+class SolvedConditions(NamedTuple):
+    """Two quantities of each node that follow from the other two, z: ``coupling @ z + given``.
+
+    Parameters
+    ----------
+    choice : (n,) int8 array
+        Which two follow, a row of `KNOWN`; the others are those of `UNKNOWN`.
+    coupling : (n, 2, 2) array
+    given : (n, 2) array
+    is_determined : (n,) bool array
+        Whether the conditions are two.
+    """
+
+    choice: IntArray
+    coupling: FloatArray
+    given: FloatArray
+    is_determined: BoolArray
+
+
+def solve_for_two(
+    on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
+) -> SolvedConditions:
+    """Solve two conditions a node for two of its four quantities; see `solve_conditions`."""
+    conditions = np.concatenate([on_traction, on_displacement], axis=2)
+    scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
+    sizes = np.abs(scaled).max(axis=2, keepdims=True)
+    scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
+    determinants = np.stack(
+        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in KNOWN], axis=1
+    )
+    best = determinants.max(axis=1)
+    own = np.where(KNOWN[:, 0] % 2 != KNOWN[:, 1] % 2, determinants, 0.0)
+    choice = np.where(own.max(axis=1) >= _PREFERRED * best, own.argmax(axis=1), determinants.argmax(axis=1))
+    nodes = np.flatnonzero(best > 0.0)
+    of_known, of_unknown = (
+        np.take_along_axis(conditions[nodes], pairs[choice[nodes], None, :], axis=2) for pairs in (KNOWN, UNKNOWN)
+    )
+    inverse = _inverse(of_known)
+    coupling, given = np.zeros((len(value), 2, 2)), np.zeros((len(value), 2))
+    coupling[nodes] = -inverse @ of_unknown
+    given[nodes] = (inverse @ value[nodes, :, None])[:, :, 0]
+    return SolvedConditions(choice.astype(np.int8), coupling, given, best > 0.0)
 
 
 def solve_conditions(
@@ -33,28 +82,13 @@ def solve_conditions(
     is_determined : (n,) bool array
         Whether the conditions are two.
     """
-    conditions = np.concatenate([on_traction, on_displacement], axis=2)
-    scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
-    sizes = np.abs(scaled).max(axis=2, keepdims=True)
-    scaled = scaled / np.where(sizes > 0.0, sizes, 1.0)
-    pairs = list(itertools.combinations(range(4), 2))
-    determinants = np.stack(
-        [np.abs(scaled[:, 0, i] * scaled[:, 1, j] - scaled[:, 0, j] * scaled[:, 1, i]) for i, j in pairs], axis=1
-    )
-    is_own = np.array([i % 2 != j % 2 for i, j in pairs])
-    best = determinants.max(axis=1)
-    own = np.where(is_own, determinants, 0.0)
-    choice = np.where(own.max(axis=1) >= _PREFERRED * best, own.argmax(axis=1), determinants.argmax(axis=1))
+    choice, coupling, known, is_determined = solve_for_two(on_traction, on_displacement, value, displacement_unit)
     n = len(value)
-    factors, given = np.zeros((n, 4, 2)), np.zeros((n, 4))
-    for number, pair in enumerate(pairs):
-        nodes = np.flatnonzero((choice == number) & (best > 0.0))
-        others = [k for k in range(4) if k not in pair]
-        inverse = _inverse(conditions[nodes][:, :, pair])
-        factors[nodes[:, None], pair] = -inverse @ conditions[nodes][:, :, others]
-        factors[nodes[:, None], others, [0, 1]] = 1.0
-        given[nodes[:, None], pair] = (inverse @ value[nodes, :, None])[:, :, 0]
-    return factors, given, best > 0.0
+    factors, given, nodes = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
+    factors[nodes, KNOWN[choice]] = coupling
+    factors[nodes, UNKNOWN[choice], [0, 1]] = is_determined[:, None]
+    given[nodes, KNOWN[choice]] = known
+    return factors, given, is_determined
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:

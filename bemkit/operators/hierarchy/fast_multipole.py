@@ -17,10 +17,12 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns, Densities
+from bemkit.operators.hierarchy.boundary_columns import Densities, caused, counted
 from bemkit.operators.hierarchy.clusters import Clusters, Discs
+from bemkit.operators.hierarchy.element_fields import element_fields
 from bemkit.operators.hierarchy.expansions import Expansions, Sources
 from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries, order_for
+from bemkit.operators.hierarchy.straight_elements import StraightElements
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -31,7 +33,7 @@ else:
 
 LEAF_SIZE = 40
 """Elements of a leaf: integrals nearby and series from afar then take about the same time."""
-_CHUNK, _FEW = 256, 32
+_CHUNK, _FEW = 128, 8
 """Clusters, or pairs of them, whose series are moved at a time; leaves whose elements are evaluated at a time."""
 
 
@@ -69,67 +71,79 @@ class _Near:
 class FastMultipole(_LinearOperator):
     """(1/2 + T) u - U t in the middle of all straight elements, from their tractions t and displacements u.
 
-    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryColumns.entries`.
+    As a linear operator it is (2 n_elements, 4 n_elements), numbered like `BoundaryColumns.entries`, the order
+    of the elements being that of the mesh.
 
     Parameters
     ----------
-    columns : BoundaryColumns
-        Of straight elements, without images and places of holes.
-    tree : ClusterTree
-        In whose order the elements are.
+    elements : StraightElements
     tolerance : float
         Of the series, by the largest displacement that comes from afar.
     """
 
-    def __init__(self, columns: BoundaryColumns, tree: ClusterTree, tolerance: float) -> None:
-        n = columns.n_elements
+    def __init__(self, elements: StraightElements, tolerance: float) -> None:
+        n, constants = elements.mesh.n_elements, elements.constants
         LinearOperator.__init__(self, np.dtype(float), (2 * n, 4 * n))  # type: ignore[call-arg]  # the stubs lack it
-        constants = columns.constants
-        self.columns, self.tree = columns, tree
+        self.elements, self.tree = elements, ClusterTree.of(elements.mesh.centres, LEAF_SIZE)
         self._expansions = Expansions(order_for(tolerance), 3.0 - 4.0 * constants.poisson_ratio, constants.log_length)
-        clusters = Clusters.around(tree, np.stack([columns.start, columns.end]))
+        ends = np.stack(elements.ends(self.tree.order))
+        clusters = Clusters.around(self.tree, ends)
         self._levels, self._near = _interactions(clusters)
-        self._sources = SourceSeries(self._expansions, clusters, 0.5 * columns.lengths)
+        self._sources = SourceSeries(self._expansions, clusters, 0.5 * np.abs(ends[1] - ends[0]))
 
     def _matvec(self, x: FloatArray) -> FloatArray:
-        state = np.reshape(x, (-1, 4))
-        return self.applied(state[:, :2], state[:, 2:]).ravel()
+        t, u = (np.ascontiguousarray(each).view(complex)[:, 0] for each in np.hsplit(np.reshape(x, (-1, 4)), 2))
+        mean, slope = self.elements.reconstructed(u)
+        return self.applied(t, mean, slope, u.copy()).view(float)
 
-    def applied(self, traction: FloatArray, displacement: FloatArray) -> FloatArray:
-        """Return (1/2 + T) u - U t, (n, 2), from tractions and displacements (n, 2); all by place."""
-        densities = self.columns.densities(traction, displacement)
-        far = self._from_afar(self._locals(self._series(densities)))
-        far += self._from_nearby(densities)
-        return far.view(float).reshape(-1, 2) + 0.5 * displacement
+    def applied(
+        self, traction: ComplexArray, mean: ComplexArray, slope: ComplexArray, displacement: ComplexArray
+    ) -> ComplexArray:
+        """Return (1/2 + T) u - U t, complex (n_elements,).
 
-    def _from_nearby(self, densities: Densities) -> ComplexArray:
-        """Return what the elements of the leaves that are not far from each one cause there, (n,) by place."""
-        columns, tree, near, first = self.columns, self.tree, self._near.source, self._near.first
-        fast = compiled.products()
+        Parameters
+        ----------
+        traction, mean, slope : (n_elements,) complex arrays
+            Tractions, constant parts and slopes of the displacements.
+        displacement : (n_elements,) complex array
+            In the middle of the elements; the result is written over it.
+        """
+        densities = traction, mean, slope
+        displacement *= 0.5
+        self._add_from_afar(self._locals(self._series(densities)), displacement)
+        self._add_nearby(densities, displacement)
+        return displacement
 
-        def of_leaves(some: slice) -> ComplexArray:
+    def _add_nearby(self, densities: Densities, result: ComplexArray) -> None:
+        """Add what the elements of the leaves that are not far from each one cause there."""
+        elements, tree, near, first = self.elements, self.tree, self._near.source, self._near.first
+        fast, constants = compiled.products(), elements.constants
+
+        def add_to_leaves(some: slice) -> None:
             if fast is not None:
-                geometry = columns.centre, columns.start, columns.end
-                caused: ComplexArray = fast.nearby(
-                    columns.constants.numbers, *geometry, *densities, tree.bounds, first, near, some.start, some.stop
-                )
-                return caused
-            parts = []
+                geometry = elements.nodes, elements.mesh.elements, tree.order, tree.bounds
+                fast.add_nearby(constants.numbers, *geometry, *densities, first, near, some.start, some.stop, result)
+                return
             for leaf in range(some.start, some.stop):
-                elements = np.concatenate([np.r_[tree.places(0, k)] for k in near[first[leaf] : first[leaf + 1]]])
-                parts.append(columns.layers(np.r_[tree.places(0, leaf)], elements, densities))
-            return np.concatenate(parts)
+                own = tree.order[tree.places(0, leaf)]
+                for number in near[first[leaf] : first[leaf + 1]].tolist():
+                    sources = tree.order[tree.places(0, number)]
+                    at, ends = counted(own, sources), elements.ends(sources)
+                    fields = element_fields(constants, elements.centres(own), at, *ends)
+                    result[own] += caused(fields, *(each[sources] for each in densities))
 
         chunks = [slice(i, min(i + _FEW, tree.n_leaves)) for i in range(0, tree.n_leaves, _FEW)]
-        return np.concatenate(for_each_chunk(of_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2))
+        for_each_chunk(add_to_leaves, chunks, n_integrals=near.size * LEAF_SIZE**2)
 
     def _series(self, densities: Densities) -> list[ComplexArray]:
         """Return the series of the sources of all clusters that are far from others, level by level from the leaves."""
-        columns, b, mu = self.columns, self.columns.constants.double, self._shear_modulus
+        order, b, mu = self.tree.order, self.elements.constants.double, self._shear_modulus
 
         def sources_of(places: IntArray, n_points: int) -> Sources:
             xi, weights = gauss_legendre(n_points)
-            start, end, t, u, s = (each[places, None] for each in (columns.start, columns.end, *densities))
+            elements = order[places]
+            start, end = (each[:, None] for each in self.elements.ends(elements))
+            t, u, s = (each[elements, None] for each in densities)
             half = 0.5 * (end - start)
             w, density = np.abs(half) * weights, u + s * xi
             normal = -1j * half / np.abs(half)
@@ -141,7 +155,7 @@ class FastMultipole(_LinearOperator):
 
     @property
     def _shear_modulus(self) -> float:
-        constants = self.columns.constants
+        constants = self.elements.constants
         return 0.5 * constants.double / constants.single
 
     def _locals(self, series: list[ComplexArray]) -> ComplexArray:
@@ -159,7 +173,7 @@ class FastMultipole(_LinearOperator):
                     own[some] = self._expansions.of_children(
                         inherited[some // 2], arm, above.radius[some // 2], discs.radius[some]
                     )
-            self._add_far(own, level, series[number])
+            self._add_far(own, level, series.pop())
             inherited = own
         assert inherited is not None
         return inherited
@@ -173,17 +187,16 @@ class FastMultipole(_LinearOperator):
             present, first = np.unique(target, return_index=True)
             own[present] += np.add.reduceat(fields, first)
 
-    def _from_afar(self, series: ComplexArray) -> ComplexArray:
-        """Return complex displacements (n,) in the middle of the elements from the series in their leaves."""
+    def _add_from_afar(self, series: ComplexArray, result: ComplexArray) -> None:
+        """Add complex displacements (n_elements,) in the middle of the elements from the series in their leaves."""
         leaves, bounds, n_leaves = self._levels[0].discs, self.tree.bounds, self.tree.n_leaves
-        result = np.empty(self.columns.n_elements, complex)
         for begin in range(0, n_leaves, _FEW):
             end = min(begin + _FEW, n_leaves)
-            places = slice(int(bounds[begin]), int(bounds[end]))
+            elements = self.tree.order[bounds[begin] : bounds[end]]
             leaf = np.repeat(np.arange(begin, end), np.diff(bounds[begin : end + 1]))
-            arm = self.columns.centre[places] - leaves.centre[leaf]
-            result[places] = self._expansions.displacements(series[leaf], arm, leaves.radius[leaf])
-        return np.asarray(result / (2.0 * self._shear_modulus))
+            arm = self.elements.centres(elements) - leaves.centre[leaf]
+            displacements = self._expansions.displacements(series[leaf], arm, leaves.radius[leaf])
+            result[elements] += displacements / (2.0 * self._shear_modulus)
 
 
 def _interactions(clusters: Clusters) -> tuple[list[_Level], _Near]:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.reciprocity import Reciprocity
-from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
-from bemkit.operators.hierarchy.factor import ElementLaws
-from bemkit.operators.hierarchy.fast_multipole import LEAF_SIZE, FastMultipole
+from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, fields_of
+from bemkit.operators.hierarchy.compact_laws import CompactLaws
+from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_for_two
+from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
-from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.linear.gmres import gmres
+from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
+from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.linear.gmres import SingleArray, gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
-from bemkit.operators.rigid_modes import traction_free_modes
+from bemkit.operators.rigid_modes import admissible_modes, traction_free_modes
 
 _PRODUCTS = 1e-3
 """Error of a product by the tolerance of the iteration; tractions feel it by elements on which it oscillates."""
@@ -27,42 +28,63 @@ _FINEST = 1e-13
 """Errors of products below that are round-off."""
 
 
+Vector: TypeAlias = FloatArray | SingleArray
+"""Unknowns, or a direction of the iteration."""
+
+
 @dataclass(frozen=True, eq=False)
 class WholeBoundary:
-    """Unknowns and equations of the boundary as a whole, of which as little as possible is stored.
+    """Unknowns and equations of the boundary as a whole, those of `collocation_system.boundary_border`.
 
     Parameters
     ----------
-    errors : (2 n_elements, n_motions + n_loops) array
-        Rigid motions and the fields of reciprocities: errors of the equations.
-    on_resultant : (2 n_elements,) array [m^2/Pa]
-        By which the work of tractions on rigid motions becomes a balance.
-    on_traction, on_displacement : (n_loops, 2 n_elements) arrays
-        Of the reciprocities; see `bemkit.operators.collocation.reciprocity`.
+    elements : StraightElements
+    material : Material
+    fields : list of ReciprocalField
+        One for each closed curve.
     """
 
-    errors: FloatArray
-    on_resultant: FloatArray
-    on_traction: FloatArray
-    on_displacement: FloatArray
+    elements: StraightElements
+    material: Material
+    fields: list[ReciprocalField]
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, order: IntArray, *, takes_slopes: bool) -> WholeBoundary:
-        """Return what `collocation_system.boundary_border` does, by place."""
-        reciprocity = Reciprocity.of(mesh, material, takes_slopes=takes_slopes)
-        compliance = 1.0 / (8.0 * np.pi * material.shear_modulus * (1.0 - material.effective_poisson_ratio))
-        places = (2 * order[:, None] + np.arange(2)).ravel()
-        errors = np.column_stack([traction_free_modes(mesh, mesh.centres), reciprocity.fields])
-        weights = compliance * np.repeat(mesh.lengths[order], 2)
-        rows = (each[:, places] for each in (reciprocity.on_traction, reciprocity.on_displacement))
-        return cls(errors[places], weights, *rows)
+    def of(cls, elements: StraightElements, material: Material) -> WholeBoundary:
+        """Return those of a mesh."""
+        return cls(elements, material, fields_of(elements.mesh))
 
-    def balances(self, state: FloatArray) -> FloatArray:
-        """Return both sides of the additional equations, one less the other, of (t_x, t_y, u_x, u_y) by place."""
-        traction, displacement = state[:, :2].ravel(), state[:, 2:].ravel()
-        n_motions = self.errors.shape[1] - len(self.on_traction)
-        resultants = (self.on_resultant * traction) @ self.errors[:, :n_motions]
-        return np.concatenate([resultants, self.on_traction @ traction - self.on_displacement @ displacement])
+    @property
+    def n_unknowns(self) -> int:
+        """Number of the rigid motions and of the closed curves."""
+        return len(admissible_modes(self.elements.mesh)) + len(self.fields)
+
+    def add_errors(self, unknowns: Vector, equations: ComplexArray) -> None:
+        """Add what the unknowns (n_unknowns,), factors of rigid motions and of fields, do to the equations (n,)."""
+        for some in self.elements.chunks():
+            centres = self.elements.centres(some)
+            errors = [*self._motions(centres), *(field.value(centres) for field in self.fields)]
+            equations[some] += sum(factor * error for factor, error in zip(unknowns, errors, strict=True))
+
+    def balances(self, traction: ComplexArray, mean: ComplexArray, slope: ComplexArray) -> FloatArray:
+        """Return both sides of the equations, one less the other, of tractions and displacements (n,) on elements."""
+        total = np.zeros(self.n_unknowns)
+        compliance = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - self.material.effective_poisson_ratio))
+        for some in self.elements.chunks():
+            start, end = self.elements.ends(some)
+            arcs, t, half = Arcs.straight(start, end), traction[some], 0.5 * (end - start)
+            forces = compliance * t * np.abs(end - start)
+            works = [(motion.conj() @ forces).real for motion in self._motions(self.elements.centres(some))]
+            for field in self.fields:
+                on_t, on_u, on_gradient = field.work(arcs, self.material)
+                works.append((on_t @ t - on_u @ mean[some] - (on_gradient / half) @ slope[some]).real)
+            total += works
+        return total
+
+    def _motions(self, points: ComplexArray) -> ComplexArray:
+        """Return the rigid motions (n_motions, n) at points, complex."""
+        mesh, places = self.elements.mesh, pairs(points)
+        motions = traction_free_modes(mesh, places).reshape(*places.shape, -1)
+        return np.asarray((motions[:, 0] + 1j * motions[:, 1]).T)
 
 
 class NotConvergedError(NoResultError):
@@ -86,28 +108,24 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     Notes
     -----
-    The iteration begins with the last response. Its preconditioner is made anew if on some element other quantities
-    are unknown than before.
+    What is kept between two responses are the unknowns of the last one, with which the iteration begins, and what is
+    known. The preconditioner is made anew if on some element other quantities are unknown than before.
     """
 
     def __init__(
         self, mesh: BoundaryMesh, material: Material, frame: FloatArray, options: MatrixFree, *, slopes: bool
     ) -> None:
-        tree = ClusterTree.of(mesh.centres, LEAF_SIZE)
-        self._order, self._n_elements, self._frame = tree.order, mesh.n_elements, frame
-        self._place = np.empty_like(self._order)
-        self._place[self._order] = np.arange(self._order.size)
+        self._n_elements, self._frame, self._material = mesh.n_elements, frame, material
         self._unit = mesh.diameter / mesh.n_elements / material.plane_modulus
-        self._mesh, self._material = mesh, material
         self._tolerance, self._max_steps = options.tolerance, options.max_steps
-        columns = BoundaryColumns.of(mesh, material, tree.order, takes_slopes=slopes)
-        self._layers = FastMultipole(columns, tree, max(_PRODUCTS * options.tolerance, _FINEST))
-        self._whole = WholeBoundary.of(mesh, material, tree.order, takes_slopes=slopes)
+        self._elements = StraightElements.of(mesh, material, takes_slopes=slopes)
+        self._layers = FastMultipole(self._elements, max(_PRODUCTS * options.tolerance, _FINEST))
+        self._whole = WholeBoundary.of(self._elements, material)
         self._traction_unit = material.plane_modulus / mesh.diameter
-        self._state, self._errors = np.zeros((self._order.size, 4)), np.zeros(self._whole.errors.shape[1])
-        self._laws: ElementLaws | None = None
+        self._x = np.zeros(2 * mesh.n_elements + self._whole.n_unknowns)
+        self._laws: CompactLaws | None = None
         self._inverse: Preconditioner | None = None
-        self._n_answers = 0
+        self._is_solved, self._n_answers = False, 0
         self.steps: list[int] = []
         """Steps of all responses so far."""
 
@@ -116,8 +134,14 @@ class MatrixFreeSystem(HierarchicalSystem):
         """How often conditions were asked for."""
         return self._n_answers
 
-    def state(self, known: ElementLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:
-        """Return (t_1, t_2, u_1, u_2) of some elements; see `HierarchicalSystem.state`.
+    def laws(self, conditions: NodeConditions) -> CompactLaws:  # type: ignore[override]  # what `state` takes
+        """Return what conditions on all elements make of their tractions and displacements, in their frames."""
+        of_all = conditions.on_traction, conditions.on_displacement, conditions.value
+        parts = (self._solved(NodeConditions(*(of[some] for of in of_all))) for some in self._elements.chunks())
+        return CompactLaws.joined([CompactLaws.of(each) for each in parts])
+
+    def state(self, known: CompactLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:  # type: ignore[override]
+        """Return (t_1, t_2, u_1, u_2) of some elements, ascending; see `HierarchicalSystem.state`.
 
         Raises
         ------
@@ -127,78 +151,109 @@ class MatrixFreeSystem(HierarchicalSystem):
             If the steps do not suffice.
         """
         self._n_answers += 1
-        places, turned = self._place[elements], self.turned(elements, self.local_laws(conditions))
-        laws = ElementLaws(known.factors.copy(), known.given.copy())
-        laws.factors[places], laws.given[places] = turned.factors, turned.given
-        if self._inverse is None or self._laws is None or np.any(laws.factors != self._laws.factors):
-            self._inverse = Preconditioner.of(self._mesh, self._material, self._layers.columns, laws)
-            self._laws = None
-        if self._laws is None or np.any(laws.given != self._laws.given):
-            self._laws = None  # until it is solved
+        laws, before = known.replaced(elements, self._solved(conditions)), self._laws
+        if before is None or not laws.has_factors_of(before):
+            self._begin_with(laws)
+            self._inverse = None  # before another is made
+        elif not np.array_equal(laws.given, before.given):
+            self._is_solved = False
+        self._laws = laws
+        if not self._is_solved:
+            self._inverse = self._inverse or Preconditioner.of(self._elements, self._material, laws, self._frame)
             self._solve(laws, self._inverse)
-            self._laws = laws
-        both = self._state[places].reshape(-1, 2, 2)
-        state: FloatArray = np.einsum("nkc,nqc->nqk", self._frame[elements], both).reshape(-1, 4)
-        return state
+        return self._local(laws, elements, self._x)
 
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        state = np.empty_like(self._state)
-        state[self._order] = self._state
-        return state[:, :2], state[:, 2:]
+        assert self._laws is not None  # `state` comes first
+        traction, displacement = self._fields(self._laws, self._x)
+        return pairs(traction), pairs(displacement)
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
-        left = self._layers.applied(traction[self._order], displacement[self._order])
-        left += (self._whole.errors @ self._errors).reshape(-1, 2)
-        return np.asarray(left[self._place[elements]])
+        t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
+        return self._left(t, u, self._x[2 * self._n_elements :])[0][elements]
 
-    def _left(self, state: FloatArray, errors: FloatArray) -> FloatArray:
-        """Return both sides of the equations and of the balances, one less the other."""
-        equations = self._layers.applied(state[:, :2], state[:, 2:]).ravel()
-        equations += self._whole.errors @ errors
-        return np.concatenate([equations, self._whole.balances(state)])
+    def _solved(self, conditions: NodeConditions) -> SolvedConditions:
+        """Return what conditions make of tractions and displacements in the frames of their elements."""
+        of = conditions.on_traction, conditions.on_displacement, conditions.value
+        solved = solve_for_two(*of, self._unit)
+        if not solved.is_determined.all():
+            raise UndeterminedError("the two conditions at a contact node are not independent")
+        return solved
 
-    def _solve(self, laws: ElementLaws, inverse: Preconditioner) -> None:
-        """Find the state and the unknowns of the boundary as a whole that fulfil the equations under laws."""
-        n = 2 * self._order.size
-        normal = laws.factors.transpose(0, 2, 1)
-        start: FloatArray = (
-            np.linalg.solve(normal @ laws.factors, normal @ (self._state - laws.given)[:, :, None])
-            .ravel()
-            .astype(float)
-        )
-        units = np.where(inverse.is_traction, self._traction_unit, 1.0).ravel()
+    def _units(self, laws: CompactLaws, elements: IntArray) -> FloatArray:
+        """Return the units (n, 2) of the unknowns of some elements in the iteration."""
+        return np.where(laws.is_traction(elements), self._traction_unit, 1.0)
 
-        def preconditioned(state: FloatArray, errors: FloatArray) -> FloatArray:
-            result = inverse.apply(self._left(state, errors))
-            result[:n] /= units
+    def _local(self, laws: CompactLaws, elements: IntArray, x: Vector, *, is_change: bool = False) -> FloatArray:
+        """Return (t_1, t_2, u_1, u_2) of some elements; of a change of the unknowns their change."""
+        unknowns = x[: 2 * self._n_elements].reshape(-1, 2)[elements]
+        return laws.state(elements, unknowns * self._units(laws, elements), is_change=is_change)
+
+    def _fields(self, laws: CompactLaws, x: Vector, *, is_change: bool = False) -> tuple[ComplexArray, ComplexArray]:
+        """Return complex tractions and displacements (n_elements,), in x and y; of a change their change."""
+        traction, displacement = np.empty((2, self._n_elements), complex)
+        for some in self._elements.chunks():
+            local = self._local(laws, some, x, is_change=is_change)
+            directions = self._frame[some] @ [1.0, 1j]
+            traction[some] = (local[:, :2] * directions).sum(axis=1)
+            displacement[some] = (local[:, 2:] * directions).sum(axis=1)
+        return traction, displacement
+
+    def _begin_with(self, laws: CompactLaws) -> None:
+        """Take over the unknowns of the last response."""
+        self._is_solved = False
+        if self._laws is None:
+            return
+        unknowns = self._x[: 2 * self._n_elements].reshape(-1, 2)
+        for some in self._elements.chunks():
+            unknowns[some] = laws.unknowns(some, self._local(self._laws, some, self._x)) / self._units(laws, some)
+
+    def _left(
+        self, traction: ComplexArray, displacement: ComplexArray, errors: Vector
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the equations (n_elements, 2) and those of the whole boundary, both sides, one less the other."""
+        mean, slope = self._elements.reconstructed(displacement)
+        balances = self._whole.balances(traction, mean, slope)
+        equations = self._layers.applied(traction, mean, slope, displacement)
+        self._whole.add_errors(errors, equations)
+        return pairs(equations), balances
+
+    def _solve(self, laws: CompactLaws, inverse: Preconditioner) -> None:
+        """Find the unknowns that fulfil the equations under laws."""
+        n = 2 * self._n_elements
+
+        def preconditioned(x: Vector, *, is_change: bool = True) -> FloatArray:
+            equations, balances = self._left(*self._fields(laws, x, is_change=is_change), x[n:])
+            result = inverse.apply(equations, balances)
+            unknowns = result[:n].reshape(-1, 2)
+            np.divide(unknowns, self._traction_unit, out=unknowns, where=inverse.is_traction)
             return result
 
-        def product(x: FloatArray) -> FloatArray:
-            return preconditioned(_combined(laws.factors, units * x[:n]), x[n:])
+        def residual(x: FloatArray) -> FloatArray:
+            left = preconditioned(x, is_change=False)
+            return np.negative(left, out=left)
 
-        self._state = _combined(laws.factors, start) + laws.given
-        right = -preconditioned(self._state, self._errors)
-        target = self._tolerance * max(self._size(self._state), float(np.linalg.norm(right)))
-        x, n_steps, left = gmres(product, right, target=target, max_steps=self._max_steps)
+        n_steps, left = gmres(
+            preconditioned, residual, self._x,
+            tolerance=self._tolerance, size=self._size(laws), max_steps=self._max_steps,
+        )  # fmt: skip
         self.steps.append(n_steps)
-        if left > target:
+        if left > self._tolerance:
             raise NotConvergedError(
-                f"{n_steps} steps of GMRES leave {self._tolerance * left / target:.1e} of the solution, above the "
+                f"{n_steps} steps of GMRES leave {left:.1e} of the solution, above the "
                 f"tolerance {self._tolerance:g}: "
-                + ("allow more max_steps" if n_steps >= self._max_steps else "round-off is reached, take a larger one")
+                + (
+                    "allow more max_steps"
+                    if n_steps >= self._max_steps
+                    else "further ones do not help, take a larger one"
+                )
                 + ", or choose the linear solver 'hierarchical'"
             )
-        self._state += _combined(laws.factors, units * x[:n])
-        self._errors = self._errors + x[n:]
+        self._is_solved = True
 
-    def _size(self, state: FloatArray) -> float:
+    def _size(self, laws: CompactLaws) -> float:
         """Return the norm of tractions and displacements in the units of the iteration."""
-        return float(np.hypot(np.linalg.norm(state[:, :2]) / self._traction_unit, np.linalg.norm(state[:, 2:])))
-
-
-def _combined(factors: FloatArray, unknowns: FloatArray) -> FloatArray:
-    """Return what unknowns (2 n_elements,) make of (t_x, t_y, u_x, u_y), without what is given."""
-    state: FloatArray = np.einsum("nqz,nz->nq", factors, unknowns.reshape(-1, 2))
-    return state
+        traction, displacement = self._fields(laws, self._x)
+        return float(np.hypot(np.linalg.norm(traction) / self._traction_unit, np.linalg.norm(displacement)))

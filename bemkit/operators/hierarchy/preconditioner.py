@@ -12,17 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray
-from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.coarse_equations import ElementGroups
 from bemkit.operators.hierarchy.collocation_system import boundary_border
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.compact_laws import CompactLaws
+from bemkit.operators.hierarchy.straight_elements import StraightElements
+from bemkit.operators.hierarchy.system import turned
 from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import DenseLU
 from bemkit.operators.material import Material
 
-_CHUNK = 64
+_CHUNK = 16
 """Groups whose columns are evaluated at a time."""
 
 
@@ -35,77 +36,83 @@ class Preconditioner:
     groups : ElementGroups
     coarse : DenseLU
         Of their equations.
-    turn : (n_elements, 2, 2) array
-        By place, from x and y to the directions along which the two unknowns act.
+    frame : (n_elements, 2, 2) array
+        Rows are the directions of the conditions of each element.
+    coupled : (n_coupled,) array
+        Elements on which unknowns do not act along these.
+    turn : (n_coupled, 2, 2) array
+        From these directions to those along which they do.
     is_traction : (n_elements, 2) bool array
-        By place, the unknowns that are tractions.
+        The unknowns that are tractions.
     tractions : TractionHierarchy
     """
 
     groups: ElementGroups
     coarse: DenseLU
+    frame: FloatArray
+    coupled: IntArray
     turn: FloatArray
     is_traction: BoolArray
     tractions: TractionHierarchy
 
     @classmethod
-    def of(cls, mesh: BoundaryMesh, material: Material, columns: BoundaryColumns, laws: ElementLaws) -> Preconditioner:
-        """Return the inverse under laws, by place.
+    def of(cls, elements: StraightElements, material: Material, laws: CompactLaws, frame: FloatArray) -> Preconditioner:
+        """Return the inverse under laws.
 
         Parameters
         ----------
-        mesh : BoundaryMesh
+        elements : StraightElements
         material : Material
-        columns : BoundaryColumns
-            Of the mesh.
-        laws : ElementLaws
+        laws : CompactLaws
             What is given counts for nothing.
+        frame : (n_elements, 2, 2) array
+            Rows are the directions of the conditions of each element.
 
         Raises
         ------
         SingularMatrixError
             If the conditions do not hold the body.
         """
-        factors, order = laws.factors, columns.order
-        is_traction = np.asarray(~factors[:, 2:].any(axis=1), bool)
-        along = np.where(is_traction[:, None], factors[:, :2], factors[:, 2:])
-        kind = np.empty(order.size, np.intp)
-        kind[order] = _kinds(factors, is_traction)
-        groups = ElementGroups.of(mesh, kind)
-        place = np.empty_like(order)
-        place[order] = np.arange(order.size)
-        hierarchy = TractionHierarchy.of(is_traction, columns.neighbours[2], columns.lengths, columns.constants)
-        coarse = _coarse(groups, material, factors[place[groups.middle]], columns)
-        by_place = ElementGroups(groups.mesh, groups.group[order], groups.middle)
-        return cls(by_place, coarse, np.linalg.inv(along), is_traction, hierarchy)
+        mesh = elements.mesh
+        is_traction = laws.is_traction(np.arange(mesh.n_elements))
+        following = mesh.node_elements[mesh.elements[:, 1], 1]
+        tractions = TractionHierarchy.of(is_traction, following, mesh.lengths, elements.constants)
+        groups = ElementGroups.of(mesh, _kinds(laws))
+        factors = turned(laws.take(groups.middle), frame[groups.middle]).factors
+        coarse = _coarse(groups, material, factors, elements)
+        coupled = laws.take(laws.coupled).factors
+        along = np.where(is_traction[laws.coupled, None], coupled[:, :2], coupled[:, 2:])
+        return cls(groups, coarse, frame, laws.coupled, np.linalg.inv(along), is_traction, tractions)
 
-    def apply(self, right: FloatArray) -> FloatArray:
-        """Return unknowns (2 n_elements + n_border,) for what the equations and balances leave, of the same shape."""
-        n = 2 * len(self.turn)
-        felt = right[:n].reshape(-1, 2)
-        means = self.groups.mean(felt)
-        of_groups = self.coarse.solve(np.concatenate([means.ravel(), right[n:]]))
-        unknowns = of_groups[: means.size].reshape(-1, 2)[self.groups.group]
-        rest = np.einsum("nij,nj->ni", self.turn, felt - means[self.groups.group])
+    def apply(self, equations: FloatArray, balances: FloatArray) -> FloatArray:
+        """Return unknowns (2 n_elements + n_border,) for what equations (n_elements, 2) and balances leave."""
+        means = self.groups.mean(equations)
+        of_groups = self.coarse.solve(np.concatenate([means.ravel(), balances]))
+        result = np.empty(equations.size + balances.size)
+        result[equations.size :] = of_groups[means.size :]
+        rest = result[: equations.size].reshape(-1, 2)
+        np.einsum("nij,nj->ni", self.frame, equations - means[self.groups.group], out=rest)
+        rest[self.coupled] = np.einsum("nij,nj->ni", self.turn, rest[self.coupled])
         of_tractions = self.tractions.apply(rest[self.is_traction])
         rest *= 2.0
         rest[self.is_traction] = -of_tractions
-        unknowns += rest
-        return np.concatenate([unknowns.ravel(), of_groups[means.size :]])
+        rest += of_groups[: means.size].reshape(-1, 2)[self.groups.group]
+        return result
 
 
-def _kinds(factors: FloatArray, is_traction: BoolArray) -> FloatArray:
-    """Return numbers of equal conditions: which unknowns are tractions, and on which side slip acts."""
-    slip = np.sign(np.round(np.einsum("ni,ni->n", factors[:, :2, 0], factors[:, :2, 1]), 6))
-    return np.asarray(is_traction @ np.array([1, 2]) + 4 * slip, np.intp)
+def _kinds(laws: CompactLaws) -> IntArray:
+    """Return numbers of equal conditions: which quantities follow from others, and on which side slip acts."""
+    kinds = laws.choice.astype(np.intp)
+    kinds[laws.coupled] += 8 * np.sign(laws.coupling.sum(axis=(1, 2))).astype(np.intp)
+    return kinds
 
 
-def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, columns: BoundaryColumns) -> DenseLU:
+def _coarse(groups: ElementGroups, material: Material, factors: FloatArray, elements: StraightElements) -> DenseLU:
     """Factor the equations of the groups under laws (n_groups, 4, 2)."""
-    n, takes_slopes = len(factors), columns.slopes is not None
+    n, takes_slopes = len(factors), elements.takes_slopes
     order = np.arange(n)
     of_groups = BoundaryColumns.of(
-        groups.mesh, material, order, takes_slopes=takes_slopes, log_length=columns.constants.log_length
+        groups.mesh, material, order, takes_slopes=takes_slopes, log_length=elements.constants.log_length
     )
     border = boundary_border(groups.mesh, material, order, takes_slopes, has_holes=True)
     balances = border.balances.reshape(-1, n, 4)

@@ -18,7 +18,7 @@ SourcesOf: TypeAlias = Callable[[IntArray, int], Sources]
 """From (n,) places and a number of Gauss points: the sources of the elements there, arrays (n, n_sources)."""
 SEPARATION = 3.0
 """Distance, by the radius of a cluster, from which on its series is summed: what a power is worth."""
-_CHUNK, _FEW = 256, 32
+_CHUNK, _FEW = 128, 8
 """Clusters whose series are moved at a time; leaves whose elements are evaluated at a time."""
 _FEW_POINTS, _SHORT = 4, 0.08
 """Gauss points of an element that is so short by the radius of its leaf; a rule that is exact for all powers else."""

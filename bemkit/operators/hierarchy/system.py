@@ -121,9 +121,9 @@ class HierarchicalSystem:
         places = self._place[elements]
         local = self.local_laws(conditions)
         if elements.size:
-            turned = self.turned(elements, local)
+            own = turned(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
-            factors[places], given[places] = turned.factors, turned.given
+            factors[places], given[places] = own.factors, own.given
         self.factor.update(ElementLaws(factors, given))
         leaves = self._tree.leaves_of(places)
         unknowns = np.empty((self._order.size, 2))
@@ -199,7 +199,7 @@ class HierarchicalSystem:
         n_holes = self._order.size - self.n_elements
         free = NodeConditions.given(np.ones((n_holes, 2), bool), *np.zeros((2, n_holes, 2)))
         every = NodeConditions(*map(np.concatenate, zip(vars(conditions).values(), vars(free).values(), strict=True)))
-        return self.turned(np.arange(self._order.size), self.local_laws(every)).take(self._order)
+        return turned(self.local_laws(every), self._frame).take(self._order)
 
     def local_laws(self, conditions: NodeConditions) -> ElementLaws:
         """Return what conditions make of tractions and displacements, in the frames of their elements."""
@@ -209,12 +209,6 @@ class HierarchicalSystem:
         if not is_determined.all():
             raise UndeterminedError("the two conditions at a contact node are not independent")
         return ElementLaws(factors, given)
-
-    def turned(self, elements: IntArray, laws: ElementLaws) -> ElementLaws:
-        """Return laws in the frames of elements in x and y."""
-        turn = np.zeros((elements.size, 4, 4))
-        turn[:, :2, :2] = turn[:, 2:, 2:] = self._frame[elements].transpose(0, 2, 1)
-        return ElementLaws(turn @ laws.factors, (turn @ laws.given[:, :, None])[:, :, 0])
 
     def _states(self) -> FloatArray:
         """Return (t_x, t_y, u_x, u_y) at all places under the conditions of the last `state`."""
@@ -226,3 +220,10 @@ class HierarchicalSystem:
 
     def _places_in(self, leaves: IntArray) -> IntArray:
         return np.concatenate([np.zeros(0, np.intp), *(np.r_[self._tree.places(0, leaf)] for leaf in leaves.tolist())])
+
+
+def turned(laws: ElementLaws, frame: FloatArray) -> ElementLaws:
+    """Return laws along directions, the rows of (n, 2, 2), in x and y."""
+    turn = np.zeros((len(frame), 4, 4))
+    turn[:, :2, :2] = turn[:, 2:, 2:] = frame.transpose(0, 2, 1)
+    return ElementLaws(turn @ laws.factors, (turn @ laws.given[:, :, None])[:, :, 0])

@@ -35,7 +35,7 @@ _COARSEST = 10
 
 @dataclass(frozen=True, eq=False)
 class TractionHierarchy:
-    """The inverse for one set of unknown tractions.
+    """The inverse for one set of unknown tractions, in single precision, as befits what only approximates.
 
     Parameters
     ----------
@@ -82,18 +82,21 @@ class TractionHierarchy:
             string = (jumps @ diags_array(1.0 / lengths[place]) @ jumps.T).tocsr()
             string += diags_array(_HOLD * string.diagonal())
             hierarchy = ruge_stuben_solver(csr_matrix(string), max_coarse=_COARSEST, max_levels=40)
-            prolongations = tuple(_smoothed(level.P, level.A) for level in hierarchy.levels[:-1])
+            prolongations = tuple(_smoothed(level.P, level.A).astype(np.float32) for level in hierarchy.levels[:-1])
         kappa = 3.0 - 4.0 * constants.poisson_ratio
         return cls(
-            unknowns, jumps, prolongations, 1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[place])
+            unknowns,
+            jumps.astype(np.float32),
+            prolongations,
+            1.0 / (_STRENGTH * np.pi * kappa * constants.single * lengths[place]),
         )
 
     def apply(self, displacement: FloatArray) -> FloatArray:
         """Return the tractions (k,) that cause displacements (k,) along them, as far as these oscillate."""
-        levels = [self.jumps @ displacement]
+        levels = [self.jumps @ displacement.astype(np.float32)]
         for prolongation in self.prolongations:
             levels.append(prolongation.T @ levels[-1])
-        levels[0] *= _FINEST
+        levels[0] *= np.float32(_FINEST)
         total = levels.pop()
         for prolongation in reversed(self.prolongations):
             total = levels.pop() + prolongation @ total

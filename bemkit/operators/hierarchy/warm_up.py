@@ -14,6 +14,7 @@ from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_pairs import ElementPairs
 from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.folded_columns import boundary_columns
+from bemkit.operators.hierarchy.straight_elements import StraightElements
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 
@@ -63,10 +64,11 @@ def warm_up() -> Iterator[Compiled]:
 
 def _use(mesh: BoundaryMesh) -> None:
     """Compress the equations of a small mesh and put numbers into them, with slopes and without."""
-    n, tree = mesh.n_elements, ClusterTree.of(mesh.centres, _LEAF)
+    n, tree, material = mesh.n_elements, ClusterTree.of(mesh.centres, _LEAF), Material(1.0, 0.3)
     for takes_slopes in (True, False):
-        columns = boundary_columns(mesh, Material(1.0, 0.3), tree.order, takes_slopes=takes_slopes)
+        columns = boundary_columns(mesh, material, tree.order, takes_slopes=takes_slopes)
         Compression.of(columns, tree, np.ones((n, 4), bool), 1e-6)
         columns.applied(np.arange(n), np.ones((n, 2)), np.ones((n, 2)))
         if columns.curved is None:
-            FastMultipole(columns, tree, 1e-6).applied(np.ones((n, 2)), np.ones((n, 2)))
+            elements = StraightElements.of(mesh, material, takes_slopes=takes_slopes)
+            FastMultipole(elements, 1e-6).matvec(np.ones(4 * n))

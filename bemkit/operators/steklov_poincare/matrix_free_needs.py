@@ -12,12 +12,13 @@ from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, PlanIte
 
 _FEWEST_ELEMENTS = 200
 _MOST_LOOPS = 20
-"""Each closed curve of the boundary has an equation of its own, which is stored."""
-_BYTES, _BYTES_OF_LOOP, _BYTES_OF_GROUPS = 1.3e3, 48.0, 4e6
-"""Of an element: directions of the iteration, series, conditions and fields; for each closed curve; and once."""
-_EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.8e3
+"""Each closed curve of the boundary has an equation of its own, which is evaluated for each product."""
+_BYTES, _BYTES_OF_GROUPS = 1.35e3, 5e6
+"""Of an element: mesh, directions of the iteration, series, conditions and fields; and once, of which the largest part
+are the equations of groups of elements."""
+_EVALUATIONS, _EVALUATIONS_COMPILED = 4.5e3, 0.3e3
 """Of a product, for each element."""
-_STEPS = 20.0
+_STEPS = 14.0
 """Products of a response from cold."""
 _RESPONSES = 6.0
 """From cold that a load step takes; later ones begin near their solution."""
@@ -42,7 +43,7 @@ def why_stored(case: BodyCase) -> str:
 def matrix_free_needs(case: BodyCase, options: MatrixFree, *, takes_slopes: bool) -> BodyNeeds:
     """Return what equations take that are not stored; how many steps an iteration takes is not foreseen."""
     n = case.mesh.n_elements
-    memory = int(n * (_BYTES + _BYTES_OF_LOOP * len(case.mesh.loops)) + _BYTES_OF_GROUPS)
+    memory = int(_BYTES * n + _BYTES_OF_GROUPS)
     is_compiled = compiled.is_installed()
     of_product = n * (_EVALUATIONS_COMPILED if is_compiled else _EVALUATIONS)
     slopes = "rotations then cause no tractions" if takes_slopes else "the method of the source paper"

@@ -16,6 +16,7 @@ from bemkit.operators.hierarchy.collocation_system import boundary_border
 from bemkit.operators.hierarchy.element_fields import Constants
 from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem, NotConvergedError, WholeBoundary
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
+from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.traction_hierarchy import TractionHierarchy
 from bemkit.operators.linear.dense import SingularMatrixError
@@ -129,21 +130,36 @@ def test_groups_lose_no_digits_on_fine_meshes() -> None:
     nothing = np.zeros_like(mesh.centres)
     system = iterated(mesh, np.tile(np.eye(2), (mesh.n_elements, 1, 1)))
     laws = system.laws(NodeConditions.given(is_held, nothing, nothing))
-    columns = BoundaryColumns.of(mesh, material, system._order, takes_slopes=True)
-    inverse = Preconditioner.of(mesh, material, columns, laws)
-    right = np.cos(np.arange(2.0 * mesh.n_elements + 4.0) / 1e4)
-    unknowns = inverse.apply(right)
-    assert np.abs(inverse.apply(3.0 * right) / 3.0 - unknowns).max() < 1e-12 * np.abs(unknowns).max()
+    inverse = Preconditioner.of(StraightElements.of(mesh, material, takes_slopes=True), material, laws, system._frame)
+    right = np.cos(np.arange(2.0 * len(inverse.groups.middle) + 4.0) / 10.0)
+    unknowns = inverse.coarse.solve(right)
+    assert np.abs(inverse.coarse.solve(3.0 * right) / 3.0 - unknowns).max() < 1e-12 * np.abs(unknowns).max()
 
 
-def test_what_is_not_stored_of_the_whole_boundary() -> None:
+@pytest.mark.parametrize("slopes", [True, False])
+@pytest.mark.parametrize("name", ["hole", "exterior"])
+def test_what_is_not_stored_of_the_whole_boundary(name: str, slopes: bool) -> None:
+    mesh = mesh_of(name, 100)
+    n, elements = mesh.n_elements, StraightElements.of(mesh, MATERIAL, takes_slopes=slopes)
+    own = WholeBoundary.of(elements, MATERIAL)
+    stored = boundary_border(mesh, MATERIAL, np.arange(n), slopes=slopes, has_holes=True)
+    random = np.random.default_rng(1)
+    unknowns, (traction, displacement) = random.standard_normal(own.n_unknowns), random.standard_normal((2, n, 2))
+    equations = np.zeros(n, complex)
+    own.add_errors(unknowns, equations)
+    np.testing.assert_allclose(pairs(equations).ravel(), stored.errors @ unknowns)
+    t, u = (each @ [1.0, 1j] for each in (traction, displacement))
+    exact = stored.balances @ np.concatenate([traction, displacement], axis=1).ravel()
+    np.testing.assert_allclose(own.balances(t, *elements.reconstructed(u)), exact, rtol=1e-11)
+
+
+def test_slopes_that_are_not_stored() -> None:
     mesh = mesh_of("hole", 100)
-    order = np.random.default_rng(0).permutation(100)
-    own = WholeBoundary.of(mesh, MATERIAL, order, takes_slopes=True)
-    stored = boundary_border(mesh, MATERIAL, order, slopes=True, has_holes=True)
-    state = np.random.default_rng(1).standard_normal((100, 4))
-    np.testing.assert_allclose(own.errors, stored.errors)
-    np.testing.assert_allclose(own.balances(state), stored.balances @ state.ravel())
+    columns = BoundaryColumns.of(mesh, MATERIAL, np.arange(mesh.n_elements), takes_slopes=True)
+    displacement = np.random.default_rng(0).standard_normal((mesh.n_elements, 2))
+    _, *exact = columns.densities(displacement, displacement)
+    found = StraightElements.of(mesh, MATERIAL, takes_slopes=True).reconstructed(displacement @ [1.0, 1j])
+    np.testing.assert_allclose(found, exact, rtol=1e-12)
 
 
 def test_groups_are_short_where_conditions_change_and_their_number_hardly_grows() -> None:
