@@ -57,7 +57,7 @@ class KnownLoads:
                 return np.zeros(len(given), bool)
             self._is_expected, before = False, np.full((1, 4), np.nan)
         self.each, self.shares = own[:, :, None], np.ones(1)
-        return np.any(given != before, axis=1) & self._has_loads
+        return np.asarray(np.any(given != before, axis=1) & self._has_loads)
 
     def _own(self, given: FloatArray) -> FloatArray:
         return np.where(self._has_loads[:, None], given, 0.0)
