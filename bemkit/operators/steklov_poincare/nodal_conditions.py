@@ -119,7 +119,7 @@ class GivenData:
 
     def force_in(self, frame: FloatArray) -> FloatArray:
         """Return the forces (n_nodes, 2) in x and y, by the frames (n_nodes, 2, 2) of the nodes."""
-        return np.einsum("nkc,nk->nc", frame, self.force)
+        return np.asarray(np.einsum("nkc,nk->nc", frame, self.force))
 
     @property
     def n_loaded(self) -> int:
