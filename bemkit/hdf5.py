@@ -274,7 +274,7 @@ class Reader:
                 raise self.error(f"too many attributes in {group}")
             for name in found.attrs:
                 stored = found.attrs.get_id(name)
-                is_text = h5py.check_string_dtype(stored.dtype) is not None  # type: ignore[attr-defined]  # stubs
+                is_text = h5py.check_string_dtype(stored.dtype) is not None
                 if stored.shape != () or not (is_text or stored.dtype.kind in "if"):
                     raise self.error(f"attribute {name!r} of {group} is not a single text or number")
             return {name: _plain(value) for name, value in found.attrs.items()}

@@ -42,7 +42,7 @@ class SurfaceErrors:
 
     def at_worst(self, others: Sequence[SurfaceErrors]) -> SurfaceErrors:
         """Return the same tractions with the largest errors of several load steps, by the largest of their totals."""
-        largest = np.max([other.errors for other in others], axis=0)
+        largest = np.stack([other.errors for other in others]).max(axis=0)
         return replace(self, errors=largest, total=max(other.total for other in others))
 
     @property

@@ -207,7 +207,7 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
             f"the executor broke down ({reason}): finished rows are good; go on with fewer processes or with one"
         ) from error
     except (pickle.PicklingError, AttributeError, TypeError) as error:
-        if "pickle" not in str(error):
+        if _can_be_sent(tasks):
             raise
         raise StudyError(
             f"the scene cannot be sent to another process ({error}): write its functions as formulas"
@@ -215,6 +215,14 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
     finally:
         for future in futures:
             future.cancel()
+
+
+def _can_be_sent(tasks: Sequence[Task[R]]) -> bool:
+    try:
+        pickle.dumps([task.compute for task in tasks])
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
+    return True
 
 
 def _bundles(tasks: Sequence[Task[R]], n_workers: int) -> Iterator[list[Callable[[], R]]]:

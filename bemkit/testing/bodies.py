@@ -173,7 +173,7 @@ def _conditions(asked: _Asked, random: np.random.Generator) -> LinearConditions:
     conditions = held = stick(gap, origin)
     for kind in (
         separated(n_contact),
-        slip(gap, random.choice([-1.0, 1.0], n_contact), np.full(n_contact, -0.2), bound),
+        slip(gap, random.choice(np.array([-1.0, 1.0]), n_contact), np.full(n_contact, -0.2), bound),
         augmented(gap, origin, multiplier, 3.0 * stiffness, 2.0 * stiffness),
     ):
         rows = np.repeat(random.random((n_contact, 1)) < 0.25, 2, axis=1)

@@ -241,7 +241,7 @@ def test_a_block_on_a_smooth_floor_keeps_its_place_and_slides_under_the_smallest
         bk.run(block(push))
 
 
-@pytest.mark.parametrize("radius", [0.3, 1e-2, 1e-3])
+@pytest.mark.parametrize("radius", [0.3, 1e-3, 1e-6])
 def test_a_smooth_pin_may_be_small_against_the_plate_it_holds(radius: float) -> None:
     push = bk.Part("push", bk.Traction(x=1.0), sides=("right",))
     pull = bk.Part("hole", bk.Contact(bk.Circle((0.0, 0.0), radius)), sides=tuple(f"hole-{k}" for k in range(1, 5)))

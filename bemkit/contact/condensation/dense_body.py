@@ -167,7 +167,7 @@ class DenseBody(LinearBody):
 
     def rigid_load(self) -> FloatArray:
         """Return the work of the load on these motions."""
-        return self._motions @ self.load
+        return self.motions_of_unknowns @ self.load
 
     def imbalance(self, state: ContactState) -> Imbalance:
         """Return how far the state is from equilibrium, relative to load and contact forces; see `unbalanced`."""
@@ -185,7 +185,7 @@ class DenseBody(LinearBody):
         contact = (self.weights[:, None] * state.traction).ravel()
         forces, unknowns = contact[self.unknown_dofs], state.displacement.ravel()[self.unknown_dofs]
         missing = np.abs(self.stiffness @ unknowns - self.load - forces).max()
-        motions, basis = self._motions, self._orthonormal_motions
+        motions, basis = self.motions_of_unknowns, self._orthonormal_motions
         left_by_motions = float(np.abs(self.stiffness @ (basis @ (basis.T @ unknowns))).max(initial=0.0))
         largest_terms, all_terms = self._column_sizes * np.abs(unknowns)
         eps = np.finfo(float).eps
@@ -209,19 +209,21 @@ class DenseBody(LinearBody):
         return np.stack([sizes.max(axis=0), sizes.sum(axis=0)])
 
     @cached_property
-    def _motions(self) -> FloatArray:
-        """(n_motions, n_unknowns) array."""
+    def motions_of_unknowns(self) -> FloatArray:
+        """(n_motions, n_unknowns) array: what the rigid motions are in the unknowns."""
         return self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self.unknown_dofs]
 
     @cached_property
     def _orthonormal_motions(self) -> FloatArray:
         """(n_unknowns, n_motions) array."""
-        return np.asarray(np.linalg.qr(self._motions.T)[0])
+        return np.asarray(np.linalg.qr(self.motions_of_unknowns.T)[0])
 
     @cached_property
     def _motion_defect(self) -> FloatArray:
         """(n_unknowns,) array [Pa]: what round-off of the stiffness adds to the balance of forces."""
-        return np.asarray(np.abs(self._motions @ self.stiffness).max(axis=0) / np.abs(self._motions).max())
+        return np.asarray(
+            np.abs(self.motions_of_unknowns @ self.stiffness).max(axis=0) / np.abs(self.motions_of_unknowns).max()
+        )
 
     def _followed(self, unknowns: FloatArray) -> FloatArray:
         """Return the displacements of the eliminated tangents."""

@@ -166,10 +166,14 @@ def free_motions(conditions: NodalConditions, contact: ContactNodes, space: Boun
 
     Bound tangential components are zero. An exterior, at rest far away, has none of these motions.
     """
-    motions = free_modes(space, conditions)[:, contact.nodes]
-    at_contact: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, motions)
-    at_contact[:, bound_tangents(conditions, contact), 1] = 0.0
-    return at_contact
+    return at_contact(free_modes(space, conditions), conditions, contact)
+
+
+def at_contact(modes: FloatArray, conditions: NodalConditions, contact: ContactNodes) -> FloatArray:
+    """Return motions (n_motions, n_contact, 2) in (n, t) components from those of all nodes; see `free_motions`."""
+    motions: FloatArray = np.einsum("nkc,jnc->jnk", contact.frame, modes[:, contact.nodes])
+    motions[:, bound_tangents(conditions, contact), 1] = 0.0
+    return motions
 
 
 def find_tangents(conditions: NodalConditions, contact: ContactNodes) -> BoolArray:

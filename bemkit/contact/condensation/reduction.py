@@ -9,11 +9,12 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
+from bemkit.contact.condensation.exact_motions import following, resisting_none, with_work
 from bemkit.contact.condensation.nodes import (
     ContactNodes,
+    at_contact,
     bound_tangents,
     find_tangents,
-    free_motions,
     held_nodes,
     unknown_directions,
 )
@@ -24,7 +25,7 @@ from bemkit.operators.equilibrium import NOISE_FACTOR, Imbalance, resultant_imba
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions
+from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
 
 
 class NoContactNodesError(InputError):
@@ -149,6 +150,8 @@ class CondensedBody(DenseBody):
         Where the nodal forces act.
     force : (n_nodes, 2) array [N/m]
         Given nodal forces, in x and y.
+    modes : (n_motions, n_nodes, 2) array
+        What `motions` are at all nodes, in x and y.
     conditions : NodalConditions
         Of the displacement nodes; the contact nodes are retained.
     nodes : ContactNodes
@@ -167,6 +170,7 @@ class CondensedBody(DenseBody):
     unknowns: Unknowns
     points: FloatArray
     force: FloatArray
+    modes: FloatArray
     conditions: NodalConditions
     nodes: ContactNodes
     balanced: tuple[int, ...] = (0, 1, 2)
@@ -203,7 +207,7 @@ class CondensedBody(DenseBody):
         condensed = condensed_under(self.condensed, conditions, force, inside)
         condensed = replace(condensed, work=self.condensed.work + condensed.work)
         unknowns = Unknowns.of(conditions, self.nodes)
-        return replace(
+        body = replace(
             self,
             load=unknowns.load(condensed),
             eliminated_tangents=unknowns.tangents(condensed, conditions, self.nodes),
@@ -212,6 +216,35 @@ class CondensedBody(DenseBody):
             force=force,
             conditions=conditions,
         )
+        return body.with_exact_motions()
+
+    def with_exact_motions(self) -> CondensedBody:
+        """Return the body with all that its rigid motions do to the last digit; see `exact_motions`."""
+        motions, tangents = self.motions_of_unknowns, self.eliminated_tangents
+        if not len(motions):
+            return self
+        if tangents is not None:
+            follows = ~bound_tangents(self.conditions, self.nodes)[tangents.nodes]
+            response = tangents.response.copy()
+            followed = self.rigid_motions()[:, tangents.nodes[follows], 1]
+            response[follows] = following(response[follows], motions, followed)
+            tangents = replace(tangents, response=response)
+        return replace(
+            self,
+            stiffness=resisting_none(self.stiffness, motions),
+            load=with_work(self.load, motions, *self._given_work()),
+            eliminated_tangents=tangents,
+        )
+
+    def _given_work(self) -> tuple[FloatArray, float]:
+        """Return the work (n_motions,) of all given forces on the rigid motions, and the sum of their sizes [N/m]."""
+        work, size = np.einsum("mnc,nc->m", self.modes, self.force), float(np.abs(self.force).sum())
+        inside = self.condensed.volume_force
+        if inside is not None:
+            unit = rigid_motions(self.points, np.zeros(2), 1.0).reshape(-1, 3)
+            work += inside @ np.linalg.lstsq(unit, self.modes.reshape(len(self.modes), -1).T, rcond=None)[0]
+            size += float(np.abs(inside[:2]).sum()) + self.condensed.inner_force
+        return work, size
 
     def recover(self, state: ContactState) -> tuple[FloatArray, FloatArray]:
         """Return displacement (n_nodes, 2) and total force (n_nodes, 2) of all boundary nodes, in x and y."""
@@ -277,19 +310,21 @@ def condensed_body(
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    unknowns = Unknowns.of(conditions, contact)
-    return CondensedBody(
+    unknowns, modes = Unknowns.of(conditions, contact), free_modes(space, conditions)
+    body = CondensedBody(
         stiffness=unknowns.stiffness(condensed),
         load=unknowns.load(condensed),
         weights=contact.weights,
-        motions=free_motions(conditions, contact, space),
+        motions=at_contact(modes, conditions, contact),
         eliminated_tangents=unknowns.tangents(condensed, conditions, contact),
         modulus=elastic.material.plane_modulus,
         condensed=condensed,
         unknowns=unknowns,
         points=dof_points(space),
         force=force,
+        modes=modes,
         conditions=conditions,
         nodes=contact,
         balanced=admissible_modes(space.mesh),
     )
+    return body.with_exact_motions()

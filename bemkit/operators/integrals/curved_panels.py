@@ -194,9 +194,9 @@ def find_parameters(
     target = np.where(at_start, from_start, from_end)
     coefficients = np.where(at_start, panels.about_start[1:, elements], panels.about_end[1:, elements])
     guesses = np.linspace(0.0, 2.0, 5)
-    side = np.where(at_start, 1.0, -1.0)
-    distance = np.stack([np.abs(g * side * evaluate(coefficients, g * side + 0j) - target) for g in guesses])
-    u = side * guesses[np.argmin(distance, axis=0)] + 0j
+    starts: ComplexArray = np.where(at_start, 1.0, -1.0) * guesses[:, None].astype(complex)
+    distance = np.stack([np.abs(start * evaluate(coefficients, start) - target) for start in starts])
+    u = starts[np.argmin(distance, axis=0), np.arange(target.size)]
     slopes = coefficients * np.arange(1, coefficients.shape[0] + 1)[:, None]
     change = np.full(u.shape, np.inf)
     active = np.arange(u.size)

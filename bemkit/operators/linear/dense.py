@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bemkit.arrays import FloatArray
@@ -137,7 +139,8 @@ class DenseLU:
         # LAPACK stores by columns: a matrix that is stored by rows is factored as its transpose, without a copy
         self._is_transposed = matrix.flags.c_contiguous and not matrix.flags.f_contiguous
         stored = matrix.T if self._is_transposed else matrix
-        norm = float(dlange("1", stored))  # type: ignore[call-arg]  # the stubs lack its arguments
+        lange: Callable[..., float] = dlange  # some stubs lack its arguments
+        norm = lange("1", stored)
         self._factor, self._pivots, info = dgetrf(stored, overwrite_a=1)
         reciprocal_condition = 0.0 if info else dgecon(self._factor, norm)[0]
         if not reciprocal_condition > 1e-15:
