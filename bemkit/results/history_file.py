@@ -29,14 +29,14 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
-from bemkit.hdf5 import Reader, columns_of, rows_of, write_table, write_text
+from bemkit.hdf5 import Reader, rows_of, write_table, write_text
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.solved_body import SolvedBody
-from bemkit.results.tables import CERTIFICATE_ENTRIES
+from bemkit.results.tables import CERTIFICATE_ENTRIES, columns_of
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene

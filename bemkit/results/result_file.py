@@ -47,7 +47,7 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import FileFormat, Reader, ResultFileError, columns_of, rows_of, write_table, write_text
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
@@ -57,7 +57,7 @@ from bemkit.results.history_file import TRANSITION_COLUMNS, read_history, write_
 from bemkit.results.outputs import STDOUT
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
+from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, columns_of, history_columns
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.scene import Scene
