@@ -54,19 +54,6 @@ def write_table(group: h5py.Group, columns: Mapping[str, Any]) -> None:
         group.create_dataset(name, data=data)
 
 
-def columns_of(
-    rows: Sequence[Mapping[str, Any]],
-    *,
-    texts: Sequence[str] = (),
-    floats: Sequence[str] = (),
-    integers: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Return the columns of these names of a table given by its rows, as `write_table` takes them."""
-    kinds = [(name, np.int64) for name in integers] + [(name, float) for name in floats]
-    numbers = {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in kinds}
-    return numbers | {name: [row[name] for row in rows] for name in texts}
-
-
 def rows_of(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the rows of a table that a `Reader` has read, as plain texts and numbers."""
     plain = [column if isinstance(column, list) else column.tolist() for column in columns.values()]

@@ -6,9 +6,9 @@ from bemkit.geometry.curves import ParametricCurve as ParametricCurve
 from bemkit.geometry.curves import Segment as Segment
 from bemkit.geometry.errors import GeometryError as GeometryError
 from bemkit.geometry.errors import UnknownPartError as UnknownPartError
+from bemkit.geometry.files.meshio_files import read_mesh as read_mesh
+from bemkit.geometry.files.meshio_files import write_mesh as write_mesh
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
-from bemkit.geometry.meshfile import read_mesh as read_mesh
-from bemkit.geometry.meshfile import write_mesh as write_mesh
 from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
 from bemkit.geometry.meshing.discretise import Geometric as Geometric
 from bemkit.geometry.meshing.discretise import Grading as Grading

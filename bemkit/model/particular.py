@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import ComplexArray, FloatArray
+from bemkit.errors import InputError
 from bemkit.formulas import Expression
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.model.harmonic_fit import TemperatureError, harmonic_sources
 from bemkit.operators.material import Material, Plane
 from bemkit.operators.particular_solutions import (
     CentrifugalForce,
     HarmonicExpansion,
+    LogarithmicExpansion,
     ParticularSolution,
     Source,
     UniformForce,
@@ -23,8 +25,136 @@ from bemkit.operators.steklov_poincare.forces_inside import projected_tractions
 from bemkit.scene.body_forces import BodyForce, Gravity, Heating, Rotation
 from bemkit.scene.scene import Scene
 
+HIGHEST_DEGREE = 16
+"""Of the polynomials that are tried."""
+ACCURACY = 1e-10
+"""Largest difference between a field and what stands for it, relative to the field."""
+_GOOD_ENOUGH = 1e-14
+_GRID = 12
+_MOST_ELEMENTS = 200
+_BENEATH = 1e-3
+"""Depth of the points beneath the boundary, relative to the size of the body."""
+_RADIUS = 1e-2
+"""Of circles whose mean value is compared with that at their centre, relative to the size of the body."""
+_PLACES = np.array([-0.9, -0.5, 0.0, 0.5, 0.9])
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 """Share of coordinates by which fields of them may be wrong."""
+
+
+class TemperatureError(InputError):
+    """A temperature that is not harmonic, or that no polynomial and logarithm stand for."""
+
+
+def harmonic_sources(
+    field: Callable[[FloatArray], FloatArray], mesh: BoundaryMesh, round_off: float = 0.0
+) -> tuple[Source, ...]:
+    """Return the expansions that stand for a harmonic field in a body.
+
+    Parameters
+    ----------
+    field : callable
+        (n, 2) points [-] of the body -> (n,) values.
+    mesh : BoundaryMesh
+        Of size one, around the origin.
+    round_off : float
+        Relative error of values of the field far from the origin of its own coordinates.
+
+    Raises
+    ------
+    TemperatureError
+        If no harmonic polynomial of degree `HIGHEST_DEGREE`, in a body with one hole together with a logarithm around
+        its centre, comes as near as `ACCURACY` and round-off allow.
+    """
+    points = _sample_points(mesh)
+    values, z = field(points), points[:, 0] + 1j * points[:, 1]
+    size = float(np.abs(values).max())
+    if size == 0.0:
+        return ()
+    centres = _hole_centres(mesh)
+    for holes in ((), tuple(centres)) if len(centres) == 1 else ((),):
+        best, sources = np.inf, tuple[Source, ...]()
+        for degree in range(HIGHEST_DEGREE + 1):
+            miss, found = _fitted(values, z, degree, holes)
+            if miss < best:
+                best, sources = miss, found
+            if best <= max(_GOOD_ENOUGH, round_off) * size:
+                break
+        if best <= (ACCURACY + round_off) * size:
+            return sources
+    raise TemperatureError(_reason(field, mesh, points, size, best / size, ACCURACY + round_off))
+
+
+def _fitted(
+    values: FloatArray, z: ComplexArray, degree: int, centres: tuple[complex, ...]
+) -> tuple[float, tuple[Source, ...]]:
+    """Return the largest difference of the least-squares fit, and its sources."""
+    powers = (2.0 * z[:, None]) ** np.arange(degree + 1)
+    logs = np.log(np.abs(z[:, None] - np.array(centres, complex)))
+    columns = np.column_stack([powers.real, -powers[:, 1:].imag, logs])
+    coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
+    along, across = coefficients[: degree + 1], np.append(0.0, coefficients[degree + 1 : 2 * degree + 1])
+    polynomial = HarmonicExpansion(tuple(((along + 1j * across) * 2.0 ** np.arange(degree + 1)).tolist()))
+    strengths = zip(coefficients[2 * degree + 1 :].tolist(), centres, strict=True)
+    logarithms = tuple(LogarithmicExpansion(strength, centre) for strength, centre in strengths)
+    return float(np.abs(columns @ coefficients - values).max()), (polynomial, *logarithms)
+
+
+def _sample_points(mesh: BoundaryMesh) -> FloatArray:
+    """Return points on the boundary, just beneath it, and on a grid inside."""
+    from bemkit.operators.somigliana.locate import Locator  # only temperatures given by a formula need it
+
+    whole = mesh.whole
+    elements = np.unique(np.linspace(0, whole.n_elements - 1, _MOST_ELEMENTS).astype(np.intp))
+    boundary, normals = whole.points(elements, _PLACES), whole.normals_at(elements, _PLACES)
+    low, high = whole.nodes.min(axis=0), whole.nodes.max(axis=0)
+    grid = low + (high - low) * np.stack(np.meshgrid(*2 * [(np.arange(_GRID) + 0.5) / _GRID]), axis=-1)
+    inside = np.concatenate([(boundary - _BENEATH * normals).reshape(-1, 2), grid.reshape(-1, 2)])
+    return np.concatenate([boundary.reshape(-1, 2), inside[Locator(whole).locate(inside).is_inside]])
+
+
+def _hole_centres(mesh: BoundaryMesh) -> list[complex]:
+    """Return the centres of area of the holes."""
+    whole = mesh.whole
+    xi, weights = np.polynomial.legendre.leggauss(12)
+    centres = []
+    for loop, area in zip(whole.loops, whole.loop_areas, strict=True):
+        if area < 0.0:
+            points, normals = whole.points(loop, xi), whole.normals_at(loop, xi)
+            measure = whole.jacobian(loop, xi) * weights
+            first, second = (float(np.sum(points[..., k] ** 2 * normals[..., k] * measure)) for k in range(2))
+            centres.append(complex(first, second) / (2.0 * float(area)))
+    return centres
+
+
+def _reason(
+    field: Callable[[FloatArray], FloatArray],
+    mesh: BoundaryMesh,
+    points: FloatArray,
+    size: float,
+    miss: float,
+    accuracy: float,
+) -> str:
+    from bemkit.operators.somigliana.locate import Locator
+
+    whole = mesh.whole
+    angles = 2.0 * np.pi * np.arange(16) / 16
+    circle = _RADIUS * np.column_stack([np.cos(angles), np.sin(angles)])
+    locator = Locator(whole)
+    around = points[:, None] + circle
+    rows = locator.locate(around.reshape(-1, 2)).is_inside.reshape(len(points), -1).all(axis=1)
+    rows &= locator.locate(points).is_inside
+    means = field(around[rows].reshape(-1, 2)).reshape(-1, len(circle)).mean(axis=1)
+    off = np.abs(means - field(points[rows])).max(initial=0.0) / size
+    if off > accuracy:
+        return (
+            "is not harmonic: its mean over small circles differs from its value in their centres by "
+            f"{off:.1e} of its size, as if there were sources of heat: give a number, or a formula f with "
+            "f_xx + f_yy = 0, such as '20 + 5 * x'"
+        )
+    return (
+        f"is harmonic, but polynomials of degree {HIGHEST_DEGREE} miss it by {miss:.1e} of its size: give a number or "
+        "a polynomial, in a body with one hole plus a multiple of log(r), r the distance from the centre of the hole"
+    )
 
 
 def stress_of(force: BodyForce, mesh: BoundaryMesh, material: Material) -> float:

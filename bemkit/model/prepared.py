@@ -154,11 +154,8 @@ class Prepared:
 
     @property
     def map_data(self) -> GivenData:
-        """The forces and displacements under which the elastic map is solved, without what acts inside the body."""
-        conditions, force = self.conditions, self.force
-        if self.inside is not None:
-            conditions, force = self.inside.left_of(conditions, force)
-        return GivenData.of(conditions, force, conditions.displacement)
+        """The forces and displacements under which the elastic map is solved; see `given_data`."""
+        return given_data(self.conditions, self.force, self.inside)
 
     @cached_property
     def free_motions(self) -> FloatArray:
@@ -210,6 +207,13 @@ class Prepared:
         check_same_body(self.scene, scene)
         check_symmetry(scene, self.mesh)
         return _prepared(scene, self.mesh, self.units, self.space)
+
+
+def given_data(conditions: NodalConditions, force: FloatArray, inside: ForcesInside | None) -> GivenData:
+    """Return the forces and displacements under which an elastic map is solved, without what acts inside the body."""
+    if inside is not None:
+        conditions, force = inside.left_of(conditions, force)
+    return GivenData.of(conditions, force, conditions.displacement)
 
 
 def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Prepared:

@@ -29,14 +29,14 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
-from bemkit.hdf5 import Reader, columns_of, rows_of, write_table, write_text
+from bemkit.hdf5 import Reader, rows_of, write_table, write_text
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, LoadStep, StepWork
 from bemkit.results.part_forces import ContactForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.solved_body import SolvedBody
-from bemkit.results.tables import CERTIFICATE_ENTRIES
+from bemkit.results.tables import CERTIFICATE_ENTRIES, columns_of
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import Scene
@@ -58,7 +58,72 @@ _COUNTS = ("n_increments", "linear_solves")
 _CONTACT = ("u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance")
 
 
-def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
+def write_history(file: h5py.File, loading: LoadHistory) -> None:
+    """Write the steps of a load history into an open result file.
+
+    Raises
+    ------
+    SceneError
+        If a step holds a Python function, which a file cannot hold.
+    """
+    write_text(file, "asked", scene_to_toml(loading.asked))
+    group, rows = file.create_group("steps"), [step.as_dict() for step in loading.steps]
+    motions, states = [step.motion for step in loading.steps], [step.state for step in loading.steps]
+    group.attrs["n_steps"] = loading.n_steps
+    write_table(group, columns_of(rows, floats=_FLOATS, integers=_COUNTS))
+    for name in (*_CONTACT, "status"):
+        column = np.stack([getattr(step.contact, name) for step in loading.steps])
+        group[f"contact/{name}"] = column.astype(np.int64) if name == "status" else column
+    for name in ("time_step", "slip", "last_slip"):
+        group[name] = np.array([getattr(motion, name) for motion in motions])
+    group["state"] = np.stack([np.hstack([state.displacement, state.traction]).ravel() for state in states])
+    _write_ends(group, [step.end for step in loading.steps])
+
+
+def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHistory | None:
+    """Read what `write_history` wrote; None if the file holds no load history.
+
+    Parameters
+    ----------
+    reader : Reader
+    last : Solution or AssemblySolution
+        The result in the file.
+    """
+    if not reader.has("steps"):
+        return None
+    if not reader.has("steps/bodies"):
+        raise InputError("its steps are of an older bemkit, which did not keep their fields: run its scene again")
+    asked = scene_from_toml(reader.text("asked", MAX_BYTES), name="scene inside")
+    rows = rows_of(reader.table("steps", floats=(*_FLOATS, "time_step"), integers=_COUNTS))
+    columns = {name: reader.floats(f"steps/contact/{name}") for name in _CONTACT}
+    status, slip = reader.integers("steps/contact/status"), reader.floats("steps/slip")
+    last_slip, state = reader.floats("steps/last_slip"), reader.floats("steps/state")
+    shape = len(rows), last.contact.n_contact
+    if not rows or any(column.shape != shape for column in (*columns.values(), status, slip, last_slip)):
+        raise InputError(f"the columns of {len(rows)} steps differ in shape")
+    if state.shape != (shape[0], 4 * shape[1]):
+        raise InputError(f"the states of {shape[1]} contact nodes in {shape[0]} steps have the shape {state.shape}")
+    state = state.reshape(*shape, 4)
+    tables = [
+        replace(last.contact, **{name: column[k].copy() for name, column in columns.items()}, status=status[k].copy())
+        for k in range(len(rows))
+    ]
+    ends = _read_ends(reader, last, asked, tables)
+    steps = tuple(
+        LoadStep(
+            work=StepWork(**{name: row[name] for name in _WORK}),
+            n_increments=row["n_increments"],
+            linear_solves=row["linear_solves"],
+            end=ends[k],
+            state=ContactState(state[k, :, :2].copy(), state[k, :, 2:].copy()),
+            motion=SlipHistory(row["time"], row["time_step"], slip[k].copy(), last_slip[k].copy()),
+        )
+        for k, row in enumerate(rows)
+    )
+    return LoadHistory(asked, int(reader.attributes("steps")["n_steps"]), steps)
+
+
+def _write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
     """Write the ends of steps, which are all solutions or all solutions of assemblies, into a group."""
     certificates = [end.certificate.as_dict() for end in ends]
     write_table(group.create_group("certificate"), columns_of(certificates, floats=CERTIFICATE_ENTRIES))
@@ -78,24 +143,13 @@ def write_ends(group: h5py.Group, ends: Sequence[Any]) -> None:
         group["rigid"] = _numbers([tuple(end.rigid.values()) for end in assemblies], RigidResult)
 
 
-def read_ends(
+def _read_ends(
     reader: Reader,
     last: Solution | AssemblySolution,
     asked: Scene | Assembly,
     tables: Sequence[ContactTable],
 ) -> list[Solution | AssemblySolution]:
-    """Read what `write_ends` wrote.
-
-    Parameters
-    ----------
-    reader : Reader
-    last : Solution or AssemblySolution
-        The result in the file; what is not known of each step is that of this one.
-    asked : Scene or Assembly
-        With all steps.
-    tables : sequence of ContactTable
-        Of each finished step.
-    """
+    """Read what `_write_ends` wrote; what is not known of each step is that of the result in the file."""
     n = len(tables)
     rows = rows_of(reader.table("steps/certificate", floats=CERTIFICATE_ENTRIES))
     transitions = _read_transitions(reader, n)
@@ -182,68 +236,3 @@ def _rows(numbers: FloatArray, names: Iterable[str], kind: type[_Row]) -> list[_
     """Return the rows of one step."""
     n_numbers = len(fields(kind)) - 1
     return [kind(name, *row) for name, row in zip(names, numbers.reshape(-1, n_numbers).tolist(), strict=True)]
-
-
-def write_history(file: h5py.File, loading: LoadHistory) -> None:
-    """Write the steps of a load history into an open result file.
-
-    Raises
-    ------
-    SceneError
-        If a step holds a Python function, which a file cannot hold.
-    """
-    write_text(file, "asked", scene_to_toml(loading.asked))
-    group, rows = file.create_group("steps"), [step.as_dict() for step in loading.steps]
-    motions, states = [step.motion for step in loading.steps], [step.state for step in loading.steps]
-    group.attrs["n_steps"] = loading.n_steps
-    write_table(group, columns_of(rows, floats=_FLOATS, integers=_COUNTS))
-    for name in (*_CONTACT, "status"):
-        column = np.stack([getattr(step.contact, name) for step in loading.steps])
-        group[f"contact/{name}"] = column.astype(np.int64) if name == "status" else column
-    for name in ("time_step", "slip", "last_slip"):
-        group[name] = np.array([getattr(motion, name) for motion in motions])
-    group["state"] = np.stack([np.hstack([state.displacement, state.traction]).ravel() for state in states])
-    write_ends(group, [step.end for step in loading.steps])
-
-
-def read_history(reader: Reader, last: Solution | AssemblySolution) -> LoadHistory | None:
-    """Read what `write_history` wrote; None if the file holds no load history.
-
-    Parameters
-    ----------
-    reader : Reader
-    last : Solution or AssemblySolution
-        The result in the file.
-    """
-    if not reader.has("steps"):
-        return None
-    if not reader.has("steps/bodies"):
-        raise InputError("its steps are of an older bemkit, which did not keep their fields: run its scene again")
-    asked = scene_from_toml(reader.text("asked", MAX_BYTES), name="scene inside")
-    rows = rows_of(reader.table("steps", floats=(*_FLOATS, "time_step"), integers=_COUNTS))
-    columns = {name: reader.floats(f"steps/contact/{name}") for name in _CONTACT}
-    status, slip = reader.integers("steps/contact/status"), reader.floats("steps/slip")
-    last_slip, state = reader.floats("steps/last_slip"), reader.floats("steps/state")
-    shape = len(rows), last.contact.n_contact
-    if not rows or any(column.shape != shape for column in (*columns.values(), status, slip, last_slip)):
-        raise InputError(f"the columns of {len(rows)} steps differ in shape")
-    if state.shape != (shape[0], 4 * shape[1]):
-        raise InputError(f"the states of {shape[1]} contact nodes in {shape[0]} steps have the shape {state.shape}")
-    state = state.reshape(*shape, 4)
-    tables = [
-        replace(last.contact, **{name: column[k].copy() for name, column in columns.items()}, status=status[k].copy())
-        for k in range(len(rows))
-    ]
-    ends = read_ends(reader, last, asked, tables)
-    steps = tuple(
-        LoadStep(
-            work=StepWork(**{name: row[name] for name in _WORK}),
-            n_increments=row["n_increments"],
-            linear_solves=row["linear_solves"],
-            end=ends[k],
-            state=ContactState(state[k, :, :2].copy(), state[k, :, 2:].copy()),
-            motion=SlipHistory(row["time"], row["time_step"], slip[k].copy(), last_slip[k].copy()),
-        )
-        for k, row in enumerate(rows)
-    )
-    return LoadHistory(asked, int(reader.attributes("steps")["n_steps"]), steps)

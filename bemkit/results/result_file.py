@@ -35,7 +35,7 @@ from __future__ import annotations
 import json
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,7 +47,7 @@ from bemkit.geometry.curves import Curve
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.surface import Surface
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.hdf5 import FileFormat, Reader, ResultFileError, columns_of, rows_of, write_table, write_text
+from bemkit.hdf5 import FileFormat, Reader, ResultFileError, rows_of, write_table, write_text
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
 from bemkit.results.assembly_solution import AssemblySolution, BodyResult
@@ -57,7 +57,7 @@ from bemkit.results.history_file import TRANSITION_COLUMNS, read_history, write_
 from bemkit.results.outputs import STDOUT
 from bemkit.results.part_forces import ContactForce, PartForce, RigidResult
 from bemkit.results.solution import BoundaryFields, Solution
-from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, history_columns
+from bemkit.results.tables import CERTIFICATE_ENTRIES, RECORD_COUNTS, columns_of, history_columns
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.body import Body
 from bemkit.scene.scene import Scene
@@ -76,7 +76,6 @@ _NUMBERS = ("x", "y", "s", "u_n", "u_t", "sigma_n", "sigma_t", "gap", "clearance
 _BOUNDARY = ("points", "displacement", "centres", "traction", "traction_dofs")
 
 
-Outcome: TypeAlias = Solution | AssemblySolution
 __all__ = ["OutputFileError", "ResultFileError", "check_result_target", "read_result", "write_result"]
 
 FORMAT = FileFormat("bemkit-result", 2, "bemkit result", "bemkit run -o")
@@ -86,20 +85,126 @@ _RIGID_NUMBERS = tuple(entry.name for entry in fields(RigidResult) if entry.name
 _DIRECTIONS, _BOUND = ("direction_x", "direction_y"), "friction_bound"
 
 
-def write_outcome(
-    file: h5py.File, solution: Outcome, numbers: Mapping[str, float], columns: Mapping[str, FloatArray]
-) -> None:
-    """Write what every solution has.
+def check_result_target(path: str | Path) -> Path:
+    """Find out, before any work is done, whether a result can be written to a file.
 
-    Parameters
-    ----------
-    file : h5py.File
-    solution : Outcome
-    numbers : mapping of str to float
-        Further attributes of the summary.
-    columns : mapping of str to (n_contact,) array
-        Further columns of the contact table.
+    Raises
+    ------
+    OutputFileError
+        If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
     """
+    if str(path) == STDOUT:
+        raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
+    return FORMAT.check_target(path)
+
+
+def write_result(path: str | Path, solution: Solution | AssemblySolution) -> None:
+    """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
+
+    Raises
+    ------
+    OutputFileError
+        If the file cannot be written, or a file that is not a bemkit result stands in the way.
+    SceneError
+        If the scene holds a Python function, which a file cannot hold.
+    """
+    text = scene_to_toml(solution.assembly if isinstance(solution, AssemblySolution) else solution.scene)
+    with FORMAT.created(path) as file:
+        if isinstance(solution, AssemblySolution):
+            write_text(file, "assembly", text)
+            _write_assembly(file, solution)
+        else:
+            write_text(file, "scene", text)
+            _write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
+            _write_forces(file, "parts", solution.part_forces)
+            _write_forces(file, "contacts", solution.contacts)
+            _write_fields(file, solution.mesh, solution.boundary)
+        if solution.loading is not None:
+            write_history(file, solution.loading)
+        annotate(file, solution.units)
+
+
+def read_result(path: str | Path) -> Solution | AssemblySolution:
+    """Read a solution from a result file.
+
+    Returns
+    -------
+    Solution or AssemblySolution
+        Of an assembly if the file holds one.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is not a complete bemkit result of a known version.
+    """
+    with FORMAT.opened(path) as reader:
+        name = "assembly" if reader.has("assembly") else "scene"
+        try:
+            scene = scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
+        except SceneError as error:
+            raise reader.error(str(error)) from error
+        try:
+            solution = _read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
+            return replace(solution, loading=read_history(reader, solution))
+        except (ValueError, KeyError, OverflowError, RecursionError) as error:
+            raise reader.error(f"inconsistent content ({error})") from error
+
+
+def _read_solution(reader: Reader, scene: Scene) -> Solution:
+    summary = reader.attributes("summary")
+    outcome, _ = _read_outcome(reader)
+    mesh, boundary = _read_fields(reader, "", lambda: scene.build_mesh().curves)
+    forces: dict[str, Any] = {name: float(summary[name]) for name in _FORCES}
+    return Solution(scene=scene, mesh=mesh, boundary=boundary, **forces, **outcome)
+
+
+def _write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
+    """Write a solution into an open file, all but the text of the assembly."""
+    columns = dict(zip(_DIRECTIONS, solution.contact_directions.T, strict=True))
+    if solution.friction_bound is not None:
+        columns[_BOUND] = solution.friction_bound
+    _write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
+    _write_forces(file, "contacts", solution.contacts)
+    if solution.rigid:
+        _write_forces(file, "rigid", tuple(solution.rigid.values()))
+    for number, body in enumerate(solution.bodies.values()):
+        group = file.create_group(f"bodies/{number}")
+        group.attrs.update({"name": body.name, "energy": body.energy})
+        _write_fields(group, body.mesh, body.boundary)
+
+
+def _read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
+    """Read a solution of an assembly."""
+    has_bound = reader.has(f"contact/{_BOUND}")
+    outcome, columns = _read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
+    contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
+    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS)) if reader.has("rigid") else []
+    bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
+    return AssemblySolution(
+        assembly=assembly,
+        bodies={body.name: body for body in bodies},
+        contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
+        friction_bound=columns.get(_BOUND),
+        contacts=tuple(ContactForce(**row) for row in contacts),
+        rigid={row["name"]: RigidResult(**row) for row in rigid},
+        **outcome,
+    )
+
+
+def _read_body(reader: Reader, number: int, body: Body, assembly: Assembly) -> BodyResult:
+    scene = assembly.scene_of(body)
+    mesh, boundary = _read_fields(reader, f"bodies/{number}/", lambda: body.placement.mesh(scene.build_mesh()).curves)
+    energy = float(reader.attributes(f"bodies/{number}")["energy"])
+    return BodyResult(body.name, scene, mesh, boundary, energy)
+
+
+def _write_outcome(
+    file: h5py.File,
+    solution: Solution | AssemblySolution,
+    numbers: Mapping[str, float],
+    columns: Mapping[str, FloatArray],
+) -> None:
+    """Write what every solution has, further numbers of the summary and further columns of the contact table."""
     counts = {name: getattr(solution, name) for name in _COUNTS}
     summary = {"status": solution.status.name, "message": solution.message, **counts, **numbers}
     file.create_group("summary").attrs.update(summary)
@@ -118,16 +223,8 @@ def write_outcome(
     write_table(file, {"warnings": list(solution.warnings)})
 
 
-def read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, FloatArray]]:
-    """Read what `write_outcome` wrote.
-
-    Returns
-    -------
-    dict
-        Arguments of a solution, by name.
-    dict of str to (n_contact,) array
-        The further columns of the contact table that are asked for.
-    """
+def _read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+    """Read what `_write_outcome` wrote: arguments of a solution by name, and the further columns asked for."""
     summary, certificate = reader.attributes("summary"), reader.attributes("certificate")
     table = reader.table("contact", texts=("part",), floats=(*_NUMBERS, *columns), integers=("status",))
     further = {name: table.pop(name) for name in columns}
@@ -138,7 +235,7 @@ def read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[st
         "certificate": Certificate(**{name: float(certificate[name]) for name in CERTIFICATE_ENTRIES}),
         "contact": ContactTable(**{**table, "part": tuple(table["part"])}),
         "history": _read_history(reader),
-        "transitions": _read_transitions(reader),
+        "transitions": tuple(map(Transition.of, rows_of(reader.table("transitions", **TRANSITION_COLUMNS)))),
         "timings": {name: float(value) for name, value in reader.attributes("timings").items()},
         "plan": structure(json.loads(reader.text("plan", _MAX_PLAN)), Plan),
         "work": structure(json.loads(reader.text("work", _MAX_PLAN)), OperationCounts),
@@ -148,21 +245,21 @@ def read_outcome(reader: Reader, columns: tuple[str, ...] = ()) -> tuple[dict[st
     return outcome, further
 
 
-def write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> None:
+def _write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> None:
     """Write resultants of parts or contacts as a table with their entries as columns."""
     rows = [force.as_dict() for force in forces]
     numbers = list(rows[0])[1:] if rows else ()
     write_table(file.create_group(name), columns_of(rows, texts=("name",), floats=numbers))
 
 
-def write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
+def _write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
     """Write the mesh of a body, and displacement and traction on it, into a group."""
     _write_mesh(group.create_group("mesh"), mesh)
     for name in _BOUNDARY:
         group.create_dataset(f"boundary/{name}", data=getattr(boundary, name))
 
 
-def read_fields(
+def _read_fields(
     reader: Reader, prefix: str, curves: Callable[[], tuple[Curve, ...]]
 ) -> tuple[BoundaryMesh, BoundaryFields]:
     """Read the mesh of a body and its fields; `curves` gives the curves that the file names by their numbers."""
@@ -209,125 +306,8 @@ def _read_mesh(reader: Reader, place: str, curves: Callable[[], tuple[Curve, ...
     )
 
 
-def _read_transitions(reader: Reader) -> tuple[Transition, ...]:
-    return tuple(Transition.of(row) for row in rows_of(reader.table("transitions", **TRANSITION_COLUMNS)))
-
-
 def _read_history(reader: Reader) -> tuple[StepRecord, ...]:
     floats = ("relative_change", *CERTIFICATE_ENTRIES)
     rows = rows_of(reader.table("history", texts=("message",), floats=floats, integers=RECORD_COUNTS))
     certificates = [Certificate(**{name: row.pop(name) for name in CERTIFICATE_ENTRIES}) for row in rows]
     return tuple(StepRecord(**row, certificate=each) for row, each in zip(rows, certificates, strict=True))
-
-
-def check_result_target(path: str | Path) -> Path:
-    """Find out, before any work is done, whether a result can be written to a file.
-
-    Raises
-    ------
-    OutputFileError
-        If the folder cannot be written to, or a file that is not a bemkit result stands in the way.
-    """
-    if str(path) == STDOUT:
-        raise OutputFileError("- is standard output, which cannot take a binary result: give a file name")
-    return FORMAT.check_target(path)
-
-
-def write_result(path: str | Path, solution: Solution | AssemblySolution) -> None:
-    """Write a solution to an HDF5 file, replacing an older result of that name at once or not at all.
-
-    Raises
-    ------
-    OutputFileError
-        If the file cannot be written, or a file that is not a bemkit result stands in the way.
-    SceneError
-        If the scene holds a Python function, which a file cannot hold.
-    """
-    text = scene_to_toml(solution.assembly if isinstance(solution, AssemblySolution) else solution.scene)
-    with FORMAT.created(path) as file:
-        if isinstance(solution, AssemblySolution):
-            write_text(file, "assembly", text)
-            _write_assembly(file, solution)
-        else:
-            write_text(file, "scene", text)
-            write_outcome(file, solution, {name: getattr(solution, name) for name in _FORCES}, {})
-            write_forces(file, "parts", solution.part_forces)
-            write_forces(file, "contacts", solution.contacts)
-            write_fields(file, solution.mesh, solution.boundary)
-        if solution.loading is not None:
-            write_history(file, solution.loading)
-        annotate(file, solution.units)
-
-
-def read_result(path: str | Path) -> Solution | AssemblySolution:
-    """Read a solution from a result file.
-
-    Returns
-    -------
-    Solution or AssemblySolution
-        Of an assembly if the file holds one.
-
-    Raises
-    ------
-    ResultFileError
-        If the file is not a complete bemkit result of a known version.
-    """
-    with FORMAT.opened(path) as reader:
-        name = "assembly" if reader.has("assembly") else "scene"
-        try:
-            scene = scene_from_toml(reader.text(name, MAX_BYTES), name="scene inside")
-        except SceneError as error:
-            raise reader.error(str(error)) from error
-        try:
-            solution = _read_assembly(reader, scene) if isinstance(scene, Assembly) else _read_solution(reader, scene)
-            return replace(solution, loading=read_history(reader, solution))
-        except (ValueError, KeyError, OverflowError, RecursionError) as error:
-            raise reader.error(f"inconsistent content ({error})") from error
-
-
-def _read_solution(reader: Reader, scene: Scene) -> Solution:
-    summary = reader.attributes("summary")
-    outcome, _ = read_outcome(reader)
-    mesh, boundary = read_fields(reader, "", lambda: scene.build_mesh().curves)
-    forces: dict[str, Any] = {name: float(summary[name]) for name in _FORCES}
-    return Solution(scene=scene, mesh=mesh, boundary=boundary, **forces, **outcome)
-
-
-def _write_assembly(file: h5py.File, solution: AssemblySolution) -> None:
-    """Write a solution into an open file, all but the text of the assembly."""
-    columns = dict(zip(_DIRECTIONS, solution.contact_directions.T, strict=True))
-    if solution.friction_bound is not None:
-        columns[_BOUND] = solution.friction_bound
-    write_outcome(file, solution, {"n_bodies": len(solution.bodies)}, columns)
-    write_forces(file, "contacts", solution.contacts)
-    if solution.rigid:
-        write_forces(file, "rigid", tuple(solution.rigid.values()))
-    for number, body in enumerate(solution.bodies.values()):
-        group = file.create_group(f"bodies/{number}")
-        group.attrs.update({"name": body.name, "energy": body.energy})
-        write_fields(group, body.mesh, body.boundary)
-
-
-def _read_assembly(reader: Reader, assembly: Assembly) -> AssemblySolution:
-    """Read a solution of an assembly."""
-    has_bound = reader.has(f"contact/{_BOUND}")
-    outcome, columns = read_outcome(reader, (*_DIRECTIONS, _BOUND) if has_bound else _DIRECTIONS)
-    contacts = rows_of(reader.table("contacts", texts=("name",), floats=_CONTACT_NUMBERS))
-    rigid = rows_of(reader.table("rigid", texts=("name",), floats=_RIGID_NUMBERS)) if reader.has("rigid") else []
-    bodies = [_read_body(reader, number, body, assembly) for number, body in enumerate(assembly.placed_bodies)]
-    return AssemblySolution(
-        assembly=assembly,
-        bodies={body.name: body for body in bodies},
-        contact_directions=np.stack([columns[name] for name in _DIRECTIONS], axis=1),
-        friction_bound=columns.get(_BOUND),
-        contacts=tuple(ContactForce(**row) for row in contacts),
-        rigid={row["name"]: RigidResult(**row) for row in rigid},
-        **outcome,
-    )
-
-
-def _read_body(reader: Reader, number: int, body: Body, assembly: Assembly) -> BodyResult:
-    scene = assembly.scene_of(body)
-    mesh, boundary = read_fields(reader, f"bodies/{number}/", lambda: body.placement.mesh(scene.build_mesh()).curves)
-    energy = float(reader.attributes(f"bodies/{number}")["energy"])
-    return BodyResult(body.name, scene, mesh, boundary, energy)

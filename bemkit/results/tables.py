@@ -13,7 +13,6 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
-from bemkit.hdf5 import columns_of
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import step_rows
 from bemkit.results.outputs import csv_text, json_text
@@ -56,6 +55,19 @@ def to_csv(solution: Solution | AssemblySolution, table: str) -> str:
         raise InputError(f"table is {table!r}: give one of {', '.join(TABLES)}")
     columns = _columns(solution, table)
     return csv_text(columns, zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+
+
+def columns_of(
+    rows: Sequence[Mapping[str, Any]],
+    *,
+    texts: Sequence[str] = (),
+    floats: Sequence[str] = (),
+    integers: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return the columns of these names of a table given by its rows, as `bemkit.hdf5.write_table` takes them."""
+    kinds = [(name, np.int64) for name in integers] + [(name, float) for name in floats]
+    numbers = {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in kinds}
+    return numbers | {name: [row[name] for row in rows] for name in texts}
 
 
 def history_columns(history: Sequence[StepRecord]) -> dict[str, Any]:

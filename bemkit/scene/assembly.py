@@ -13,7 +13,6 @@ from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.errors import InputError
 from bemkit.formulas import choices, closest
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
@@ -21,7 +20,7 @@ from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
-from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
+from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -143,7 +142,7 @@ def _check_reach(reach: float | None, name: str) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assembly(ShownInNotebooks):
+class Assembly(Stated):
     """Several elastic bodies with their contacts, supports and loads: everything that determines the solution.
 
     Parameters
@@ -204,15 +203,11 @@ class Assembly(ShownInNotebooks):
     reference: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "load_factors", tuple(self.load_factors))
-        object.__setattr__(self, "steps", tuple(self.steps))
-        check_stated(self.title, self.load_factors, self.steps)
+        super().__post_init__()
         if not self.bodies:
             raise InputError("bodies is empty: give at least one body")
-        names = Counter([*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)])
-        repeated = [name for name, count in names.items() if count > 1]
-        if repeated:
-            raise InputError(f"bodies: {repeated[0]!r} is the name of two bodies: give each its own name")
+        names = [*(body.name for body in self.placed_bodies), *(body.name for body in self.rigid)]
+        check_names("bodies", names, "bodies")
         own = {f"law of contact {pair.name!r}": self.law_of(pair) for pair in self.contacts}
         check_laws({"law": self.law, **own}, self.steps)
         pairs = Counter(frozenset(pair.sides) for pair in self.contacts)
@@ -257,11 +252,6 @@ class Assembly(ShownInNotebooks):
                 raise InputError(
                     f"mesh.accuracy is {accuracy}, and body {body.name!r} has mesh options of its own: give one of them"
                 )
-
-    @property
-    def n_steps(self) -> int:
-        """Number of load steps, increments counted."""
-        return n_steps(self.load_factors, self.steps)
 
     def _check_rigid(self) -> None:
         known = [body.name for body in self.rigid]

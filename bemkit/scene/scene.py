@@ -6,7 +6,6 @@ form can be turned into the other. All quantities are in one consistent set of u
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -23,7 +22,6 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
 from bemkit.geometry.symmetry import Symmetry
-from bemkit.notebook import ShownInNotebooks
 from bemkit.operators.linear.solvers import Automatic, LinearSolverChoice
 from bemkit.operators.material import Material
 from bemkit.scene.body_forces import BodyForce
@@ -31,7 +29,7 @@ from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplaceme
 from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
-from bemkit.scene.steps import Step, check_laws, check_stated, n_steps
+from bemkit.scene.steps import Stated, Step, check_laws, check_names
 from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
@@ -43,7 +41,7 @@ class NoContactError(InputError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene(ShownInNotebooks):
+class Scene(Stated):
     """One body with its supports, loads and contacts: everything that determines the solution.
 
     Boundary that belongs to no part is free of traction. Without contact this is a problem of elasticity alone.
@@ -110,12 +108,8 @@ class Scene(ShownInNotebooks):
     reference: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "load_factors", tuple(self.load_factors))
-        object.__setattr__(self, "steps", tuple(self.steps))
-        check_stated(self.title, self.load_factors, self.steps)
-        repeated = [name for name, count in Counter(part.name for part in self.parts).items() if count > 1]
-        if repeated:
-            raise InputError(f"parts: {repeated[0]!r} is the name of two parts: give each part its own name")
+        super().__post_init__()
+        check_names("parts", (part.name for part in self.parts), "parts")
         if not self.contact_parts:
             self._check_without_contact()
         check_laws({f"law of part {name!r}": law for name, law in self.laws.items()}, self.steps)
@@ -156,11 +150,6 @@ class Scene(ShownInNotebooks):
                 f"mesh.accuracy is {accuracy}: {self.discretisation.method} has no error estimate: choose the "
                 "discretisation 'quadratic' or 'linear', or give elements"
             )
-
-    @property
-    def n_steps(self) -> int:
-        """Number of load steps, increments counted."""
-        return n_steps(self.load_factors, self.steps)
 
     @property
     def contact_parts(self) -> tuple[Part, ...]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -12,6 +14,7 @@ import numpy as np
 
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
+from bemkit.notebook import ShownInNotebooks
 
 TimeValue: TypeAlias = float | str | Callable[[float], float]
 """A number, a formula in the time t, or a Python function of it."""
@@ -63,25 +66,41 @@ class Step:
         return not self.changes and self.load_factor is None and self.increments == 1
 
 
-def check_stated(title: str, load_factors: Sequence[float], steps: Sequence[Step]) -> None:
-    """Refuse a title or a load history that is none.
+class Stated(ShownInNotebooks):
+    """What frozen dataclasses of one body and of several say about themselves, whatever they are made of."""
 
-    Raises
-    ------
-    InputError
-        If the title is empty, a load factor is missing or not finite, times do not increase, or there are load factors
-        besides steps.
-    """
-    if not title or not title.isprintable():
-        raise InputError(f"title is {title!r}: give one line of printable text")
-    if not (load_factors and np.all(np.isfinite(load_factors))):
-        raise InputError(f"load_factors is {load_factors}: give finite numbers such as (0.5, 1.0)")
-    if steps and tuple(load_factors) != (1.0,):
-        raise InputError(f"load_factors is {load_factors} besides {len(steps)} steps: give each step its load_factor")
-    for number in range(1, len(steps)):
-        before, time = steps[number - 1].time, steps[number].time
-        if time <= before:
-            raise InputError(f"steps[{number}]: time is {time:g} after {before:g}: give times that increase")
+    title: str
+    load_factors: tuple[float, ...]
+    steps: tuple[Step, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "load_factors", tuple(self.load_factors))
+        object.__setattr__(self, "steps", tuple(self.steps))
+        if not self.title or not self.title.isprintable():
+            raise InputError(f"title is {self.title!r}: give one line of printable text")
+        if not (self.load_factors and np.all(np.isfinite(self.load_factors))):
+            raise InputError(f"load_factors is {self.load_factors}: give finite numbers such as (0.5, 1.0)")
+        if self.steps and self.load_factors != (1.0,):
+            raise InputError(
+                f"load_factors is {self.load_factors} besides {len(self.steps)} steps: give each step its load_factor"
+            )
+        for number, (before, step) in enumerate(pairwise(self.steps), start=1):
+            if step.time <= before.time:
+                raise InputError(
+                    f"steps[{number}]: time is {step.time:g} after {before.time:g}: give times that increase"
+                )
+
+    @property
+    def n_steps(self) -> int:
+        """Number of load steps, increments counted."""
+        return sum(step.increments for step in self.steps) if self.steps else len(self.load_factors)
+
+
+def check_names(owner: str, names: Iterable[str], kind: str) -> None:
+    """Refuse names of parts or bodies of which one is given twice."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise InputError(f"{owner}: {name!r} is the name of two {kind}: give each its own name")
 
 
 def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
@@ -97,8 +116,3 @@ def check_laws(laws: Mapping[str, FrictionLaw], steps: Sequence[Step]) -> None:
             raise InputError(
                 f"{place} is {type(law).__name__}, which depends on slip or time: give [[steps]] with their times"
             )
-
-
-def n_steps(load_factors: Sequence[float], steps: Sequence[Step]) -> int:
-    """Return how many results a load history has."""
-    return sum(step.increments for step in steps) if steps else len(load_factors)

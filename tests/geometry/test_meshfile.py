@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bemkit.geometry.errors import GeometryError
+from bemkit.geometry.files.meshio_files import read_mesh, write_mesh
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.meshfile import read_mesh, write_mesh
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.outline import Selection
 from bemkit.geometry.shapes import ExteriorOf, Polygon, Rectangle

@@ -9,7 +9,6 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.contact.body import ContactState
 from bemkit.contact.condensation.dense_body import DenseBody, EliminatedTangents
-from bemkit.contact.condensation.exact_motions import following, resisting_none, with_work
 from bemkit.contact.condensation.nodes import (
     ContactNodes,
     at_contact,
@@ -26,6 +25,51 @@ from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 from bemkit.operators.steklov_poincare import CondensedMap, SteklovPoincare
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside, condensed_under
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, free_modes
+
+_ROUND_OFF = 1e-6
+"""What is off by more than this share is no round-off: it stays, for the certificate to tell."""
+
+
+def resisting_none(stiffness: FloatArray, motions: FloatArray) -> FloatArray:
+    """Return a stiffness (n, n) that maps motions (n_motions, n) to no force, and makes no force that works on them.
+
+    Notes
+    -----
+    A body that supports leave free to move resists no rigid motion, its load does on it the work of all given forces
+    (`with_work`), and what follows the unknowns follows the motion (`following`). Elimination keeps that to the
+    round-off of the forces on the whole body. A contact much smaller than the body, such as a pin in a plate, has short
+    lever arms: there the same round-off would be forces that turn the body, by far.
+    """
+    basis = np.linalg.qr(motions.T)[0]
+    forces, works = stiffness @ basis, basis.T @ stiffness
+    if max(np.abs(forces).max(), np.abs(works).max()) > _ROUND_OFF * np.abs(stiffness).max():
+        return stiffness
+    result: FloatArray = stiffness - forces @ basis.T - basis @ (works - (works @ basis) @ basis.T)
+    return result
+
+
+def with_work(load: FloatArray, motions: FloatArray, work: FloatArray, size: float) -> FloatArray:
+    """Return a load (n,) that does a given work (n_motions,) on motions (n_motions, n).
+
+    Parameters
+    ----------
+    load, motions, work : arrays
+        The forces that are added are the least ones.
+    size : float [N/m]
+        Sum of the sizes of all given forces.
+    """
+    missing = work - motions @ load
+    if np.abs(missing).max() > _ROUND_OFF * size:
+        return load
+    return np.asarray(load + np.linalg.lstsq(motions, missing, rcond=None)[0])
+
+
+def following(response: FloatArray, motions: FloatArray, followed: FloatArray) -> FloatArray:
+    """Return a response (k, n) that takes motions (n_motions, n) to (n_motions, k), what they are where it leads."""
+    missing = followed - motions @ response.T
+    if np.abs(missing).max(initial=0.0) > _ROUND_OFF * np.abs(motions).max():
+        return response
+    return np.asarray(response + np.linalg.lstsq(motions, missing, rcond=None)[0].T)
 
 
 class NoContactNodesError(InputError):

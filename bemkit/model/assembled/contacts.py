@@ -16,7 +16,6 @@ from bemkit.contact.mortar.facing import find_facing, is_non_mortar
 from bemkit.contact.mortar.sides import ContactSide
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.spaces import dof_points
 from bemkit.geometry.symmetry import Symmetry
 from bemkit.model.assembled.placed import PlacedBody
 from bemkit.model.contact_data import FacingPart, find_contact
@@ -109,7 +108,7 @@ def listed_contacts(assembly: Assembly, bodies: Sequence[PlacedBody]) -> tuple[C
     sides, names, owners = [], [], []
     for number, body in enumerate(bodies):
         for part in assembly.contact_parts(body.body):
-            elements = body.part_elements(part)
+            elements = body.mesh.part(part)
             if elements.size:  # none beyond a symmetry line
                 sides.append(ContactSide(body.space, elements))
                 names.append(f"{body.name}.{part}")
@@ -218,7 +217,7 @@ def _ordered(pair: ContactPair, bodies: Sequence[PlacedBody], numbers: dict[str,
     sides = []
     for body, part in pair.elastic_parts:
         number = numbers[body]
-        sides.append((number, part, ContactSide(bodies[number].space, bodies[number].part_elements(part))))
+        sides.append((number, part, ContactSide(bodies[number].space, bodies[number].mesh.part(part))))
     one, two = sides
     return (one, two) if carries_multipliers(pair, one[2], two[2]) else (two, one)
 
@@ -252,11 +251,6 @@ def check_overlap(pair: ContactPair, overlap: float, deepest: FloatArray, size: 
             f"contact {pair.name!r}: the bodies overlap by {overlap:.4g} at ({x:.6g}, {y:.6g}), and an "
             f"interference of {pair.interference:g} is given: move them apart, or give the interference that is meant"
         )
-
-
-def node_points(body: PlacedBody) -> FloatArray:
-    """Return the displacement nodes (n_nodes, 2) [m] of a body in its place."""
-    return dof_points(body.space)
 
 
 def obstacle_rows(
@@ -310,7 +304,7 @@ def obstacle_rows(
                 gap,
                 sparse.csr_array((np.ones(nodes.nodes.size), where), shape),
                 on_other,
-                body.part_elements(part),
+                body.mesh.part(part),
                 np.zeros(0, np.intp),
                 fixed[nodes.nodes].any(axis=1) | nodes.is_shared,
             )

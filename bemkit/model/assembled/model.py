@@ -145,23 +145,18 @@ class AssembledModel:
             of_contacts[number].append((elements, values))
         fields: list[tuple[FloatArray, FloatArray, float]] = []
         unknowns = self.body.member_displacements(state)[: len(self.condensed)]
-        for body, elastic, condensed, own in zip(
-            self.prepared.bodies, self.elastic, self.condensed, unknowns, strict=True
-        ):
+        for body, elastic, condensed, own in zip(prepared.bodies, self.elastic, self.condensed, unknowns, strict=True):
             displacement, force = condensed.recover(own)
-            traction = elastic.element_tractions(displacement, force) * (
-                self.prepared.force_unit / body.own_mesh.diameter
-            )
-            traction = np.array(body.to_place(traction))
+            traction = elastic.element_tractions(displacement, force) * (prepared.force_unit / body.own_mesh.diameter)
+            traction = np.array(body.turn.turned(traction))
             traction_space = body.scene.discretisation.traction_space(body.mesh)
             for elements, values in of_contacts[len(fields)]:
                 traction[elements] = values
-            touching = self.prepared.assembly.contact_parts(body.body)
+            touching = prepared.assembly.contact_parts(body.body)
             insert_loads(traction, body.scene, body.mesh, traction_space, touching)
-            energy = (
-                elastic_energy(elastic, body.own_space, displacement, force) * prepared.force_unit * units.displacement
-            )
-            fields.append((body.to_place(displacement) * units.displacement, traction, energy))
+            energy = elastic_energy(elastic, body.own_space, displacement, force)
+            energy *= prepared.force_unit * units.displacement
+            fields.append((body.turn.turned(displacement) * units.displacement, traction, energy))
         return fields
 
     def rigid_bodies(self, state: ContactState) -> list[tuple[FloatArray, FloatArray]]:
@@ -205,26 +200,30 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
     NotSentError
         If a body cannot be sent to the executor, or this breaks down.
     """
-    bodies, alike = prepared.bodies, groups(prepared.bodies)
-    elastic: list[SteklovPoincare | None] = [None] * len(bodies)
-    condensed: list[CondensedMap | None] = [None] * len(bodies)
+    bodies, firsts = prepared.bodies, _firsts(prepared.bodies)
+    shapes = iter(condensed_shapes(prepared, executor))
+    elastic: list[SteklovPoincare] = []
+    condensed: list[CondensedMap] = []
     work = OperationCounts()
-    for group, (map_, base) in zip(alike, condensed_shapes(prepared, executor), strict=True):
+    for number, first in enumerate(firsts):
+        if first < number:
+            elastic.append(elastic[first])
+            condensed.append(_under(condensed[first], prepared, number))
+            continue
+        map_, base = next(shapes)
+        elastic.append(map_)
+        condensed.append(base)
         work += base.work
-        for number in group.tolist():
-            elastic[number] = map_
-            condensed[number] = base if number == group[0] else _under(base, prepared, number)
-    maps = tuple(each for each in condensed if each is not None)
     motions = [_motions(*pair) for pair in zip(bodies, prepared.conditions, strict=True)]
     members = tuple(
         Member(
-            stiffness=maps[first].stiffness,
+            stiffness=condensed[first].stiffness,
             load=each.load,
             motions=motions[first],
             modulus=body.material.plane_modulus / prepared.units.modulus,
             name=body.name,
         )
-        for each, body, first in zip(maps, bodies, _firsts(bodies), strict=True)
+        for each, body, first in zip(condensed, bodies, firsts, strict=True)
     )
     joined = JoinedBodies(
         members=(*members, *rigid_members(prepared)),
@@ -235,17 +234,17 @@ def build_assembled_model(prepared: PreparedAssembly, executor: Executor | None 
     )
     n_eliminated = int(np.count_nonzero(prepared.tangent_is_eliminated))
     work += OperationCounts(contact_unknowns=2 * prepared.n_contact - n_eliminated)
-    loaded_maps = _loaded([each for each in elastic if each is not None], prepared.insides)
-    return AssembledModel(prepared, loaded_maps, maps, joined, _problem(prepared, joined), work)
+    loaded_maps = _loaded(elastic, prepared.insides)
+    return AssembledModel(prepared, loaded_maps, tuple(condensed), joined, _problem(prepared, joined), work)
 
 
 def _loaded(maps: Sequence[SteklovPoincare], insides: Sequence[ForcesInside | None]) -> tuple[SteklovPoincare, ...]:
     """Return the maps under what acts inside their bodies; copies alike share theirs, and what it finds out."""
     shared: dict[tuple[int, int], SteklovPoincare] = {}
-    for map_, inside in zip(maps, insides, strict=True):
-        loaded = map_ if inside is None else HeavyElasticity(map_, inside)
-        shared.setdefault((id(map_), id(inside)), loaded)
-    return tuple(shared[id(map_), id(inside)] for map_, inside in zip(maps, insides, strict=True))
+    return tuple(
+        shared.setdefault((id(map_), id(inside)), map_ if inside is None else HeavyElasticity(map_, inside))
+        for map_, inside in zip(maps, insides, strict=True)
+    )
 
 
 def _under(condensed: CondensedMap, prepared: PreparedAssembly, number: int) -> CondensedMap:
@@ -256,11 +255,8 @@ def _under(condensed: CondensedMap, prepared: PreparedAssembly, number: int) -> 
 
 def _firsts(bodies: Sequence[PlacedBody]) -> list[int]:
     """Return for each body the first one that shares its mesh."""
-    first = [0] * len(bodies)
-    for group in groups(bodies):
-        for number in group.tolist():
-            first[number] = int(group[0])
-    return first
+    known: dict[int, int] = {}
+    return [known.setdefault(id(body.own_mesh), number) for number, body in enumerate(bodies)]
 
 
 def _problem(prepared: PreparedAssembly, body: JoinedBodies) -> ContactProblem:
@@ -278,7 +274,7 @@ def _motions(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
 
 def _nodal(body: PlacedBody, conditions: NodalConditions) -> sparse.csr_array:
     """Return how retained displacements move nodes in the axes of the scene, sparse (2 n_nodes, n_retained)."""
-    directions = body.to_place(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
+    directions = body.turn.turned(conditions.frame)  # (n_nodes, 2, 2): rows are vectors
     node, k = np.nonzero(conditions.is_retained)
     vectors = directions[node, k]
     rows = 2 * node[:, None] + np.arange(2)
@@ -290,7 +286,7 @@ def _nodal(body: PlacedBody, conditions: NodalConditions) -> sparse.csr_array:
 def _given(body: PlacedBody, conditions: NodalConditions) -> FloatArray:
     """Return the displacements (2 n_nodes,) that supports prescribe, in the axes of the scene."""
     fixed = np.where(conditions.is_fixed, conditions.displacement, 0.0)
-    return np.asarray(np.einsum("nkc,nk->nc", body.to_place(conditions.frame), fixed)).ravel()
+    return np.asarray(np.einsum("nkc,nk->nc", body.turn.turned(conditions.frame), fixed)).ravel()
 
 
 def _frames(prepared: PreparedAssembly) -> sparse.csr_array:

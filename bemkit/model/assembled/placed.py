@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import IntArray
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.placement import Placement
@@ -85,10 +85,6 @@ class PlacedBody:
         is_own = self.own_mesh is self.mesh
         return self.own_space if is_own else self.scene.discretisation.displacement_space(self.mesh.unit)
 
-    def part_elements(self, part: str) -> IntArray:
-        """Return the elements of a part."""
-        return self.mesh.part(part)
-
     def units(self, modulus: float, force: float, mesh: BoundaryMesh | None = None) -> Units:
         """Return its units, in which forces and displacements are those of all bodies of the assembly.
 
@@ -101,10 +97,6 @@ class PlacedBody:
         """
         mesh = self.own_mesh if mesh is None else mesh
         return Units(mesh.centre, mesh.diameter, modulus, force / mesh.diameter)
-
-    def to_place(self, vectors: FloatArray) -> FloatArray:
-        """Turn vectors (..., 2) from the axes of the own mesh to those of the scene."""
-        return self.turn.turned(vectors)
 
 
 def place(assembly: Assembly, meshes: Mapping[str, BoundaryMesh] | None = None) -> tuple[PlacedBody, ...]:

@@ -21,7 +21,7 @@ from bemkit.model.assembled.contact_tractions import ContactSpread
 from bemkit.model.assembled.contacts import ContactRows, body_rows, listed_contacts, obstacle_rows
 from bemkit.model.assembled.placed import PlacedBody, groups, place
 from bemkit.model.particular import particular_solution
-from bemkit.model.prepared import linear_solver_of, nodal_forces, supports_on
+from bemkit.model.prepared import given_data, linear_solver_of, nodal_forces, supports_on
 from bemkit.model.units import Units, largest_sizes
 from bemkit.operators.linear.solvers import ChosenLinearSolver
 from bemkit.operators.steklov_poincare.forces_inside import ForcesInside
@@ -134,11 +134,8 @@ class PreparedAssembly:
         return np.concatenate([np.zeros(0, bool), *(rows.is_held | rows.law.is_frictionless for rows in self.rows)])
 
     def map_data(self, number: int) -> GivenData:
-        """Return the forces and displacements of a body without what acts inside it; see `Prepared.map_data`."""
-        conditions, force, inside = self.conditions[number], self.forces[number], self.insides[number]
-        if inside is not None:
-            conditions, force = inside.left_of(conditions, force)
-        return GivenData.of(conditions, force, conditions.displacement)
+        """Return the forces and displacements under which the map of a body is solved; see `given_data`."""
+        return given_data(self.conditions[number], self.forces[number], self.insides[number])
 
     def under(self, assembly: Assembly) -> PreparedAssembly:
         """Return the same bodies under the loads, gaps and laws of another assembly, in the same units.
