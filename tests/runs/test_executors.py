@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,8 @@ class Fading(bk.LinearGalerkin):
         object.__setattr__(self, "secret", secret)
 
     def chosen_map(self, *arguments: Any) -> Any:
-        """Leave."""
+        """Leave, if this is another process."""
+        assert parent_process() is not None
         os._exit(1)
 
 

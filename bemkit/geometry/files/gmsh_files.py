@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import Any
 
 import numpy as np
@@ -158,6 +160,15 @@ def _check_calls(path: Path) -> None:
         )
 
 
+def _initialise(gmsh: Any) -> None:
+    """Start gmsh, which would let a pipe that breaks end the whole process from then on, without a word."""
+    number = getattr(signal, "SIGPIPE", None)
+    before = None if number is None else signal.getsignal(number)
+    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    if number is not None and before is not None and current_thread() is main_thread():
+        signal.signal(number, before)
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     """Open a file as a model of gmsh of its own, and leave gmsh as it was."""
@@ -167,7 +178,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
     was_there = bool(gmsh.isInitialized())
     if not was_there:
-        gmsh.initialize([], readConfigFiles=False, interruptible=False)
+        _initialise(gmsh)
     before = gmsh.model.getCurrent() if was_there else ""
     speaks = gmsh.option.getNumber("General.Terminal")
     gmsh.option.setNumber("General.Terminal", 0)

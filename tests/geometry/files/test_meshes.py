@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import subprocess
 import sys
 import types
 from pathlib import Path
@@ -62,6 +63,23 @@ def square(nodes: list[int], cells: dict[str, list[list[int]]], points: object =
 def stored(mesh: meshio.Mesh, folder: Path, name: str = "body.vtk") -> str:
     mesh.write(folder / name)
     return str(folder / name)
+
+
+@needs_gmsh
+def test_a_pipe_that_breaks_afterwards_is_an_error_as_ever() -> None:
+    code = f"""
+import os
+from bemkit.geometry.files.shape_file import MeshFile
+MeshFile({str(DATA / ONLY_GMSH[1])!r}).shape
+read, write = os.pipe()
+os.close(read)
+try:
+    os.write(write, b"x")
+except BrokenPipeError:
+    print("an error")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.returncode) == ("an error\n", 0)
 
 
 def test_clockwise_triangles_and_mixed_lines_are_turned_and_said(tmp_path) -> None:
