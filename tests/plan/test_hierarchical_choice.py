@@ -108,7 +108,8 @@ def test_the_plan_says_what_is_compressed_and_which_kernels_run() -> None:
 def test_memory_of_compressed_equations_grows_like_the_elements(monkeypatch: pytest.MonkeyPatch) -> None:
     small, large, larger = (bk.make_plan(scene_of(n), scene_of(n).build_mesh()).memory for n in (6000, 16000, 26000))
     assert larger - large == pytest.approx(large - small, rel=1e-2)
-    assert 1.5 * small < large < 2.0 * small  # the working memory is the same
+    # the working memory is the same, and less with numba: not quite in proportion to the elements
+    assert 1.5 * small < large < 16 / 6 * small
     monkeypatch.setattr(plan_module, "physical_memory", lambda: 80.0 * small)
     check_elements(scene_of(300_000))
     with pytest.raises(bk.errors.InputError, match="use at most"):

@@ -75,8 +75,8 @@ class _Costs:
 
 _COLLOCATION = _Costs(14e3, 3e3, 0.4e6, 25e3, 8.8e3, 3.5e3, 16e6, 6.5e3)
 _GALERKIN = {
-    1: _Costs(250e3, 100e3, 4e6, 0.4e6, 27e3, 0.0, 40e6, 0.0),
-    2: _Costs(500e3, 190e3, 8e6, 0.8e6, 54e3, 0.0, 55e6, 0.0),
+    1: _Costs(250e3, 100e3, 4e6, 0.4e6, 27e3, 0.0, 32e6, 0.0),
+    2: _Costs(500e3, 190e3, 8e6, 0.8e6, 54e3, 0.0, 42e6, 0.0),
 }
 """By the degree of the displacements."""
 _MOST_IN_NUMPY = 38e6
