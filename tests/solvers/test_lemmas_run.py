@@ -1,15 +1,10 @@
-"""The drivers project with the functions whose lemmas `tests/solvers/test_projection.py` proves."""
+"""The drivers project with the functions whose lemmas `tests/contact/test_projection.py` proves."""
 
 import pytest
 
+from bemkit.contact import projection
 from bemkit.contact.laws import Coulomb
 from bemkit.solvers import active_sets
-from bemkit.solvers.active_sets import (
-    clip_to_bound,
-    clip_to_bound_derivative,
-    positive_part,
-    positive_part_derivative,
-)
 from bemkit.solvers.alm import AugmentedLagrangian
 from bemkit.solvers.base import solve
 from bemkit.solvers.fixed_point import FixedPoint
@@ -21,12 +16,11 @@ DRIVERS = [NEWTON, AugmentedLagrangian(max_steps=20), FixedPoint(NEWTON, max_ste
 PROBLEM = block_problem(Coulomb(0.5), n=6)
 
 WRONG = {
-    "positive_part": lambda a: -positive_part(a),
-    "positive_part_derivative": lambda a: 1.0 - positive_part_derivative(a),
-    "clip_to_bound": lambda x, bound: -clip_to_bound(x, bound),
-    "clip_to_bound_derivative": lambda x, bound: tuple(-part for part in clip_to_bound_derivative(x, bound)),
+    "positive_part": lambda a: -projection.positive_part(a),
+    "positive_part_derivative": lambda a: 1.0 - projection.positive_part_derivative(a),
+    "clip_to_bound": lambda x, bound: -projection.clip_to_bound(x, bound),
+    "clip_to_bound_derivative": lambda x, bound: tuple(-part for part in projection.clip_to_bound_derivative(x, bound)),
 }
-RIGHT = {name: getattr(active_sets, name) for name in WRONG}
 
 
 def misled(solver, name, monkeypatch):
@@ -63,6 +57,6 @@ def test_every_driver_calls_all_four_functions(solver, monkeypatch):
 def _counted(calls, name):
     def function(*arguments):
         calls[name] += 1
-        return RIGHT[name](*arguments)
+        return getattr(projection, name)(*arguments)
 
     return function

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bemkit.solvers.active_sets import (
+from bemkit.contact.projection import (
     clip_to_bound,
     clip_to_bound_derivative,
     positive_part,
