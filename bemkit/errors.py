@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,19 @@ class InputError(BemkitError, ValueError):
 
 class NoResultError(BemkitError, RuntimeError):
     """A calculation that ended without a result: the input is well posed, but the method did not get there."""
+
+
+CANNOT_BE_SENT = (pickle.PicklingError, AttributeError, TypeError)
+"""What Python raises for a value that cannot be sent to another process, among other things."""
+
+
+def why_not_sent(value: object) -> str:
+    """Return why a value cannot be sent to another process; empty if it can."""
+    try:
+        pickle.dumps(value)
+    except CANNOT_BE_SENT as error:
+        return str(error)
+    return ""
 
 
 def printable(text: str) -> str:

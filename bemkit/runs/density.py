@@ -162,9 +162,9 @@ def _gradual(density: FloatArray, mesh: BoundaryMesh) -> FloatArray:
     return np.asarray(lengths / wanted)
 
 
-def _idle_elements(body: SolvedBody) -> BoolArray | None:
-    """Return which elements of a half-plane carry no tractions; of other bodies all do what they must."""
-    return None if body.mesh.surface is None else np.asarray(~body.boundary.traction.any(axis=1))
+def _idle_elements(half_plane: SolvedBody) -> BoolArray:
+    """Return which elements (n_elements,) of a half-plane carry no tractions."""
+    return np.asarray(~half_plane.boundary.traction.any(axis=1))
 
 
 def next_size(n_elements: int, needed: float, *, is_accurate: bool) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -15,7 +14,7 @@ from multiprocessing import get_context, parent_process
 from threading import Thread
 from typing import Generic, NamedTuple
 
-from bemkit.errors import BemkitError, InputError, printable
+from bemkit.errors import CANNOT_BE_SENT, BemkitError, InputError, printable, why_not_sent
 from bemkit.results.record_file import R
 from bemkit.results.solved_problem import AnySolution
 
@@ -206,23 +205,15 @@ def _computed_elsewhere(tasks: Sequence[Task[R]], executor: Executor, n_workers:
         raise StudyError(
             f"the executor broke down ({reason}): finished rows are good; go on with fewer processes or with one"
         ) from error
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        if _can_be_sent(tasks):
+    except CANNOT_BE_SENT as error:
+        if not (reason := why_not_sent([task.compute for task in tasks])):
             raise
         raise StudyError(
-            f"the scene cannot be sent to another process ({error}): write its functions as formulas"
+            f"the scene cannot be sent to another process ({reason}): write its functions as formulas"
         ) from error
     finally:
         for future in futures:
             future.cancel()
-
-
-def _can_be_sent(tasks: Sequence[Task[R]]) -> bool:
-    try:
-        pickle.dumps([task.compute for task in tasks])
-    except (pickle.PicklingError, AttributeError, TypeError):
-        return False
-    return True
 
 
 def _bundles(tasks: Sequence[Task[R]], n_workers: int) -> Iterator[list[Callable[[], R]]]:

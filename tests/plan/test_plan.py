@@ -153,6 +153,16 @@ TRACED = {
 }
 
 
+def traced(small: bk.Scene, scene: bk.Scene) -> bk.Solution:
+    """Return the solution of a scene with the memory of its steps; the small one loads what is loaded on first use."""
+    bk.run(small)
+    tracemalloc.start()
+    try:
+        return bk.run(scene)
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.parametrize(
     "kind",
     slow_only(
@@ -172,13 +182,7 @@ def test_the_largest_memory_is_foreseen(kind: str) -> None:
 
     The mesh is a matter of kilobytes.
     """
-    scene = TRACED[kind]
-    bk.run(with_overrides(scene, elements=40))  # loads what is loaded on first use
-    tracemalloc.start()
-    try:
-        solution = bk.run(scene)
-    finally:
-        tracemalloc.stop()
+    solution = traced(with_overrides(TRACED[kind], elements=40), TRACED[kind])
     assert solution.is_converged
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 
@@ -190,12 +194,7 @@ def test_the_largest_memory_of_compressed_equations_is_foreseen(degree: int, n_e
     discretisation = bk.Galerkin(degree) if degree else bk.ConstantCollocation()
     scene = load_scene("paper-1")
     scene = dataclasses.replace(scene, discretisation=discretisation, linear_solver=bk.Hierarchical())
-    bk.run(with_overrides(scene, elements=400))  # loads what is loaded on first use
-    tracemalloc.start()
-    try:
-        solution = bk.run(with_overrides(scene, elements=n_elements))
-    finally:
-        tracemalloc.stop()
+    solution = traced(with_overrides(scene, elements=400), with_overrides(scene, elements=n_elements))
     assert solution.plan.is_compressed
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 
@@ -206,12 +205,7 @@ def test_the_largest_memory_of_equations_that_are_not_stored_is_foreseen(n_eleme
     """With compiled kernels and without."""
     scene = dataclasses.replace(load_scene("paper-1"), discretisation=bk.ConstantCollocation())
     scene = dataclasses.replace(scene, linear_solver=bk.MatrixFree())
-    bk.run(with_overrides(scene, elements=400))  # loads what is loaded on first use
-    tracemalloc.start()
-    try:
-        solution = bk.run(with_overrides(scene, elements=n_elements))
-    finally:
-        tracemalloc.stop()
+    solution = traced(with_overrides(scene, elements=400), with_overrides(scene, elements=n_elements))
     assert any("fast multipole" in item.reason for item in solution.plan.items)
     assert max(solution.memory.values()) == pytest.approx(solution.plan.memory, rel=0.2)
 

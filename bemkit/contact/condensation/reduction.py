@@ -263,7 +263,7 @@ class CondensedBody(DenseBody):
         return body.with_exact_motions()
 
     def with_exact_motions(self) -> CondensedBody:
-        """Return the body with all that its rigid motions do to the last digit; see `exact_motions`."""
+        """Return the body with load and tangents that go with its rigid motions to the last digit; see `with_work`."""
         motions, tangents = self.motions_of_unknowns, self.eliminated_tangents
         if not len(motions):
             return self
@@ -275,7 +275,6 @@ class CondensedBody(DenseBody):
             tangents = replace(tangents, response=response)
         return replace(
             self,
-            stiffness=resisting_none(self.stiffness, motions),
             load=with_work(self.load, motions, *self._given_work()),
             eliminated_tangents=tangents,
         )
@@ -371,4 +370,6 @@ def condensed_body(
         nodes=contact,
         balanced=admissible_modes(space.mesh),
     )
+    if len(motions := body.motions_of_unknowns):
+        body = replace(body, stiffness=resisting_none(body.stiffness, motions))
     return body.with_exact_motions()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import dataclass
 
 from bemkit.arrays import FloatArray
-from bemkit.errors import InputError
+from bemkit.errors import CANNOT_BE_SENT, InputError, why_not_sent
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.model.assembled.placed import groups
 from bemkit.model.assembled.prepared import PreparedAssembly, linear_solver
@@ -88,18 +86,11 @@ def condensed_shapes(
         raise NotSentError(
             f"the executor broke down ({str(error) or type(error).__name__}): take fewer processes, or leave it out"
         ) from error
-    except (pickle.PicklingError, AttributeError, TypeError):
-        _check_sent(shapes)
+    except CANNOT_BE_SENT as error:
+        for shape in shapes:
+            if reason := why_not_sent(shape):
+                raise NotSentError(
+                    f"body {shape.name!r} cannot be sent to another process ({reason}): write its functions as "
+                    "formulas, or leave the executor out"
+                ) from error
         raise
-
-
-def _check_sent(shapes: Sequence[Shape]) -> None:
-    """Raise NotSentError unless bodies can be sent to another process."""
-    for shape in shapes:
-        try:
-            pickle.dumps(shape)
-        except (pickle.PicklingError, AttributeError, TypeError) as error:
-            raise NotSentError(
-                f"body {shape.name!r} cannot be sent to another process ({error}): write its functions as formulas, or "
-                "leave the executor out"
-            ) from error
