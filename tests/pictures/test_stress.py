@@ -15,6 +15,7 @@ from bemkit.pictures import draw_stress
 from bemkit.pictures.shown import shown
 from bemkit.pictures.stress import STRESSES, largest_shown
 from bemkit.pictures.stress_points import StressPoints, _inner_points, stress_points
+from bemkit.results.interior import interior_fields
 from tests.slow import slow_except
 
 INNER = tuple(f"inner-{number}" for number in (1, 2, 3, 4))
@@ -36,6 +37,18 @@ def test_points_stay_as_far_from_short_elements_as_a_picture_shows() -> None:
     inner = distance > 1e-9
     assert inner.sum() > 20
     assert distance[inner].min() >= 0.999 * spacing / 8.0
+
+
+def test_beside_constant_elements_stresses_have_no_kinks() -> None:
+    """Along the wall of Example 1, beside fields of degrees up to 6: there 0.7 lengths away they were off by 0.03."""
+    scene = bk.load_scene("paper-1")
+    true = bk.run(replace(scene, discretisation=bk.HpGalerkin(), mesh=bk.MeshOptions(accuracy=1e-4)))
+    found = stress_points(bk.run(scene), 0.02, shown(true).frame)
+    x, y = found.points.T
+    beside = (x > 0.9) & (x < 0.999) & (y > 0.1) & (y < 0.9)
+    assert beside.sum() > 100
+    expected = interior_fields(true).stress(found.points[beside])
+    np.testing.assert_allclose(found.stresses[beside], expected, atol=0.005)  # 0.003 of elements that are a fiftieth
 
 
 def test_of_many_elements_few_points_are_measured_from_the_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
