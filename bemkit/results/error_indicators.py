@@ -19,7 +19,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.geometry.neighbours import along_boundary, break_nodes
+from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.reflection import reflected_to_whole
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, dof_points
 from bemkit.operators.rigid_modes import without_motion
@@ -220,41 +220,13 @@ def largest_but_a_share(errors: FloatArray, lengths: FloatArray) -> float:
     return float(np.maximum(np.append(errors[order], 0.0), worse).min())
 
 
-def place_errors(contact: ContactTable, mesh: BoundaryMesh, transitions: Sequence[Transition]) -> FloatArray:
-    """Estimate the squared L2 error of the contact tractions of high degree for nodes beside the places of change.
-
-    Parameters
-    ----------
-    contact : ContactTable
-    mesh : BoundaryMesh
-    transitions : sequence of Transition
-
-    Returns
-    -------
-    (n_transitions,) array [Pa^2 m]
-        Tractions that grow like K sqrt(d) from a place of change are wrong by 0.2 K times its distance from the nearest
-        end of an element; K is that of the steeper neighbour.
-    """
-    errors = np.zeros(len(transitions))
-    for number, transition in enumerate(transitions):
-        elements = along_boundary(mesh, mesh.part(transition.part))
-        ends = np.concatenate([[0.0], np.cumsum(mesh.lengths[elements])])
-        nearest = int(np.argmin(np.abs(ends - transition.s)))
-        neighbours = ends[max(nearest - 1, 0) : nearest + 2]
-        rows = contact.rows(transition.part)
-        for column in (contact.sigma_n, contact.sigma_t):
-            at_ends = np.interp(neighbours, contact.s[rows], column[rows])
-            steepest = np.max(np.diff(at_ends) ** 2 / np.diff(neighbours))
-            errors[number] += PLACE_CALIBRATION * steepest * (ends[nearest] - transition.s) ** 2
-    return errors
-
-
 def place_error(
     contact: ContactTable, transition: Transition, transitions: Sequence[Transition], end: ZoneEnd
 ) -> float:
-    """Estimate the squared L2 error [Pa^2 m] that a place of change inside an element leaves on one of two sides.
+    """Estimate the squared L2 error [Pa^2 m] of the contact tractions of a side for nodes beside a place of change.
 
-    As `place_errors`, whose K is here that of tractions an element's length away, or halfway to the next place.
+    Tractions that grow like K sqrt(d) from there are wrong by 0.2 K times its distance from the nearest end of an
+    element; K is that of tractions an element's length away, or halfway to the next place, on the steeper side.
     """
     rows, length = contact.rows(transition.part), float(end.mesh.lengths[end.element])
     others = [each.s for each in transitions if each.part == transition.part and each.s != transition.s]

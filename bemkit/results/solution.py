@@ -18,12 +18,12 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
-from bemkit.results.contact_table import bound_at
+from bemkit.results.contact_table import bound_at, resolved_transitions
 from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
-from bemkit.results.zone_ends import ZoneEnd, zone_ends_on
+from bemkit.results.zone_ends import ZoneEnd, zone_end
 from bemkit.scene.scene import Scene
 
 
@@ -71,14 +71,17 @@ class Solution(SolvedProblem, SolvedBody):
             return self.surface_errors.in_the_mean
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
-        from bemkit.results.error_indicators import contact_errors, place_errors
+        from bemkit.results.error_indicators import contact_errors, place_error
 
         if self.coefficient_errors is None:
             degree = max(self.scene.discretisation.displacement_space(self.mesh).degree, 1)
             squared = float(contact_errors(self.contact, degree).sum())
         else:
             squared = float(self.coefficient_errors.traction[self.contact_elements].sum())
-            squared += float(place_errors(self.contact, self.mesh, self.transitions).sum())
+            squared += sum(
+                place_error(self.contact, each, self.transitions, zone_end(self.mesh, self.contact, each))
+                for each in self.transitions
+            )
         return float(np.sqrt(squared)) / self.contact_traction_size
 
     @cached_property
@@ -129,7 +132,8 @@ class Solution(SolvedProblem, SolvedBody):
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
         """Where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
-        return tuple(zone_ends_on(self.mesh, self.contact, self.transitions))
+        resolved = resolved_transitions(self.contact, self.transitions)
+        return tuple(zone_end(self.mesh, self.contact, each) for each in resolved)
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         return violations_between_nodes(self, self.contact, motion)

@@ -13,7 +13,7 @@ from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.vectors import norms
-from bemkit.results.contact_table import ContactTable, Transition, resolved_transitions
+from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.solvers.active_sets import NodeStatus
 
 LYING_ON = 1e-2
@@ -42,21 +42,20 @@ class ZoneEnd(NamedTuple):
         return float(min(self.fraction, 1.0 - self.fraction) * self.mesh.lengths[self.element])
 
 
-def zone_ends_on(mesh: BoundaryMesh, contact: ContactTable, transitions: tuple[Transition, ...]) -> Iterator[ZoneEnd]:
-    """Yield where zones end on a body alone, as far as they are resolved; see `resolved_transitions`.
+def zone_end(mesh: BoundaryMesh, contact: ContactTable, transition: Transition) -> ZoneEnd:
+    """Return where a transition is on a body alone.
 
     Zones are as long as their part; on a half-plane, of which a part may be any strip, as half of what touches there.
     """
-    for transition in resolved_transitions(contact, transitions):
-        elements = along_boundary(mesh, mesh.part(transition.part))
-        ends = np.cumsum(mesh.lengths[elements])
-        k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
-        fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
-        zone_length = float(ends[-1])
-        if mesh.surface is not None:
-            touches = contact.rows(transition.part) & (contact.status != NodeStatus.SEPARATED)
-            zone_length = 0.5 * float(contact.weight[touches].sum())
-        yield ZoneEnd(mesh, zone_length, int(elements[k]), fraction)
+    elements = along_boundary(mesh, mesh.part(transition.part))
+    ends = np.cumsum(mesh.lengths[elements])
+    k = min(int(np.searchsorted(ends, transition.s)), elements.size - 1)
+    fraction = 1.0 - float((ends[k] - transition.s) / mesh.lengths[elements[k]])
+    zone_length = float(ends[-1])
+    if mesh.surface is not None:
+        touches = contact.rows(transition.part) & (contact.status != NodeStatus.SEPARATED)
+        zone_length = 0.5 * float(contact.weight[touches].sum())
+    return ZoneEnd(mesh, zone_length, int(elements[k]), fraction)
 
 
 @dataclass(frozen=True, eq=False)
