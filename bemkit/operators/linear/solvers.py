@@ -96,7 +96,7 @@ class MatrixFree:
     """Boundary equations solved by iteration, with products by the fast multipole method: a fraction of the memory.
 
     For constant collocation on straight elements; elsewhere what `Automatic` takes is taken, and the plan says why.
-    Every response takes up to about fifteen products, whatever the number of elements.
+    Every response takes up to about seventeen products, whatever the number of elements.
 
     Parameters
     ----------
