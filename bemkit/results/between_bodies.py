@@ -75,7 +75,8 @@ def violations_between_bodies(
     -----
     Points of the pieces on which the functions of both sides are smooth, where they face each other along the mean of
     both normals: tractions of both sides against the one clearance. Each contact is measured by the one of its bodies
-    that carries less, and lengths by the softer of them, so that a light block is not judged by the heaviest.
+    that carries less, and lengths by the softer of them, so that a light block is not judged by the heaviest. Without
+    any contact force lengths are measured by the larger displacement of the two.
     """
     with np.errstate(all="ignore"):  # results that are not finite are measured by nan
         stated = [*_at_obstacles(assembly, bodies, rigid), *_at_bodies(assembly, bodies)]
@@ -88,7 +89,7 @@ def violations_between_bodies(
             forces[body] += float(contact.weight[rows] @ size[rows])
             stresses[body] = max(stresses[body], float(size[rows].max(initial=0.0)))
     found: dict[str, BetweenNodes] = {}
-    longest = max(float(np.abs(body.boundary.displacement).max()) for body in bodies.values())
+    moved = {name: float(np.abs(body.boundary.displacement).max()) for name, body in bodies.items()}
     for name, partners, law, values in stated:
         modulus = min(bodies[body].scene.material.plane_modulus for body in partners)
         force, stress = (
@@ -99,7 +100,7 @@ def violations_between_bodies(
                 values,
                 law_between(law, values, contact, name, motion),
                 stress or 1.0,
-                force / modulus or longest or 1.0,
+                force / modulus or max(moved[body] for body in partners) or max(moved.values()) or 1.0,
             )
     return found
 

@@ -22,6 +22,8 @@ from bemkit.scene.conditions import Contact
 
 _POINTS_PER_NODE = 4
 """Points of an element for each of its nodes: between them a polynomial grows by a few per cent more at most."""
+_ROUND_OFF = 64.0 * float(np.finfo(float).eps)
+"""Of clearances, which are differences of coordinates, relative to the largest of these."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class BetweenNodes:
     cone_excess : float
         ``|sigma_t| - bound(sigma_n)`` where positive, relative to the largest contact traction.
     penetration_depth : float [m]
-        ``u_n - g`` where positive.
+        ``u_n - g`` where positive, and more than round-off of coordinates.
     """
 
     penetration: float
@@ -216,6 +218,7 @@ def violations_at(values: PointsBetween, law: FrictionLaw, stress: float, length
     shear = 0.0 if law.acts_across_gap else np.abs(values.sigma_t)
     traction = np.maximum(np.abs(values.sigma_n), shear) / stress
     depth = _largest(-values.clearance)
+    depth = 0.0 if depth <= _ROUND_OFF * _largest(np.abs(values.points)) else depth
     return BetweenNodes(
         penetration=depth / length,
         tension=_largest(values.sigma_n) / stress,

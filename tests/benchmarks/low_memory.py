@@ -4,8 +4,8 @@
 
 For each number of elements N (default 1000 10000) it runs `bk.run` with each of the two linear solvers in a process of
 its own (`--alone`: without the direct one), and prints the most and the median number of steps of a response on the
-finest mesh, the largest memory of all arrays since its equations were begun, processor seconds, the certificate, and
-whether statuses are those of the direct solver.
+finest mesh, the largest memory of all arrays since its equations were begun, processor seconds, the certificate, how
+the run ended, and whether statuses are those of the direct solver.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ def measured(n_elements: int, name: str) -> dict[str, Any]:
         "seconds": time.process_time() - clock,
         "bytes": tracemalloc.get_traced_memory()[1],
         "worst": solution.certificate.worst,
+        "status": solution.status.name.lower(),
         "steps": systems[-1].steps if isinstance(systems[-1], MatrixFreeSystem) else [],
         "statuses": solution.contact.status.tolist(),
     }
@@ -69,7 +70,19 @@ def main() -> None:
         print(json.dumps(measured(arguments.n_elements[0], arguments.child)))
         return
     console, table = Console(width=150), Table(title="Example 1: matrix-free beside direct")
-    for column in ("N", "responses", "most steps", "median", "MB", "direct MB", "s", "direct s", "certificate", "same"):
+    for column in (
+        "N",
+        "responses",
+        "most steps",
+        "median",
+        "MB",
+        "direct MB",
+        "s",
+        "direct s",
+        "certificate",
+        "status",
+        "same",
+    ):
         table.add_column(column, justify="right")
     for n_elements in arguments.n_elements:
         found = []
@@ -80,7 +93,8 @@ def main() -> None:
         table.add_row(
             str(n_elements), str(len(own["steps"])), str(max(own["steps"])), f"{np.median(own['steps']):.0f}",
             f"{own['bytes'] / 1e6:.1f}", f"{direct['bytes'] / 1e6:.1f}" if direct is not own else "",
-            f"{own['seconds']:.1f}", f"{direct['seconds']:.1f}" if direct is not own else "", f"{own['worst']:.0e}",
+            f"{own['seconds']:.1f}", f"{direct['seconds']:.1f}" if direct is not own else "",
+            f"{own['worst']:.0e}", own["status"],
             str(own["statuses"] == direct["statuses"]) if direct is not own else "",
         )  # fmt: skip
         console.print(table)

@@ -138,6 +138,16 @@ def test_a_light_contact_is_not_judged_by_a_heavy_one(pressed: AssemblySolution)
     assert light == pytest.approx(100.0 * strong, rel=1e-12)
 
 
+def test_a_contact_without_forces_is_measured_by_what_its_own_bodies_move(pressed: AssemblySolution) -> None:
+    """A third body, which touches nothing, is carried a million times as far."""
+    far, own = replace(pressed.bodies["upper"], name="far"), pressed.bodies["upper"].boundary
+    bodies = {**pressed.bodies, "far": replace(far, boundary=replace(own, displacement=1e6 + own.displacement))}
+    table = replace(pressed.contact, sigma_n=np.zeros_like(pressed.contact.s), sigma_t=np.zeros_like(pressed.contact.s))
+    found = changed(replace(pressed, contact=table, bodies=bodies), "upper", -DEPTH)
+    moved = max(float(np.abs(body.boundary.displacement).max()) for body in pressed.bodies.values())
+    assert found.penetration == pytest.approx(DEPTH / moved, rel=1e-9)
+
+
 def test_a_contact_with_a_rigid_obstacle_is_that_of_one_body() -> None:
     scene = replace(bk.load_scene("paper-1"), discretisation=bk.QuadraticGalerkin(), mesh=bk.MeshOptions(elements=40))
     body = bk.Body(name="square", shape=scene.shape, material=scene.material, parts=scene.parts)

@@ -63,6 +63,12 @@ def test_a_parabola_between_its_nodes_is_seen_to_penetrate(sliding: Solution) ->
     assert changed(sliding, displacement=-DEPTH).penetration_depth == pytest.approx(DEPTH, rel=1e-9)
 
 
+def test_round_off_of_coordinates_is_no_depth(sliding: Solution) -> None:
+    far = float(np.abs(sliding.mesh.nodes).max())
+    assert changed(sliding, displacement=-4.0 * np.finfo(float).eps * far).penetration_depth == 0.0
+    assert changed(sliding, displacement=-400.0 * np.finfo(float).eps * far).penetration_depth > 0.0
+
+
 def test_tension_and_friction_beyond_the_bound_are_seen(sliding: Solution) -> None:
     tense = changed(sliding, normal=1.0 + RISE)
     assert tense.tension == pytest.approx(RISE, rel=1e-9)  # at the end of the element

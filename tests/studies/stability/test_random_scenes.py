@@ -192,8 +192,15 @@ def test_errors_without_a_name_are_tracebacks(monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize(
     ("seed", "index"),
-    [(178, 306), (77, 1010), (77, 2840), (77, 2935), (4242, 99)],
-    ids=["unloaded without strain", "tip of a wedge", "no shear", "carried along", "contact between nodes"],
+    [(178, 306), (77, 1010), (77, 2840), (77, 2935), (4242, 99), (1, 1008)],
+    ids=[
+        "unloaded without strain",
+        "tip of a wedge",
+        "no shear",
+        "carried along",
+        "contact between nodes",
+        "far fall far away",
+    ],
 )
 def test_scenes_that_once_were_wrong_are_so_no_more(seed: int, index: int) -> None:
     assert try_case(seed, index).outcome in (Outcome.SUCCESS, Outcome.WARNED)

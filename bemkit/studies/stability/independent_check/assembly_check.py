@@ -9,6 +9,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.solution import Solution
+from bemkit.studies.stability.independent_check.balance import trusted_work
 from bemkit.studies.stability.independent_check.check import check_solution, contact_violations, is_finite
 from bemkit.studies.stability.independent_check.distances import gap_mismatch, hidden_overlaps, mean_mismatch
 from bemkit.studies.stability.independent_check.joints import Joints
@@ -58,7 +59,7 @@ def check_assembly(solution: AssemblySolution, before: AssemblySolution | None =
     """
     if not is_finite(solution):
         return AssemblyCheck.not_finite()
-    joints = Joints.of(solution)
+    joints = Joints.of(solution, before)
     bodies = joints.bodies.values()
     deepest, unsaid = hidden_overlaps(joints)
     return AssemblyCheck(
@@ -176,8 +177,7 @@ def energy_mismatch(joints: Joints) -> float:
         forces = np.where(is_load[:, None], body.boundary.shares, 0.0)[..., None] * body.boundary.traction
         each = forces * body.boundary.interpolated(body.result.boundary.displacement)
         work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())
-        motion = float(np.abs(body.result.boundary.displacement).max())
-        size += 1e-3 * body.scales.stress * (body.scales.length + 1e-3 * motion) * body.result.mesh.diameter
+        size += 1e-3 * body.scales.stress * body.scales.length * body.result.mesh.diameter + trusted_work(body.fields)
     table = joints.solution.contact
     each = table.weight[:, None] * np.column_stack([table.sigma_n * table.u_n, table.sigma_t * table.u_t])
     work, size = work + 0.5 * float(each.sum()), size + 0.5 * float(np.abs(each).sum())

@@ -127,7 +127,7 @@ def negative_energy(fields: Fields) -> float:
     To these belong the tractions of which nothing but round-off is known, on the displacement of the whole body.
     """
     solution, scales = fields.solution, fields.scales
-    size = _work_of_sizes(fields, strained_displacement(solution)) + _trusted_work(fields)
+    size = _work_of_sizes(fields, strained_displacement(solution)) + trusted_work(fields)
     size += 1e-6 * scales.stress * scales.length * solution.mesh.diameter
     return max(-solution.energy, 0.0) / size if np.isfinite(solution.energy) else float("nan")
 
@@ -146,7 +146,7 @@ def energy_mismatch(fields: Fields) -> float:
     loads = _loads(solution, boundary)
     work = 0.5 * float(np.sum(contact * nodes.displacement))
     work += 0.5 * float(np.sum(loads * boundary.interpolated(displacement)))
-    size = _work_of_sizes(fields, displacement) + _trusted_work(fields)
+    size = _work_of_sizes(fields, displacement) + trusted_work(fields)
     return abs(solution.energy - work) / size if size > 0.0 else 0.0
 
 
@@ -161,7 +161,7 @@ def strained_displacement(solution: Solution, displacement: FloatArray | None = 
     return np.asarray(displacement - (motions @ rigid).reshape(-1, 2))
 
 
-def _trusted_work(fields: Fields) -> float:
+def trusted_work(fields: Fields) -> float:
     """Return the work [J/m] of tractions of which nothing but round-off is known, on the motion of the whole body."""
     motion = float(np.abs(fields.solution.boundary.displacement).max())
     return trusted_stress(fields.solution) * motion * float(fields.boundary.lengths.sum())

@@ -64,16 +64,12 @@ class MeasuredBody:
     is_touched: BoolArray
 
     @classmethod
-    def of(cls, result: BodyResult, touched: tuple[str, ...]) -> MeasuredBody:
-        """Measure a body with the names of its sides in contact."""
-        scene, mesh = result.scene, result.mesh
-        obstacles = [part.name for part in scene.parts if isinstance(part.condition, Contact)]
-        parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in scene.parts)
-        freed = replace(scene, parts=parts, law=Frictionless())
-        alone = cast(Solution, Alone(freed, mesh, result.boundary, result.energy, result.particular))
-        boundary = boundary_of(alone)
+    def of(cls, result: BodyResult, touched: tuple[str, ...], before: BodyResult | None = None) -> MeasuredBody:
+        """Measure a body with the names of its sides in contact, and what it was after the load step before."""
+        alone, earlier = _alone(result), None if before is None else _alone(before)
+        mesh, boundary = result.mesh, boundary_of(alone)
         is_touched = np.zeros(mesh.n_elements, bool)
-        for name in (*touched, *obstacles):
+        for name in (*touched, *_obstacles(result.scene)):
             is_touched[mesh.part(name)] = True
         traction = boundary.traction.copy()
         is_known = is_touched.copy()
@@ -82,7 +78,7 @@ class MeasuredBody:
         traction[is_known] = _interpolated(result)[is_known]
         boundary = replace(boundary, traction=traction)
         nodes = contact_nodes_of(alone, boundary)
-        return cls(result, Fields(alone, None, boundary, nodes, scales_of(alone)), is_touched)
+        return cls(result, Fields(alone, earlier, boundary, nodes, scales_of(alone, earlier)), is_touched)
 
     @property
     def largest_stress(self) -> float:
@@ -174,6 +170,19 @@ class MeasuredBody:
         size = float(np.abs(forces).sum()) + float(np.abs(inside).sum())
         size += 1e-6 * self.scales.stress * float(boundary.shares.sum())
         return abs(float(work[..., 2].sum() + inside[2])) / size if size > 0.0 else 0.0
+
+
+def _obstacles(scene: Scene) -> list[str]:
+    """Return the names of the parts that face rigid obstacles."""
+    return [part.name for part in scene.parts if isinstance(part.condition, Contact)]
+
+
+def _alone(result: BodyResult) -> Solution:
+    """Return a body with free parts where rigid obstacles touch it."""
+    obstacles = _obstacles(result.scene)
+    parts = tuple(replace(part, condition=Free()) if part.name in obstacles else part for part in result.scene.parts)
+    freed = replace(result.scene, parts=parts, law=Frictionless())
+    return cast(Solution, Alone(freed, result.mesh, result.boundary, result.energy, result.particular))
 
 
 def _interpolated(result: BodyResult) -> FloatArray:

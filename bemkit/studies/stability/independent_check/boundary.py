@@ -196,7 +196,7 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     table = solution.contact
     fields = (solution.boundary.traction, table.sigma_n, table.sigma_t)
     largest_traction = max(float(np.abs(each).max(initial=0.0)) for each in fields)
-    trusted = max(trusted_stress(each) for each in (solution, before) if each is not None)
+    trusted = trusted_stress(solution, before)
     stress = max(largest_traction, trusted)
     length = max(stress / modulus * diameter, 1e-6 * displacement)
     # forces inside strain a body, too, that an overlap has pushed aside and that touches nothing any more
@@ -212,8 +212,10 @@ def scales_of(solution: Solution, before: Solution | None = None) -> Scales:
     return Scales(stress or 1.0, length or 1.0, coordinates, (error + 1e-12) * displacement)
 
 
-def trusted_stress(solution: Solution) -> float:
+def trusted_stress(solution: Solution, before: Solution | None = None) -> float:
     """Return the stress [Pa] whose `CONTACT_LIMIT`-th part is the round-off of tractions: the least to measure by.
+
+    What is left of the load step `before` is known no better than its tractions were.
 
     Numbers hold a displacement to some eps of its size. Across a node of length h that is the strain ``eps |u| / h``,
     times E' a stress, which a bulk modulus beyond E' multiplies. A body that only moves, say because an overlap has
@@ -225,7 +227,8 @@ def trusted_stress(solution: Solution) -> float:
     lengths = solution.contact.weight if solution.contact.n_contact else solution.mesh.lengths
     digits = 64.0 * EPSILON * diameter / (float(lengths.min()) * freedom)
     strain = float(np.abs(solution.boundary.displacement).max()) / diameter
-    return min(digits / CONTACT_LIMIT, 1e-4) * strain * material.plane_modulus
+    trusted = min(digits / CONTACT_LIMIT, 1e-4) * strain * material.plane_modulus
+    return trusted if before is None else max(trusted, trusted_stress(before))
 
 
 def largest(values: FloatArray) -> float:

@@ -46,8 +46,11 @@ class Joints:
     owner: Mapping[str, str]
 
     @classmethod
-    def of(cls, solution: AssemblySolution) -> Joints:
-        """Measure the bodies of a solution, and find whose nodes the rows of its table are."""
+    def of(cls, solution: AssemblySolution, before: AssemblySolution | None = None) -> Joints:
+        """Measure the bodies of a solution, and find whose nodes the rows of its table are.
+
+        What is left of the load step `before` is known no better than that was.
+        """
         contacts = solution.assembly.contacts
         pairs = {pair.name: pair for pair in solution.assembly.elastic_contacts}
         moving = {pair.name: pair for pair in contacts if pair.name not in pairs}
@@ -55,7 +58,11 @@ class Joints:
         for pair in contacts:
             for body, part in (side.split(".", 1) for side in pair.elastic_sides):
                 touched[body].append(part)
-        alone = {name: MeasuredBody.of(body, tuple(touched[name])) for name, body in solution.bodies.items()}
+        earlier = {} if before is None else before.bodies
+        alone = {
+            name: MeasuredBody.of(body, tuple(touched[name]), earlier.get(name))
+            for name, body in solution.bodies.items()
+        }
         most = max(body.largest_stress for body in alone.values())
         bodies = {name: body.measured_by(LIGHTEST * most) for name, body in alone.items()}
         joints = cls(solution, bodies, pairs, moving, {})
@@ -105,7 +112,7 @@ class Joints:
             bodies = [self.bodies[side.split(".", 1)[0]] for side in sides]
             scales = [body.scales for body in bodies]
             # a body that moves far passes on what is round-off there
-            trusted = max(trusted_stress(body.fields.solution) for body in bodies)
+            trusted = max(trusted_stress(body.fields.solution, body.fields.before) for body in bodies)
             rows = self.solution.contact.rows(name)
             length[rows] = max(each.length for each in scales)
             stress[rows] = max(min(each.stress for each in scales), trusted)
