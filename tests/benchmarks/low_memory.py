@@ -1,11 +1,12 @@
 """Example 1 with products by the fast multipole method beside the direct solver: steps, memory and time.
 
-    python tests/benchmarks/low_memory.py [--alone] [N ...]
+    python tests/benchmarks/low_memory.py [--alone | --product] [N ...]
 
 For each number of elements N (default 1000 10000) it runs `bk.run` with each of the two linear solvers in a process of
 its own (`--alone`: without the direct one), and prints the most and the median number of steps of a response on the
 finest mesh, the largest memory of all arrays since its equations were begun, processor seconds, the certificate, how
-the run ended, and whether statuses are those of the direct solver.
+the run ended, and whether statuses are those of the direct solver. `--product` prints the processor seconds of one
+product of the operator instead.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from rich.table import Table
 
 import bemkit as bk
 from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.matrix_free import MatrixFreeSystem
+from bemkit.operators.hierarchy.straight_elements import StraightElements
 from bemkit.operators.steklov_poincare.hierarchical import HierarchicalCollocation
 
 SOLVERS = {"direct": bk.Hierarchical(), "matrix-free": bk.MatrixFree()}
@@ -59,15 +62,34 @@ def measured(n_elements: int, name: str) -> dict[str, Any]:
     }
 
 
+def product_seconds(n_elements: int) -> float:
+    """Return the processor seconds of a product, of five the median."""
+    scene = bk.load_scene("paper-1")
+    mesh = replace(scene, mesh=replace(scene.mesh, elements=n_elements)).build_mesh()
+    elements = StraightElements.of(mesh, scene.material, takes_slopes=bk.ConstantCollocation().slopes)
+    layers = FastMultipole(elements, 1e-13)  # what a tolerance of 1e-10 of the iteration takes
+    x, seconds = np.random.default_rng(0).standard_normal(layers.shape[1]), []
+    for _ in range(6):
+        clock = time.process_time()
+        layers @ x
+        seconds.append(time.process_time() - clock)
+    return float(np.median(seconds[1:]))  # the first loads what is compiled
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("n_elements", nargs="*", type=int, default=[1000, 10_000])
     parser.add_argument("--alone", action="store_true")
+    parser.add_argument("--product", action="store_true")
     parser.add_argument("--child", choices=SOLVERS)
     arguments = parser.parse_args()
     if arguments.child:
         print(json.dumps(measured(arguments.n_elements[0], arguments.child)))
+        return
+    if arguments.product:
+        for n_elements in arguments.n_elements:
+            print(f"{n_elements} elements: {product_seconds(n_elements):.2f} s")
         return
     console, table = Console(width=150), Table(title="Example 1: matrix-free beside direct")
     for column in (
