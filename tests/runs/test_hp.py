@@ -309,9 +309,9 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
 
 @pytest.mark.slow
 def test_statuses_that_flicker_where_clearances_are_round_off_do_not_cost_elements() -> None:
-    assert risen("wavy-obstacle", 2e-9)[-1].is_converged
-    last = risen("wavy-obstacle", 1e-9)[-1]
-    assert traction_error(last) <= 1e-9  # the estimate ends at 1.4e-9
+    last = risen("wavy-obstacle", 7e-10)[-1]
+    assert last.is_converged  # for 5e-10 the estimate ends at more than that
+    assert traction_error(last) <= 7e-10
     assert last.n_elements <= 70
     assert len(last.transitions) > 1  # all within 3e-9 of each other
     assert _settled([place.x for place in last.transitions]) == pytest.approx([0.25000030], abs=1e-7)
