@@ -50,6 +50,12 @@ class Side:
         """(2,) array: of a flat side."""
         return np.asarray(self._normals.mean(axis=0))
 
+    @property
+    def turn(self) -> float:
+        """Largest angle [rad] by which an element turns."""
+        first, last = np.moveaxis(self.body.result.mesh.normals_at(self.elements, np.array([-1.0, 1.0])), 1, 0)
+        return float(np.arccos(np.clip(np.sum(first * last, axis=1), -1.0, 1.0)).max())
+
     def displacement(self, row: IntArray, xi: FloatArray) -> FloatArray:
         """Return displacements (n, 2) at xi (n,) of the elements at the positions `row` (n,)."""
         result = self.body.result
