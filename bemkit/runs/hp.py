@@ -52,6 +52,9 @@ more, and a layer more where loads jump."""
 NEXT_ERROR = 0.04
 """Part of the error of contact tractions that the next mesh keeps, whatever its degree: places where the status changes
 have moved away from their nodes (0.02 to 0.1 on the scenes with a reference)."""
+LAST_TIPS = 10.0
+"""Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
+the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
@@ -139,14 +142,14 @@ class LayeredMeshes:
         needed = self._needed_rise(errors, is_inner) if has_moved else 0
         may_be_last = level.number > FIRST_NUMBER or not self._moves_on(solution)
         is_last = has_moved and needed <= LAST_RISE and may_be_last
-        # else so many that the one after that may be the last
-        number = level.number + (needed if is_last else min(needed, max(needed - LAST_RISE, 1), LARGEST_RISE))
+        number = level.number + (needed if is_last else min(needed, LARGEST_RISE))
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
-        resolution, excesses = max(self.accuracy, FLICKER), errors.split(errors.excess(np.concatenate(higher), goal))
+        resolution = max(LAST_TIPS * self.accuracy if is_last else self.accuracy, FLICKER)
+        excesses = errors.split(errors.excess(np.concatenate(higher), goal))
         refined = tuple(
             refined_partition(member.partition, excess, own, resolution)
             for member, excess, own in zip(members, excesses, cuts, strict=True)
