@@ -49,9 +49,9 @@ enough for two digits more at once. Degree 3 takes hardly less time."""
 COARSE = 2e-3
 """Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
 more, and a layer more where loads jump."""
-NEXT_ERROR = 0.04
+NEXT_ERROR, LEAST_NEXT_ERROR = 0.04, 0.013
 """Part of the error of contact tractions that the next mesh keeps, whatever its degree: places where the status changes
-have moved away from their nodes (0.02 to 0.1 on the scenes with a reference)."""
+have moved away from their nodes (0.01 to 0.1 on the scenes with a reference). As a rule, and with luck."""
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
@@ -127,7 +127,7 @@ class LayeredMeshes:
         if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
         cuts = [_settled_cuts(member) for member in members]
-        more = int(level.number == 0 and self.accuracy < COARSE and not self._moves_on(solution))
+        more = int(level.number == 0 and self.accuracy < COARSE and not self._moves_on(solution, NEXT_ERROR))
         fresh = [
             layered_partition(each.partition.base, own, n_at_jumps=1 + more)
             for each, own in zip(members, cuts, strict=True)
@@ -140,9 +140,14 @@ class LayeredMeshes:
         has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
         is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
         needed = self._needed_rise(errors, is_inner) if has_moved else 0
-        may_be_last = level.number > FIRST_NUMBER or not self._moves_on(solution)
-        is_last = has_moved and needed <= LAST_RISE and may_be_last
-        number = level.number + (needed if is_last else min(needed, LARGEST_RISE))
+        moves_on, moves_on_at_best = (
+            level.number == FIRST_NUMBER and self._moves_on(solution, part) for part in (NEXT_ERROR, LEAST_NEXT_ERROR)
+        )
+        is_last = has_moved and needed <= LAST_RISE and not moves_on
+        rise = needed if is_last else min(needed, LARGEST_RISE)
+        if moves_on_at_best:  # only so far that the mesh after the next one may be the last
+            rise = min(rise, max(needed - LAST_RISE, 1))
+        number = level.number + rise
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
         if not is_last:
@@ -159,10 +164,10 @@ class LayeredMeshes:
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
         return replace(level, partitions=refined, number=number, degrees=degrees)
 
-    def _moves_on(self, solution: AnySolution) -> bool:
-        """Whether places where the status changes are not told well enough for the next mesh to be the last."""
+    def _moves_on(self, solution: AnySolution, part: float) -> bool:
+        """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
         error = solution.estimated_traction_error
-        return error is not None and NEXT_ERROR * error > self.accuracy
+        return error is not None and part * error > self.accuracy
 
     def _degrees(self, errors: _Errors, old: Partition, new: Partition, largest: int) -> tuple[int, ...]:
         """Return the degrees of new elements that come from those of a solution."""
