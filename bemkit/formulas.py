@@ -126,8 +126,9 @@ class Expression:
         x_all, y_all = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         with np.errstate(all="ignore"):  # values that are not finite are reported below, with the point
             values = np.array(np.broadcast_to(self._compiled.value(x_all, y_all), x_all.shape))
-        remedy = "guard it with where(condition, a, b) or change the formula"
-        _refuse_not_finite(values, x_all, y_all, f"expression {shorten(self.text)}", remedy)
+        if not np.isfinite(values).all():
+            remedy = "guard it with where(condition, a, b) or change the formula"
+            raise _not_finite(values, x_all, y_all, f"expression {shorten(self.text)}", remedy)
         return values == 1.0 if self.is_condition else values
 
 
@@ -157,15 +158,16 @@ def evaluate_field(value: ScalarField, points: FloatArray) -> FloatArray:
     if values.shape not in ((), x.shape):
         raise ExpressionError(f"{value!r} returns the shape {values.shape} for {x.size} points: return one value each")
     result = np.array(np.broadcast_to(values, x.shape))
-    _refuse_not_finite(result, x, y, repr(value), "it must be finite on the part")
+    if not np.isfinite(result).all():
+        raise _not_finite(result, x, y, repr(value), "it must be finite on the part")
     return result
 
 
-def _refuse_not_finite(values: FloatArray, x: FloatArray, y: FloatArray, name: str, remedy: str) -> None:
-    wrong = np.flatnonzero(~np.isfinite(values))
-    if wrong.size:
-        value, *place = (float(array.ravel()[wrong[0]]) for array in (values, x, y))
-        raise ExpressionError(f"{name} is {value} at (x, y) = ({place[0]:.6g}, {place[1]:.6g}); {remedy}")
+def _not_finite(values: FloatArray, x: FloatArray, y: FloatArray, name: str, remedy: str) -> ExpressionError:
+    """Return an error that tells the first value that is not finite, and its place."""
+    wrong = int(np.argmin(np.isfinite(values)))
+    value, *place = (float(array.ravel()[wrong]) for array in (values, x, y))
+    return ExpressionError(f"{name} is {value} at (x, y) = ({place[0]:.6g}, {place[1]:.6g}); {remedy}")
 
 
 def check_field(value: object, name: str) -> None:

@@ -100,6 +100,11 @@ class ContactProblem:
         return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
 
     @cached_property
+    def modulus(self) -> float:
+        """Force by which a typical node resists its displacement [Pa]: about E' of the material."""
+        return self.body.stiffness_scale * float(np.median(self.body.weights))
+
+    @cached_property
     def of_body(self) -> dict[str, Any]:
         """What drivers have found out of the body and its load, to be kept under other laws; see `with_law`."""
         return {}
@@ -325,8 +330,7 @@ class _Scales(NamedTuple):
 
 
 def _scales(problem: ContactProblem, state: ContactState) -> _Scales:
-    weights = problem.body.weights
-    modulus = problem.body.stiffness_scale * float(np.median(weights))
+    weights, modulus = problem.body.weights, problem.modulus
     furthest = float(np.abs(state.displacement).max())
     # friction without pressure is a traction to be met as well, however small beside those of the sticking state
     resisted = problem.cohesion

@@ -103,7 +103,9 @@ def clip_to_bound_derivative(x: FloatArray, bound: FloatArray | float) -> tuple[
 def _checked_bound(x: FloatArray, bound: FloatArray | float) -> FloatArray:
     if x.ndim not in (1, 2):
         raise InputError(f"x has {x.ndim} axes; give (n,) components or (n, d) vectors")
-    radii = np.broadcast_to(np.asarray(bound, dtype=float), x.shape[:1])
+    radii = np.asarray(bound, dtype=float)
+    if radii.shape != x.shape[:1]:
+        radii = np.broadcast_to(radii, x.shape[:1])
     if np.any(radii < 0.0):
         raise InputError(f"bound has the negative value {radii.min():g}; a friction bound is zero or positive")
     return radii

@@ -138,8 +138,8 @@ def needs_contact(problem: ContactProblem) -> bool:
     if not motions.shape[0]:
         return False
     load, force_scale = _rigid_load(problem, largest_components(motions))
-    modulus = problem.body.stiffness_scale * float(np.median(problem.body.weights))
-    carried = modulus * float(np.abs(problem.sticking_state.displacement).max())  # of which forces may be round-off
+    # of which forces may be round-off
+    carried = problem.modulus * float(np.abs(problem.sticking_state.displacement).max())
     return bool(np.abs(load).max() > _PLAIN * max(force_scale, _PLAIN * carried))
 
 

@@ -104,6 +104,14 @@ class ContactTable:
         return own
 
     @cached_property
+    def is_joined(self) -> BoolArray:
+        """(n_contact - 1,) bool: whether a node and the next one follow each other on one piece of one part."""
+        distance = np.hypot(np.diff(self.x), np.diff(self.y))
+        # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
+        reach = (1.0 + 1e-9) * (self.weight[:-1] + self.weight[1:])
+        return np.equal(self.part[:-1], self.part[1:]) & (distance <= reach)
+
+    @cached_property
     def _nodes(self) -> Mapping[str, Sequence[int]]:
         """The nodes of each part."""
         nodes: dict[str, list[int]] = {}
@@ -198,7 +206,7 @@ def find_transitions(contact: ContactTable, slip: FloatArray | None = None) -> t
     """
     words = contact.status_words()
     slip = contact.u_t if slip is None else slip
-    changes = [i for i in range(contact.n_contact - 1) if words[i] != words[i + 1] and are_neighbours(contact, i)]
+    changes = [i for i in np.flatnonzero(contact.is_joined).tolist() if words[i] != words[i + 1]]
     places = np.array([_transition_place(contact, slip, words, i) for i in changes])
     kept, x, y = _kept_apart(contact, changes, places), np.zeros(len(changes)), np.zeros(len(changes))
     parts = [contact.part[i] for i in changes]
@@ -238,14 +246,6 @@ def _kept_apart(contact: ContactTable, changes: list[int], places: FloatArray) -
             is_lost = np.diff(kept[own], prepend=ends[0], append=ends[1]) < least
             kept[own] = np.where(is_lost[:-1] | is_lost[1:], halfway[own], kept[own])
     return kept
-
-
-def are_neighbours(contact: ContactTable, i: int) -> bool:
-    """Tell whether the nodes i and i + 1 follow each other on one piece of one part."""
-    distance = np.hypot(contact.x[i + 1] - contact.x[i], contact.y[i + 1] - contact.y[i])
-    # the lengths two neighbours stand for add up to at least their distance, however graded the mesh is
-    reach = (1.0 + 1e-9) * (contact.weight[i] + contact.weight[i + 1])
-    return contact.part[i] == contact.part[i + 1] and bool(distance <= reach)
 
 
 def _transition_place(contact: ContactTable, slip: FloatArray, words: list[str], i: int) -> float:

@@ -15,7 +15,7 @@ from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
-from bemkit.results.contact_table import ContactTable, are_neighbours
+from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
@@ -225,7 +225,7 @@ def _hidden_overlaps(contacts: Mapping[str, BetweenNodes], units: UnitNames | No
 def _zones(contact: ContactTable, chosen: BoolArray) -> list[IntArray]:
     """Return the runs of chosen nodes that follow each other on one piece of a part."""
     nodes = np.flatnonzero(chosen)
-    is_end = [nodes[k + 1] != nodes[k] + 1 or not are_neighbours(contact, int(nodes[k])) for k in range(nodes.size - 1)]
+    is_end = (np.diff(nodes) != 1) | ~contact.is_joined[nodes[:-1]]
     return [zone for zone in np.split(nodes, np.flatnonzero(is_end) + 1) if zone.size]
 
 

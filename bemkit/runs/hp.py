@@ -46,9 +46,15 @@ LARGEST_RISE, LAST_RISE = 2, 3
 FIRST_NUMBER = 2
 """Of the first mesh in layers: of degree 4, which tells the places where the status changes, and its own error, well
 enough for two digits more at once. Degree 3 takes hardly less time."""
-NEXT_ERROR = 0.03
-"""Part of the error of contact tractions on the first mesh in layers that the next one keeps, whatever its degree:
-places where the status changes have moved away from their nodes (0.02 to 0.1 on the scenes with a reference)."""
+COARSE = 2e-3
+"""Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
+more, and a layer more where loads jump."""
+NEXT_ERROR, LEAST_NEXT_ERROR = 0.04, 0.013
+"""Part of the error of contact tractions that the next mesh keeps, whatever its degree: places where the status changes
+have moved away from their nodes (0.01 to 0.1 on the scenes with a reference). As a rule, and with luck."""
+LAST_TIPS = 10.0
+"""Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
+the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
 FLICKER = 1e-8
 """Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
 statuses change from node to node."""
@@ -121,23 +127,34 @@ class LayeredMeshes:
         if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
         cuts = [_settled_cuts(member) for member in members]
-        fresh = [layered_partition(each.partition.base, own) for each, own in zip(members, cuts, strict=True)]
+        more = int(level.number == 0 and self.accuracy < COARSE and not self._moves_on(solution, NEXT_ERROR))
+        fresh = [
+            layered_partition(each.partition.base, own, n_at_jumps=1 + more)
+            for each, own in zip(members, cuts, strict=True)
+        ]
         if level.number == 0:
-            return replace(level, partitions=tuple(fresh), number=FIRST_NUMBER)
+            return replace(level, partitions=tuple(fresh), number=FIRST_NUMBER + more)
         if errors is None:
             method = solution.solved_bodies[0].scene.discretisation.method
             raise InputError(f"{method} has no error estimate: take another discretisation")
         has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
         is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
         needed = self._needed_rise(errors, is_inner) if has_moved else 0
-        is_last = has_moved and needed <= LAST_RISE and not self._moves_on(level, solution)
-        number = level.number + (needed if is_last else min(needed, LARGEST_RISE))
+        moves_on, moves_on_at_best = (
+            level.number == FIRST_NUMBER and self._moves_on(solution, part) for part in (NEXT_ERROR, LEAST_NEXT_ERROR)
+        )
+        is_last = has_moved and needed <= LAST_RISE and not moves_on
+        rise = needed if is_last else min(needed, LARGEST_RISE)
+        if moves_on_at_best:  # only so far that the mesh after the next one may be the last
+            rise = min(rise, max(needed - LAST_RISE, 1))
+        number = level.number + rise
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
-        resolution, excesses = max(self.accuracy, FLICKER), errors.split(errors.excess(np.concatenate(higher), goal))
+        resolution = max(LAST_TIPS * self.accuracy if is_last else self.accuracy, FLICKER)
+        excesses = errors.split(errors.excess(np.concatenate(higher), goal))
         refined = tuple(
             refined_partition(member.partition, excess, own, resolution)
             for member, excess, own in zip(members, excesses, cuts, strict=True)
@@ -147,10 +164,10 @@ class LayeredMeshes:
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
         return replace(level, partitions=refined, number=number, degrees=degrees)
 
-    def _moves_on(self, level: Level[AnyScene], solution: AnySolution) -> bool:
-        """Whether the first mesh in layers is still too far from the places where the status changes for one more."""
+    def _moves_on(self, solution: AnySolution, part: float) -> bool:
+        """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
         error = solution.estimated_traction_error
-        return level.number == FIRST_NUMBER and error is not None and NEXT_ERROR * error > self.accuracy
+        return error is not None and part * error > self.accuracy
 
     def _degrees(self, errors: _Errors, old: Partition, new: Partition, largest: int) -> tuple[int, ...]:
         """Return the degrees of new elements that come from those of a solution."""

@@ -285,6 +285,8 @@ class _Recorder:
         first, spent = (records[-1].step + 1, records[-1].linear_solves) if records else (0, 0)
 
         def following(record: StepRecord) -> StepRecord:
+            if not records and not self.words:
+                return record
             message = "; ".join(filter(None, (self.words, record.message)))
             return replace(
                 record, step=first + record.step, linear_solves=spent + record.linear_solves, message=message

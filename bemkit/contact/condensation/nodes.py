@@ -134,8 +134,10 @@ def contact_conditions(
     motion = np.where(conditions.is_fixed[candidates.nodes][:, :, None], 0.0, conditions.frame[candidates.nodes])
     approach = np.abs(np.einsum("nkc,nc->nk", motion, candidates.directions)).max(axis=1)
     contact = candidates.take(approach > APPROACH_TOLERANCE)
-    motions = free_motions(conditions, contact, space)
-    has_tangent = retained_tangents(motions, contact.is_frictionless, bound_tangents(conditions, contact))
+    has_tangent = ~contact.is_frictionless
+    if not has_tangent.all():
+        motions = free_motions(conditions, contact, space)
+        has_tangent = retained_tangents(motions, contact.is_frictionless, bound_tangents(conditions, contact))
     return _opened(conditions, contact, has_tangent), contact
 
 

@@ -56,7 +56,7 @@ def looking_partition(base: Division, even: Collection[str], n_elements: int) ->
     return _balanced(base, base, [_first_layers(*ends) for ends in np.vstack([n_layers, n_even]).T.tolist()])
 
 
-def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]]) -> Partition:
+def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]], *, n_at_jumps: int = 1) -> Partition:
     """Divide an outline into few elements, with a layer or two at the ends of its pieces.
 
     Parameters
@@ -65,9 +65,12 @@ def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]]) -> Pa
         The outline cut at corners and ends of parts.
     cuts : mapping of int to sequence of float
         Where the contact status changes: parameters by the number of the side.
+    n_at_jumps : int
+        Layers where parts end inside of a side, as loads jump there.
     """
     division = base.cut(cuts)
-    n_layers = np.where(_at_cut(base, division), FIRST_LAYERS[1], FIRST_LAYERS[0]) * _singular_ends(division)
+    n_layers = np.where(_inside_sides(division), n_at_jumps, FIRST_LAYERS[0])
+    n_layers = np.where(_at_cut(base, division), FIRST_LAYERS[1], n_layers) * _singular_ends(division)
     return _balanced(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
 
 
@@ -256,6 +259,11 @@ def _at_cut(base: Division, division: Division) -> BoolArray:
     """Tell (2, n_pieces) of the start and the end of each piece whether it is no end of a piece of the base."""
     ends = {(piece.side, end) for piece in base.pieces for end in piece.span}
     return np.array([[(piece.side, piece.span[end]) not in ends for piece in division.pieces] for end in (0, 1)], bool)
+
+
+def _inside_sides(division: Division) -> BoolArray:
+    """Tell (2, n_pieces) of the start and the end of each piece whether it is no end of a side."""
+    return np.array([[piece.span[end] not in (0.0, 1.0) for piece in division.pieces] for end in (0, 1)], bool)
 
 
 def _singular_ends(division: Division) -> BoolArray:

@@ -107,8 +107,9 @@ def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArr
         is_kind = panels.is_straight[inner] != is_curved
         for number, (n_points, _) in enumerate(GAUSS_LEVELS):
             item = np.flatnonzero(is_kind & (level == number))
-            rule = _Rule.whole(item, n_points + extra_points)
-            _add(sums, panels, degrees, outer, inner, rule, n_points + extra_points if is_curved else None)
+            if item.size:
+                rule = _Rule.whole(item, n_points + extra_points)
+                _add(sums, panels, degrees, outer, inner, rule, n_points + extra_points if is_curved else None)
         item = np.flatnonzero(is_kind & (level == len(GAUSS_LEVELS)))
         pieces = _split(panels, outer, inner, item)
         for (points, weights), chosen in (
@@ -215,9 +216,9 @@ def _add(
         item, at_start, fraction = rule.item[batch], rule.at_start[batch], rule.fraction[batch]
         own, other = outer[item, None], inner[item, None]
         node = np.where(at_start, panels.start[own], panels.end[own])
-        offset = panels.offset(np.broadcast_to(own, fraction.shape).ravel(), fraction.ravel(), at_start.ravel())
+        offset = panels.offset(np.repeat(own, n_points), fraction.ravel(), at_start.ravel())
         from_start, from_end = ((node - end[other]).ravel() + offset for end in (panels.start, panels.end))
-        other = np.broadcast_to(other, fraction.shape).ravel()
+        other = np.repeat(other, n_points)
         if n_inner_points is None:
             values = inner_integrals(panels, degrees, other, from_start, from_end)
         else:

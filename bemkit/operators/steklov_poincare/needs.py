@@ -310,7 +310,9 @@ def physical_memory() -> float:
         import resource
 
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit == resource.RLIM_INFINITY:
+            return memory
         taken = page * int(Path("/proc/self/statm").read_text().split()[0])
     except (ImportError, OSError):  # not a system of the Linux family
         return memory
-    return memory if limit == resource.RLIM_INFINITY else min(memory, max(limit - taken, 0.0))
+    return min(memory, max(limit - taken, 0.0))

@@ -229,17 +229,18 @@ def supported(space: BoundarySpace, supports: Sequence[Support]) -> NodalConditi
     n_nodes = space.n_dofs // 2
     points = dof_points(space)
     supports = [*supports, *_mirrors(space)]
+    given = [np.zeros_like(points) if each.displacement is None else each.displacement(points) for each in supports]
+    directions = [_directions_of(space, support) for support in supports]
     matrix, right = np.zeros((n_nodes, 2, 2)), np.zeros((n_nodes, 2))
-    for support in supports:
-        own = _directions_of(space, support)
-        values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
+    for own, values in zip(directions, given, strict=True):
         matrix += own
         right += np.einsum("nij,nj->ni", own, values)
     size, vectors = np.linalg.eigh(matrix)
     rank = (size > 1e-9).sum(axis=1)
     inverse = np.where(size > 1e-9, 1.0 / np.where(size > 1e-9, size, 1.0), 0.0)
     displacement = np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, right)
-    _check_agreement(space, supports, points, displacement)
+    for support, own, values in zip(supports, directions, given, strict=True):
+        _check_agreement(support, own, values, points, displacement)
 
     direction = vectors[:, :, 1]
     is_x = np.abs(direction[:, 0]) >= np.abs(direction[:, 1])
@@ -276,19 +277,17 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
 
 
 def _check_agreement(
-    space: BoundarySpace, supports: Sequence[Support], points: FloatArray, displacement: FloatArray
+    support: Support, directions: FloatArray, values: FloatArray, points: FloatArray, displacement: FloatArray
 ) -> None:
-    for support in supports:
-        own = _directions_of(space, support)
-        values = np.zeros_like(points) if support.displacement is None else support.displacement(points)
-        miss = np.abs(np.einsum("nij,nj->ni", own, values - displacement)).max(axis=1)
-        worst = int(np.argmax(miss))
-        if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
-            x, y = points[worst]
-            raise ConflictingSupportsError(
-                f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
-                f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
-            )
+    """Refuse displacements (n_nodes, 2) that are not the values of a support along its directions."""
+    miss = np.abs(np.einsum("nij,nj->ni", directions, values - displacement)).max(axis=1)
+    worst = int(np.argmax(miss))
+    if miss[worst] > CONFLICT_TOLERANCE * max(float(np.abs(values).max()), float(np.abs(displacement).max())):
+        x, y = points[worst]
+        raise ConflictingSupportsError(
+            f"part {support.name!r} and a neighbour prescribe different displacements at their common point "
+            f"({x:.6g}, {y:.6g}): make them agree there, or leave a free element between them"
+        )
 
 
 def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
