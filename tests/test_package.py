@@ -17,6 +17,17 @@ PACKAGE = Path(bemkit.__file__).parent
 
 CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
 NAME = "bemkit"
+NOT_NEEDED = (
+    *("operators.steklov_poincare.galerkin", "operators.forms", "operators.assembly", "operators.integrals.sweep"),
+    *("operators.hierarchy.element_pairs", "operators.steklov_poincare.matrix_free_needs"),
+    *("operators.particular_solutions", "model.particular", "model.free_motion", "model.untouched_body"),
+    *("geometry.drawn", "geometry.nurbs", "geometry.files", "geometry.arclength", "geometry.placement"),
+    *("geometry.reflection", "geometry.meshing.partition", "geometry.meshing.layers"),
+    *("scene.assembly", "scene.body", "scene.copies", "scene.places", "scene.symmetry", "scene.explanations"),
+    *("results.assembly_solution", "results.part_forces", "results.zone_ends"),
+    *("runs.warm_start", "solvers.homotopy", "solvers.multistart"),
+)
+"""Of a scene with one body of straight sides on one obstacle, solved by collocation from a number of elements."""
 HEAVY = ("scipy.sparse.linalg", "h5py", "pyamg", "matplotlib", "meshio", "rich", "click", "cattrs")
 
 
@@ -143,3 +154,17 @@ scene = bk.Scene(title="block", shape=bk.Rectangle(1.0, 1.0), material=bk.Materi
 assert bk.run(scene).is_converged
 """
     assert loaded_after(code) == set()
+
+
+def test_what_a_scene_does_not_need_is_not_imported() -> None:
+    code = f"""
+import sys
+from importlib.util import find_spec
+import bemkit as bk
+assert bk.run(bk.load_scene("paper-1")).is_converged
+names = [f"bemkit.{{name}}" for name in {NOT_NEEDED!r}] + ["scipy.spatial", "scipy.sparse"]
+print([name for name in names if name in sys.modules])
+assert all(find_spec(name) for name in names)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console, Group
@@ -11,16 +12,18 @@ from rich.table import Table
 from rich.text import Text
 
 from bemkit.contact.problem import Certificate
-from bemkit.geometry.drawn import drawn_shape
+from bemkit.geometry.shapes import Shape
 from bemkit.operators.counts import OperationCounts
 from bemkit.plan import Plan
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.outputs import plain_table, stdout_console
 from bemkit.results.solution import Solution
 from bemkit.scene.registry import DISCRETISATIONS, SOLVERS
 from bemkit.scene.unit_names import UnitNames, amount
 from bemkit.solvers.base import StepRecord
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
 
 _MANY_TRANSITIONS, _MANY_CONTACTS = 12, 8
 
@@ -147,15 +150,15 @@ def format_seconds(seconds: float) -> str:
 
 def _summary_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, Text | str]]:
     yield "status", _status(solution)
-    if isinstance(solution, AssemblySolution):
-        solver, of_tractions = solution.assembly.solver, ""
-        yield from _bodies_rows(solution)
-    else:
+    if isinstance(solution, Solution):
         solver, of_tractions = solution.scene.solver, _traction_errors(solution)
         yield from _body_rows(solution)
+    else:
+        solver, of_tractions = solution.assembly.solver, ""
+        yield from _bodies_rows(solution)
     if has_contact := solution.contact.n_contact > 0:
         yield "contact nodes", _node_counts(solution)
-        yield from _contacts_rows(solution) if isinstance(solution, AssemblySolution) else _force_rows(solution)
+        yield from _force_rows(solution) if isinstance(solution, Solution) else _contacts_rows(solution)
     else:
         yield "contact", "none"
     yield "elastic energy", f"{_amount(solution.energy, 'energy', solution.units)}  per unit thickness"
@@ -176,11 +179,17 @@ def _body_rows(solution: Solution) -> Iterator[tuple[str, str]]:
     if (degree := solution.scene.discretisation.displacement_space(mesh).degree) > 2:
         discretisation += f", degree {degree}"
     yield "elements", f"{mesh.n_elements} ({discretisation})"
-    if (drawn := drawn_shape(solution.scene.shape)) and drawn.notes:
-        yield "outline", "\n".join(drawn.notes)
+    if notes := _notes(solution.scene.shape):
+        yield "outline", notes
     if mesh.symmetry is not None:
         values = f"values of one side, {mesh.n_elements} of {mesh.whole.n_elements} elements"
         yield "symmetry", f"about {mesh.symmetry}: {values}"
+
+
+def _notes(shape: Shape) -> str:
+    """Return what was done to read the outline of a body, in lines."""
+    drawing = shape.outline().drawing
+    return "" if drawing is None else "\n".join(drawing.notes)
 
 
 def _force_rows(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -198,8 +207,8 @@ def _traction_errors(solution: Solution) -> str:
 def _bodies_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:
     yield "bodies", f"{len(solution.bodies)}, with {solution.n_elements} elements"
     for elastic in solution.assembly.bodies:
-        if (drawn := drawn_shape(elastic.shape)) and drawn.notes:
-            yield f"outline of {elastic.name}", "\n".join(drawn.notes)
+        if notes := _notes(elastic.shape):
+            yield f"outline of {elastic.name}", notes
 
 
 def _contacts_rows(solution: AssemblySolution) -> Iterator[tuple[str, str]]:

@@ -62,7 +62,7 @@ def outline(
         figures = Outputs((), folder, drawn, "outline")
         figures.check(text.check())
         sides = shape.outline()
-    print_sides(shape, sides)
+    print_sides(sides)
     figures.write(sides)
     if output is not None and isinstance(shape, MeshFile | DrawingFile):
         relative = os.path.relpath(Path(file).resolve(), Path(output).resolve().parent)

@@ -7,11 +7,9 @@ import numpy as np
 from rich.text import Text
 
 from bemkit.geometry.curves import Arc
-from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.files.chords import CORNER_ANGLE
 from bemkit.geometry.files.shape_file import DrawingFile, MeshFile, is_drawing
 from bemkit.geometry.outline import Outline, Side
-from bemkit.geometry.shapes import Shape
 from bemkit.geometry.vectors import norms
 from bemkit.results.outputs import plain_table, stdout_console
 
@@ -31,10 +29,10 @@ def shape_file(
     return MeshFile(file, scale, only, CORNER_ANGLE if corner_angle is None else corner_angle)
 
 
-def print_sides(shape: Shape, sides: Outline) -> None:
+def print_sides(sides: Outline) -> None:
     """Print a line for each side, the size of the body and what was done to read it."""
     console = stdout_console()
-    drawn = drawn_shape(shape)
+    drawing = sides.drawing
     table = plain_table(("loop", "side", "group", "kind"), ("length", "from"), gap=2)
     for number, loop in enumerate(sides.loops):
         for side in loop:
@@ -46,9 +44,9 @@ def print_sides(shape: Shape, sides: Outline) -> None:
     console.print(table)
     points = np.concatenate([side.curve.point(_SEEN) for side in sides.sides])
     width, height = np.ptp(points, axis=0).tolist()
-    unit = f" {drawn.unit}" if drawn is not None and drawn.unit else ""
+    unit = f" {drawing.unit}" if drawing is not None and drawing.unit else ""
     console.print(Text(f"about {width:.4g} by {height:.4g}{unit}; the body lies on the left of every side"))
-    for note in drawn.notes if drawn is not None else ():
+    for note in () if drawing is None else drawing.notes:
         console.print(Text(f"note: {note}", style="yellow"))
 
 

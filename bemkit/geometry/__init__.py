@@ -1,13 +1,13 @@
 """Curves, shapes, selections, gradings and boundary meshes."""
 
+from typing import TYPE_CHECKING, Any
+
 from bemkit.geometry.curves import Arc as Arc
 from bemkit.geometry.curves import Curve as Curve
 from bemkit.geometry.curves import ParametricCurve as ParametricCurve
 from bemkit.geometry.curves import Segment as Segment
 from bemkit.geometry.errors import GeometryError as GeometryError
 from bemkit.geometry.errors import UnknownPartError as UnknownPartError
-from bemkit.geometry.files.meshio_files import read_mesh as read_mesh
-from bemkit.geometry.files.meshio_files import write_mesh as write_mesh
 from bemkit.geometry.mesh import BoundaryMesh as BoundaryMesh
 from bemkit.geometry.meshing.discretise import Algebraic as Algebraic
 from bemkit.geometry.meshing.discretise import Geometric as Geometric
@@ -27,3 +27,16 @@ from bemkit.geometry.shapes import Ring as Ring
 from bemkit.geometry.shapes import Sector as Sector
 from bemkit.geometry.shapes import Shape as Shape
 from bemkit.geometry.symmetry import Symmetry as Symmetry
+
+if TYPE_CHECKING:
+    from bemkit.geometry.files.meshio_files import read_mesh as read_mesh
+    from bemkit.geometry.files.meshio_files import write_mesh as write_mesh
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Import what reads and writes files of meshes when it is first used."""
+        if name not in ("read_mesh", "write_mesh"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from bemkit.geometry.files import meshio_files
+
+        return getattr(meshio_files, name)

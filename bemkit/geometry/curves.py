@@ -1,18 +1,22 @@
 """Curves: what a side of a body, or a curved element, follows."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Real
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.geometry.arclength import ArcLength
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.vectors import norms
+
+if TYPE_CHECKING:
+    from bemkit.geometry.arclength import ArcLength
 
 _SAMPLES = np.linspace(0.0, 1.0, 17)
 _N_CHECK_INTERVALS = 8
@@ -207,6 +211,8 @@ class ParametricCurve:
 
     @cached_property
     def _arc_length(self) -> ArcLength:
+        from bemkit.geometry.arclength import ArcLength
+
         return ArcLength(self._velocity)
 
     def point(self, s: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from bemkit.arrays import FloatArray
 from bemkit.geometry.curves import Arc, Curve, ParametricCurve, Segment, as_point, reverse_curve
 from bemkit.geometry.errors import GeometryError, format_point
 from bemkit.geometry.nurbs import Nurbs, clamped_knots
-from bemkit.geometry.outline import Outline, Side
+from bemkit.geometry.outline import Drawing, Outline, Side
 from bemkit.geometry.shapes import CheckedShape
 from bemkit.geometry.vectors import cross, enclosed_area, norms
 
@@ -256,7 +256,7 @@ class OutlineShape(CheckedShape):
         for k, area in enumerate(areas):
             if (area > 0.0) != (k == outer):
                 loops[k] = tuple(Side(side.name, reverse_curve(side.curve), side.group) for side in reversed(loops[k]))
-        return Outline(tuple(loops))
+        return Outline(tuple(loops), drawing=Drawing(self.notes, self.unit))
 
 
 def _arc(centre: FloatArray, start: FloatArray, sweep: float) -> Arc:
@@ -268,10 +268,3 @@ def _arc(centre: FloatArray, start: FloatArray, sweep: float) -> Arc:
 def _signed_area(loop: Sequence[Side]) -> float:
     """Return the area [m^2] of a loop, to a few digits; negative if it runs clockwise."""
     return enclosed_area(np.concatenate([side.curve.point(_SEEN) for side in loop]))
-
-
-def drawn_shape(shape: object) -> OutlineShape | None:
-    """Return the drawn outline that a shape is or is made of, as one read from a file or the exterior of one."""
-    while shape is not None and not isinstance(shape, OutlineShape):
-        shape = getattr(shape, "shape", None)
-    return shape

@@ -48,6 +48,22 @@ class Side:
             raise GeometryError(f"Side: name is {self.name!r}: give a non-empty string")
 
 
+@dataclass(frozen=True)
+class Drawing:
+    """What else is known of an outline that was drawn.
+
+    Parameters
+    ----------
+    notes : tuple of str
+        What the reader of a file had to do or to assume to make it of the file.
+    unit : str
+        Unit of length that the file states; empty if it states none.
+    """
+
+    notes: tuple[str, ...]
+    unit: str
+
+
 @dataclass(frozen=True, eq=False)
 class Outline:
     """The closed loops of sides that bound a body.
@@ -62,6 +78,8 @@ class Outline:
     surface : Surface, optional
         Given if the body is a half-plane: the only loop is then one straight side with the body on its left, and stays
         open.
+    drawing : Drawing, optional
+        Given if the sides were drawn one by one.
 
     Raises
     ------
@@ -73,6 +91,7 @@ class Outline:
     loops: tuple[tuple[Side, ...], ...]
     is_exterior: bool = False
     surface: Surface | None = None
+    drawing: Drawing | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "loops", tuple(tuple(loop) for loop in self.loops))

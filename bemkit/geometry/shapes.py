@@ -266,8 +266,9 @@ class ExteriorOf(CheckedShape):
     @cached_property
     def _outline(self) -> Outline:
         """Return the loop of the shape, reversed."""
-        (loop,) = self.shape.outline().loops
-        return Outline((_reversed_loop(loop),), is_exterior=True)
+        outline = self.shape.outline()
+        (loop,) = outline.loops
+        return Outline((_reversed_loop(loop),), is_exterior=True, drawing=outline.drawing)
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.model.contact_data import SMOOTH_SIDE_COSINE, ContactData
-from bemkit.model.free_motion import check_held
 from bemkit.model.prepared import Prepared
 from bemkit.model.units import Units
-from bemkit.model.untouched_body import UntouchedBody
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.surface import SurfaceElasticity
@@ -42,6 +40,7 @@ from bemkit.solvers.base import ContactSolver
 if TYPE_CHECKING:
     from bemkit.contact.condensation.hierarchical_body import HierarchicalBody
     from bemkit.contact.periodic_body import PeriodicBody
+    from bemkit.model.untouched_body import UntouchedBody
 
 _MORE_POINTS = 4
 """Gauss points of an element at which given loads are evaluated, beyond the degree of the tractions."""
@@ -292,6 +291,9 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
             assert isinstance(weightless, HierarchicalMap)
             return hierarchical_body(weightless, *given, prepared.inside)
         return condensed_body(elastic, *given)
+    from bemkit.model.free_motion import check_held
+    from bemkit.model.untouched_body import UntouchedBody
+
     check_held(prepared)
     condensed = elastic.condense(prepared.conditions, prepared.force)
     return UntouchedBody(prepared.space, prepared.conditions, prepared.force, condensed)

@@ -19,7 +19,6 @@ from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
 from bemkit.model.contact_data import ContactData, find_contact
-from bemkit.model.particular import particular_solution
 from bemkit.model.units import Units, check_position, find_units
 from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.linear.solvers import (
@@ -49,7 +48,6 @@ from bemkit.operators.steklov_poincare.nodal_conditions import (
 from bemkit.scene.conditions import Clamped, Part, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.scene import Scene
-from bemkit.scene.symmetry import check_symmetry
 
 
 def supports_on(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> list[Support]:
@@ -205,7 +203,7 @@ class Prepared:
             If the scene has another body, other parts, or other kinds of conditions.
         """
         check_same_body(self.scene, scene)
-        check_symmetry(scene, self.mesh)
+        _check_symmetry(scene, self.mesh)
         return _prepared(scene, self.mesh, self.units, self.space)
 
 
@@ -238,7 +236,7 @@ def prepare(scene: Scene, mesh: BoundaryMesh, units: Units | None = None) -> Pre
         If the scene lacks its symmetry, or an expression is not finite somewhere.
     """
     check_position(mesh)
-    check_symmetry(scene, mesh)
+    _check_symmetry(scene, mesh)
     units = find_units(scene, mesh) if units is None else units
     space = scene.discretisation.displacement_space(mesh.unit)
     return _prepared(scene, mesh, units, space)
@@ -253,6 +251,13 @@ def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared,
     return (first, *later)
 
 
+def _check_symmetry(scene: Scene, mesh: BoundaryMesh) -> None:
+    if scene.symmetry is not None or mesh.symmetry is not None:
+        from bemkit.scene.symmetry import check_symmetry
+
+        check_symmetry(scene, mesh)
+
+
 def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpace) -> Prepared:
     candidates = find_contact(scene, mesh, space)
     drive = far_drive(scene, units)
@@ -261,6 +266,8 @@ def _prepared(scene: Scene, mesh: BoundaryMesh, units: Units, space: BoundarySpa
     force = nodal_forces(scene, mesh, space, units)
     inside = None
     if scene.body_forces:
+        from bemkit.model.particular import particular_solution
+
         inside = ForcesInside.of(particular_solution(scene, mesh, units.modulus, units.stress), space)
     return Prepared(scene, mesh, units, space, conditions, candidates, candidates.of(nodes), force, inside, drive)
 

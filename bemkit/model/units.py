@@ -11,7 +11,6 @@ from bemkit.contact.obstacle import measure_contact
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.vectors import LARGEST, SMALLEST
-from bemkit.model.particular import stress_of
 from bemkit.scene.conditions import Contact, PrescribedDisplacement, Pressure, Traction
 from bemkit.scene.scene import Scene
 
@@ -97,7 +96,10 @@ def largest_sizes(scene: Scene, mesh: BoundaryMesh, length: float) -> tuple[floa
     The length [m] tells which overlaps and gaps are the round-off of coordinates.
     """
     loads, motions, gaps = [0.0], [0.0], [0.0]
-    loads += [stress_of(force, mesh, scene.material) for force in scene.body_forces]
+    if scene.body_forces:
+        from bemkit.model.particular import stress_of
+
+        loads += [stress_of(force, mesh, scene.material) for force in scene.body_forces]
     if scene.far is not None:
         of_turn = np.array([1.0, 1.0, length])
         loads.append(float(np.abs(scene.far.load / of_turn).max()) / length)

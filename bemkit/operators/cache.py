@@ -32,7 +32,7 @@ from bemkit.hdf5 import Reader, ResultFileError, created, opened, write_table
 from bemkit.operators.boundary import Mass, PairOperator
 from bemkit.operators.linear.dense import Cholesky
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import GalerkinFactors
+from bemkit.operators.steklov_poincare.galerkin import GalerkinFactors
 from bemkit.operators.steklov_poincare.maps import GalerkinMap
 from bemkit.version import __version__
 

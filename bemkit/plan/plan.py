@@ -11,7 +11,6 @@ import numpy as np
 from bemkit.contact.condensation.nodes import find_tangents
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
-from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline
 from bemkit.geometry.symmetry import Symmetry
@@ -154,15 +153,16 @@ def last_items(n_steps: int, *inside: str) -> Iterator[PlanItem]:
 def _mesh_items(scene: Scene, sizes: Sizes, proposal: Symmetry | None) -> Iterator[PlanItem]:
     """Yield what elements, symmetry and spaces need."""
     n, n_curved = sizes.n_elements, sizes.n_curved
-    if drawn := drawn_shape(scene.shape):
-        read = "; ".join(drawn.notes) or "taken as it is"
-        yield PlanItem("drawn outline", True, f"{_count(len(drawn.outline().sides), 'side')}; {read}")
+    outline = scene.shape.outline()
+    if outline.drawing is not None:
+        read = "; ".join(outline.drawing.notes) or "taken as it is"
+        yield PlanItem("drawn outline", True, f"{_count(len(outline.sides), 'side')}; {read}")
     yield PlanItem("elements", True, f"{n} on {_count(sizes.n_loops, 'closed curve')}")
     yield further_meshes(scene.mesh.accuracy, "the number of elements is given", "first mesh")
     curved = f"{n_curved} of {n} elements are curved" if n_curved else "all elements are straight"
     yield PlanItem("quadrature on curved elements", n_curved > 0, curved)
     if not sizes.n_motions and scene.symmetry is None:
-        where = "outside of the boundary" if scene.shape.outline().surface is None else "half-plane below its surface"
+        where = "outside of the boundary" if outline.surface is None else "half-plane below its surface"
         yield PlanItem("exterior domain", True, f"the body fills the {where}")
     reason = "not asked for"
     if scene.symmetry is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -19,12 +19,14 @@ from bemkit.results.between_nodes import BetweenNodes, violations_between_nodes
 from bemkit.results.contact_table import ContactTable as ContactTable
 from bemkit.results.contact_table import Transition as Transition
 from bemkit.results.contact_table import bound_at, resolved_transitions
-from bemkit.results.part_forces import ContactForce, contact_forces
 from bemkit.results.solved_body import BoundaryFields as BoundaryFields
 from bemkit.results.solved_body import SolvedBody
 from bemkit.results.solved_problem import SolvedProblem
-from bemkit.results.zone_ends import ZoneEnd, zone_end
 from bemkit.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from bemkit.results.part_forces import ContactForce
+    from bemkit.results.zone_ends import ZoneEnd
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +74,7 @@ class Solution(SolvedProblem, SolvedBody):
         if not self.scene.discretisation.estimates_error or self.contact_traction_size == 0.0:
             return None
         from bemkit.results.error_indicators import contact_errors, place_error
+        from bemkit.results.zone_ends import zone_end
 
         if self.coefficient_errors is None:
             degree = max(self.scene.discretisation.displacement_space(self.mesh).degree, 1)
@@ -121,6 +124,8 @@ class Solution(SolvedProblem, SolvedBody):
     @cached_property
     def contacts(self) -> tuple[ContactForce, ...]:
         """What each contact part feels of its obstacle."""
+        from bemkit.results.part_forces import contact_forces
+
         parts = {force.name: force for force in self.part_forces}
         return contact_forces(self.contact, [parts[name] for name in self.contact.parts], self.transitions)
 
@@ -132,6 +137,8 @@ class Solution(SolvedProblem, SolvedBody):
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
         """Where zones of one status end, as far as they are resolved; see `resolved_transitions`."""
+        from bemkit.results.zone_ends import zone_end
+
         resolved = resolved_transitions(self.contact, self.transitions)
         return tuple(zone_end(self.mesh, self.contact, each) for each in resolved)
 

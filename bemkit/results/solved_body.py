@@ -12,13 +12,13 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
-from bemkit.model.particular import ParticularFields
-from bemkit.results.part_forces import PartForce, part_force
 from bemkit.scene.conditions import Pressure, Traction
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from bemkit.model.particular import ParticularFields
     from bemkit.results.coefficient_decay import CoefficientErrors
+    from bemkit.results.part_forces import PartForce
     from bemkit.results.surface_errors import SurfaceErrors
 
 
@@ -94,6 +94,10 @@ class SolvedBody:
     @cached_property
     def particular(self) -> ParticularFields | None:
         """The particular solution of the body forces, known in closed form; None without body forces."""
+        if not self.scene.body_forces:
+            return None
+        from bemkit.model.particular import ParticularFields
+
         return ParticularFields.of(self.scene, self.mesh)
 
     @cached_property
@@ -157,6 +161,8 @@ class SolvedBody:
     @cached_property
     def part_forces(self) -> tuple[PartForce, ...]:
         """The resultants of the tractions on each part."""
+        from bemkit.results.part_forces import part_force
+
         space = self.scene.discretisation.traction_space(self.mesh)
         if len(self.boundary.traction_dofs) != space.element_dofs.size:  # a file of an older version
             space = ConstantSpace(self.mesh)

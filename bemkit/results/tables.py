@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,12 +13,14 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.problem import Certificate
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import values_on_elements
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import step_rows
 from bemkit.results.outputs import csv_text, json_text
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.solvers.base import StepRecord
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
 
 TABLES = ("contact", "boundary", "history", "steps")
 CSV_STARTS: Mapping[str, str] = MappingProxyType(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,13 +14,15 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.vectors import norms
 from bemkit.operators.rigid_modes import without_motion
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solution import Solution
 from bemkit.results.solved_body import SolvedBody
 from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Roller
 from bemkit.scene.unit_names import UnitNames, amount
+
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
 
 LARGEST_ERROR = 0.05
 """Estimated relative error above which a solution carries a warning."""
@@ -55,12 +58,14 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
     if not solution.is_certified:
         return solution.plan.warnings
     remedy = _remedy(solution.solved_bodies)
-    if isinstance(solution, AssemblySolution):
-        laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
-        of_all: list[Iterator[str]] = [_large(solution.estimated_error, remedy)]
-        titled: dict[str, SolvedBody] = {f"Body {name!r}: ": body for name, body in solution.bodies.items()}
-    else:
+    of_all: list[Iterator[str]]
+    titled: dict[str, SolvedBody]
+    if isinstance(solution, Solution):
         laws, of_all, titled = solution.scene.laws, [_error(solution), _turned(solution)], {"": solution}
+    else:
+        laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
+        of_all = [_large(solution.estimated_error, remedy)]
+        titled = {f"Body {name!r}: ": body for name, body in solution.bodies.items()}
     smooth = {name for name, law in laws.items() if law.is_frictionless}
     doubts = [
         *of_all,

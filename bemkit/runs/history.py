@@ -15,7 +15,6 @@ from bemkit.geometry.local_values import mean_tractions
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import dof_points
 from bemkit.model.contact_model import Model, build_model
-from bemkit.model.free_motion import describe
 from bemkit.model.prepared import Prepared, prepare_steps
 from bemkit.model.solved_contact import contact_warnings, with_energy_checked, with_held_friction
 from bemkit.operators.stopwatch import Stage, StageClock
@@ -25,7 +24,6 @@ from bemkit.results.solution import BoundaryFields, Solution
 from bemkit.results.solved_problem import SolvedSteps
 from bemkit.results.warnings import find_warnings
 from bemkit.runs.steps import Kind, joined, solved_history
-from bemkit.runs.warm_start import state_on
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import ContactSolution, Status, StepRecord
 
@@ -82,6 +80,8 @@ def _guess(scene: Scene, start: Solution | None) -> Callable[[Model], ContactSta
         return None
     if not scene.contact_parts:
         raise NoContactError("start is given, but no part is in contact: leave it out, there is nothing to iterate")
+    from bemkit.runs.warm_start import state_on
+
     return lambda model: state_on(model, start)
 
 
@@ -95,6 +95,8 @@ def _prepared(steps: Sequence[Scene], mesh: BoundaryMesh | None) -> tuple[tuple[
 
 
 def _explained(model: Model, load: UnsolvableLoad) -> str:
+    from bemkit.model.free_motion import describe
+
     return describe(model.prepared, load)
 
 

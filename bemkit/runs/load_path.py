@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -12,7 +14,6 @@ from bemkit.arrays import FloatArray
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.model.units import Units
-from bemkit.model.untouched_body import certified
 from bemkit.results.load_history import StepWork
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import ContactSolution, ContactSolver, Status, StepRecord, solve
@@ -66,26 +67,30 @@ class Standing:
     motion : SlipHistory
     gap : (n_contact,) array
         Dimensionless.
-    forces, displacements : (n,) arrays [N/m], [m]
-        See `StepModel.acting`; a single zero at rest.
+    acts : callable
+        () -> what `StepModel.acting` returns there; a single zero each at rest.
     """
 
     state: ContactState
     motion: SlipHistory
     gap: FloatArray
-    forces: FloatArray
-    displacements: FloatArray
+    acts: Callable[[], tuple[FloatArray, FloatArray]]
+
+    @cached_property
+    def acting(self) -> tuple[FloatArray, FloatArray]:
+        """(n,) arrays [N/m], [m]: the forces of loads and supports, and the displacements on which they work."""
+        return self.acts()
 
     @classmethod
     def at_rest(cls, model: StepModel) -> Standing:
         """Return what is before any load: obstacles that overlap with the body have not come yet."""
-        n, nothing = model.problem.n_contact, np.zeros(1)
-        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), nothing, nothing)
+        n = model.problem.n_contact
+        return cls(_no_state(n), SlipHistory.at_rest(n), np.maximum(model.problem.gap, 0.0), _nothing)
 
     @classmethod
     def under(cls, model: StepModel, state: ContactState, motion: SlipHistory) -> Standing:
         """Return the end of a step of a model."""
-        return cls(state, motion, model.problem.gap, *model.acting(state))
+        return cls(state, motion, model.problem.gap, partial(model.acting, state))
 
     def work_from(self, before: Standing, model: StepModel) -> StepWork:
         """Return the work from another end to this one, by the trapezoidal rule."""
@@ -101,7 +106,8 @@ class Standing:
         of_friction = -sigma[:, 1] * moved[:, 1]
         taken = max(float(of_friction[is_held].sum()), 0.0)
         along_slip = 2.0 * weights * self.state.traction[:, 1] * moved[:, 1]
-        of_forces = 0.5 * float((before.forces + self.forces) @ (self.displacements - before.displacements))
+        (forces_before, displacements_before), (forces, displacements) = before.acting, self.acting
+        of_forces = 0.5 * float((forces_before + forces) @ (displacements - displacements_before))
         return StepWork(
             external_work=of_forces + float(sigma[:, 0] @ approached),
             dissipation=taken,
@@ -116,23 +122,30 @@ class ReachedStep:
 
     Parameters
     ----------
+    path : Path
     problem : ContactProblem
         Of the last increment, slip counting from the one before, the law that of its slip.
     result : ContactSolution
         Of the last increment, with the records and linear solves of all; its message says what was done.
-    end : Standing
-        Of the last increment that converged.
-    work : StepWork
-        Up to there.
-    n_increments : int
-        Of those that converged.
+    ends : tuple of Standing
+        Of the increments that converged.
     """
 
+    path: Path
     problem: ContactProblem
     result: ContactSolution
-    end: Standing
-    work: StepWork
-    n_increments: int
+    ends: tuple[Standing, ...]
+
+    @property
+    def end(self) -> Standing:
+        """Of the last increment that converged."""
+        return (self.path.start, *self.ends)[-1]
+
+    @property
+    def work(self) -> StepWork:
+        """Up to there."""
+        stands = pairwise((self.path.start, *self.ends))
+        return sum((end.work_from(before, self.path.model) for before, end in stands), StepWork())
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,11 +179,8 @@ class Path:
 
     def standing(self, problem: ContactProblem, share: float, state: ContactState, motion: SlipHistory) -> Standing:
         """Return the end of an increment."""
-        acting = self.model.acting(state)
-        if self.before is not None and share < 1.0:  # what acts is affine in the loads
-            pairs = zip(self.before.acting(state), acting, strict=True)
-            acting = tuple((1.0 - share) * one + share * two for one, two in pairs)  # type: ignore[assignment]
-        return Standing(state, motion, problem.gap, *acting)
+        before = self.before if share < 1.0 else None
+        return Standing(state, motion, problem.gap, partial(_acting, self.model, before, share, state))
 
 
 def reach(path: Path, guess: ContactState | None = None, callback: Callback = None) -> ReachedStep:
@@ -197,7 +207,8 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
     dilate, the programme is a bound from above: bodies may give way below it, and which of the two has happened is not
     decided.
     """
-    reached, increment, end, n_increments, work = 0.0, 1.0, path.start, 0, StepWork()
+    reached, increment, end = 0.0, 1.0, path.start
+    ends: tuple[Standing, ...] = ()
     records: tuple[StepRecord, ...] = ()
     is_first = path.before is None
     while True:
@@ -210,9 +221,8 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
         attempt = _attempt(path, problem, end, path.time_at(target), guess if is_first else end.state, recorder)
         records, failure = attempt.result.history, attempt.result
         if failure.is_converged:
-            following = path.standing(problem, target, failure.state, attempt.motion)
-            work += following.work_from(end, path.model)
-            reached, end, n_increments, increment = target, following, n_increments + 1, 2.0 * increment
+            end = path.standing(problem, target, failure.state, attempt.motion)
+            reached, ends, increment = target, (*ends, end), 2.0 * increment
             if reached == 1.0:
                 break
         elif is_first or failure.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
@@ -220,8 +230,8 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
         else:
             increment = 0.5 * (target - reached)
     words = failure.message
-    if failure.is_converged and n_increments > 1:
-        words += f" The jump to this load stalled; {n_increments} increments in its place led there."
+    if failure.is_converged and len(ends) > 1:
+        words += f" The jump to this load stalled; {len(ends)} increments in its place led there."
     elif not is_first and failure.status in _UNDECIDED:
         bound = "" if problem.law.is_frictionless else ", but friction may give way before that does"
         words = (
@@ -230,7 +240,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
             f"ended {failure.status.name.lower().replace('_', ' ')}: {words}"
         )
         failure = replace(failure, status=Status.LOAD_NOT_REACHED)
-    return ReachedStep(attempt.problem, replace(failure, message=words), end, work, n_increments)
+    return ReachedStep(path, attempt.problem, replace(failure, message=words), ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,10 +309,27 @@ class _Recorder:
         if problem.n_contact:
             result = solve(problem, solver, start=start, throw=False, callback=told)
         else:
+            from bemkit.model.untouched_body import certified
+
             result = certified(problem.body, told)
         history = (*records, *(following(record) for record in result.history))
         steps = history[-1].step if history else 0
         return replace(result, history=history, steps=steps, linear_solves=spent + result.linear_solves)
+
+
+def _acting(
+    model: StepModel, before: StepModel | None, share: float, state: ContactState
+) -> tuple[FloatArray, FloatArray]:
+    """Return what acts at a share of the way from the loads of a step before; it is affine in the loads."""
+    forces, displacements = model.acting(state)
+    if before is None:
+        return forces, displacements
+    of_before = before.acting(state)
+    return (1.0 - share) * of_before[0] + share * forces, (1.0 - share) * of_before[1] + share * displacements
+
+
+def _nothing() -> tuple[FloatArray, FloatArray]:
+    return np.zeros(1), np.zeros(1)
 
 
 def _no_state(n_contact: int) -> ContactState:

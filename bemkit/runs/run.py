@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, overload
 from bemkit.contact.solvability import find_unsolvable_load
 from bemkit.errors import BemkitError, InputError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.model.free_motion import describe
 from bemkit.model.solved_contact import with_energy_checked
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage
@@ -19,14 +18,13 @@ from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import with_times
 from bemkit.runs.history import ONE_BODY, run_history, run_on_mesh, solution_of
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
 from bemkit.solvers.base import StepRecord
-from bemkit.solvers.multistart import probe
 
 if TYPE_CHECKING:
     from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.scene.assembly import Assembly
 
 
 _COARSEST, _RATIO = 1024, 16
@@ -92,7 +90,7 @@ def run(
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
-    if isinstance(scene, Assembly):
+    if not isinstance(scene, Scene):
         return _run_assembly(scene, mesh, start, callback, executor)
     if executor is not None:
         raise InputError(
@@ -116,16 +114,16 @@ def _gain_by_cascade(scene: Scene) -> int:
     That pays where a contact step costs about as much as all the rest: of periodic half-planes, which have no matrices,
     and of large bodies on compressed equations.
     """
-    n_elements, outline = scene.mesh.n_elements, scene.shape.outline()
-    surface, least = outline.surface, few_on(outline)
-    if scene.n_steps > 1 or not scene.contact_parts:
+    outline = scene.shape.outline()
+    if outline.surface is not None and not outline.surface.is_periodic:
         return 0
-    if surface is not None and surface.is_periodic:
-        return 2 if n_elements >= 2 * _COARSEST else 0
-    if n_elements < _RATIO * max(_COARSEST, least) or surface is not None:
+    ratio, least = (_RATIO, few_on(outline)) if outline.surface is None else (2, 0)
+    if scene.mesh.n_elements < ratio * max(_COARSEST, least) or scene.n_steps > 1 or not scene.contact_parts:
         return 0
+    if outline.surface is not None:
+        return ratio
     smaller = replace(scene, mesh=replace(scene.mesh, elements=max(_LARGE, least)))
-    return _RATIO if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
+    return ratio if make_plan(smaller, smaller.build_mesh()).is_compressed else 0
 
 
 def _run_assembly(
@@ -152,7 +150,7 @@ def run_steps(
 ) -> Sequence[Solution] | Sequence[AssemblySolution]:
     """Solve scenes, or assemblies, that follow each other in time; see `run_history` and `run_assembly_history`."""
     solve: Callable[..., Any] = run_history
-    if isinstance(scenes[0], Assembly):
+    if not isinstance(scenes[0], Scene):
         from bemkit.runs.assembly import run_assembly_history
 
         solve = run_assembly_history
@@ -190,12 +188,14 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
         raise NoContactError("no part is in contact: the solution is the only one, which run returns")
     if scene.n_steps > 1:
         raise LoadHistoryError(f"a load history of {scene.n_steps} steps cannot be probed: give one load")
+    from bemkit.solvers.multistart import probe
+
     (prepared,), plan, clock = ONE_BODY.planned(load_steps(scene), mesh)
     with blas_threads_for(prepared.largest_matrix):
         model, clock = ONE_BODY.built(prepared, clock)
         load = find_unsolvable_load(model.problem)
         if load is not None:
-            raise UnsolvableSceneError(describe(model.prepared, load))
+            raise UnsolvableSceneError(ONE_BODY.explained(model, load))
         clock = clock.closed(Stage.CONDENSE)
         found = [with_energy_checked(model, result) for result in probe(model.problem, scene.solver, n_starts=n_starts)]
         clock = clock.closed(Stage.SOLVE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
@@ -13,17 +13,19 @@ from bemkit.errors import InputError
 from bemkit.operators.linear.threads import blas_threads_for
 from bemkit.operators.stopwatch import Stage, StageClock, assembly_time
 from bemkit.plan import Plan, announce_plan, check_memory
-from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.load_history import LoadHistory, LoadStep
-from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import following
 from bemkit.runs.load_path import Callback, Path, ReachedStep, Standing, reach
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.load_history import AnyScene, load_steps
-from bemkit.scene.scene import Scene
 from bemkit.solvers.base import ContactSolution, Status, solve
 
-AnySolution = TypeVar("AnySolution", Solution, AssemblySolution)
+if TYPE_CHECKING:
+    from bemkit.results.assembly_solution import AssemblySolution
+    from bemkit.results.solution import Solution
+    from bemkit.scene.assembly import Assembly
+    from bemkit.scene.scene import Scene
+
+AnySolution = TypeVar("AnySolution", "Solution", "AssemblySolution")
 AnyModel = TypeVar("AnyModel", bound=Any)
 
 
@@ -278,7 +280,7 @@ def _loading(
         work = replace(work, external_work=change + work.dissipation + work.increment_work)
     step = LoadStep(
         work=work,
-        n_increments=reached.n_increments,
+        n_increments=len(reached.ends),
         linear_solves=solution.linear_solves,
         end=solution,
         state=end.state,

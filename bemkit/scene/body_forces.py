@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import ScalarField, check_field, evaluate_field
-from bemkit.geometry.placement import Placement
+
+if TYPE_CHECKING:
+    from bemkit.geometry.placement import Placement
 
 
 @dataclass(frozen=True)

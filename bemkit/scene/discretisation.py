@@ -15,15 +15,9 @@ from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.neighbours import break_nodes
 from bemkit.geometry.spaces import LARGEST_DEGREE, BoundarySpace, ConstantSpace, LagrangeSpace, check_degree
-from bemkit.operators.linear.solvers import (
-    ChosenLinearSolver,
-    DenseCholesky,
-    Hierarchical,
-    LinearSolver,
-    MatrixFree,
-)
+from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky, Hierarchical, LinearSolver, MatrixFree
 from bemkit.operators.material import Material
-from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity, SteklovPoincare
+from bemkit.operators.steklov_poincare import SteklovPoincare
 from bemkit.operators.steklov_poincare.needs import BodyCase, BodyNeeds, collocation_needs, galerkin_needs
 from bemkit.scene.mesh_options import thinness_warnings
 
@@ -150,6 +144,8 @@ class SymmetricGalerkin(Discretisation, Protocol):
             from bemkit.operators.half_plane.maps import half_plane_map
 
             return half_plane_map(mesh, material)
+        from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
+
         displacements, tractions = self.displacement_space(mesh), self.traction_space(mesh)
         return GalerkinElasticity(mesh, material, displacements, tractions, linear_solver)
 
@@ -367,6 +363,8 @@ class ConstantCollocation(Discretisation):
 
     def elastic_map(self, mesh: BoundaryMesh, material: Material, linear_solver: LinearSolver) -> SteklovPoincare:
         """Return the collocation map, which has a linear solver of its own."""
+        from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+
         return CollocationElasticity(mesh, material, slopes=self.slopes)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:

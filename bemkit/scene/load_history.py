@@ -11,22 +11,23 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from bemkit.arrays import FloatArray
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, ExpressionError, ScalarField
-from bemkit.scene.assembly import Assembly
-from bemkit.scene.body import Body
 from bemkit.scene.body_forces import scaled_body_force
 from bemkit.scene.conditions import with_fields
-from bemkit.scene.places import Place, with_value
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Step, TimeValue
 
+if TYPE_CHECKING:
+    from bemkit.scene.assembly import Assembly
+    from bemkit.scene.body import Body
+
 _TIME, _COORDINATES = re.compile(r"\bt\b"), re.compile(r"\b[xy]\b")
 
-AnyScene = TypeVar("AnyScene", Scene, Assembly)
+AnyScene = TypeVar("AnyScene", "Scene", "Assembly")
 
 
 def load_steps(scene: AnyScene) -> tuple[AnyScene, ...]:
@@ -97,6 +98,8 @@ def with_changed_steps(scene: AnyScene, change: Callable[[AnyScene], AnyScene]) 
 
 def _at_time(scene: AnyScene, changes: Mapping[str, Any], factor: TimeValue, time: float) -> AnyScene:
     """Return a scene at a time of its history, under the changes that hold there."""
+    from bemkit.scene.places import Place, with_value
+
     for place, value in changes.items():
         scene = with_value(scene, Place(place), _value(value, time))
     scaled = _value(factor, time)
@@ -133,7 +136,7 @@ def with_scaled_loads(scene: AnyScene, factor: float) -> AnyScene:
     """
     if factor == 1.0 and scene.load_factors == (1.0,):
         return scene
-    if isinstance(scene, Assembly):
+    if not isinstance(scene, Scene):
         known: dict[int, Any] = {}
         bodies = tuple(replace(body, **_scaled(body, factor, known)) for body in scene.bodies)
         rigid = tuple(body.scaled(factor) for body in scene.rigid)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
@@ -10,6 +10,11 @@ from typing import Any
 
 from bemkit.errors import InputError
 from bemkit.formulas import closest, shorten
+
+
+def reference_of(declared: object) -> str:
+    """Return where a class stands, as ``"module:Class"``; of another declared type what is no place of a class."""
+    return f"{getattr(declared, '__module__', '')}:{getattr(declared, '__qualname__', '')}"
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class Registry:
         A word, a key and a value of that key that together name another word.
     retired : mapping of str to str, optional
         Words of former versions, and what to take instead.
+    protocol : str, optional
+        The protocol that the classes fulfil, as ``"module:Class"``; none if they are all alternatives there are.
     """
 
     role: str
@@ -35,6 +42,12 @@ class Registry:
     group: str = ""
     variants: Mapping[tuple[str, str, str], str] = field(default_factory=dict, repr=False)
     retired: Mapping[str, str] = field(default_factory=dict, repr=False)
+    protocol: str = ""
+
+    def holds(self, alternatives: Iterable[object]) -> bool:
+        """Whether a type declared by these alternatives stands for the role: its protocol, or several classes."""
+        names = {reference_of(each) for each in alternatives}
+        return names <= {self.protocol, *self.built_in.values()} and (self.protocol in names or len(names) > 1)
 
     def without_variant(self, table: Mapping[str, Any]) -> dict[str, Any]:
         """Return a table whose kind is the word that its kind and another key name together."""
@@ -79,7 +92,7 @@ class Registry:
         ValueError
             If the class has no word, so that it cannot be written to a scene file.
         """
-        name = f"{type(value).__module__}:{type(value).__qualname__}"
+        name = reference_of(type(value))
         for kind, reference in self.built_in.items():
             if reference == name:
                 return kind
@@ -126,6 +139,7 @@ SHAPES = Registry(
         "drawing": "bemkit.geometry.files.shape_file:DrawingFile",
     },
     "bemkit.shapes",
+    protocol="bemkit.geometry.shapes:Shape",
 )
 
 FILE_KINDS = ("mesh", "drawing")
@@ -139,6 +153,7 @@ SIDES = Registry(
         "spline": "bemkit.geometry.drawn:SplineTo",
         "nurbs": "bemkit.geometry.drawn:NurbsTo",
     },
+    protocol="bemkit.geometry.drawn:DrawnSide",
 )
 
 GRADINGS = Registry(
@@ -148,6 +163,7 @@ GRADINGS = Registry(
         "algebraic": "bemkit.geometry.meshing.discretise:Algebraic",
         "geometric": "bemkit.geometry.meshing.discretise:Geometric",
     },
+    protocol="bemkit.geometry.meshing.discretise:Grading",
 )
 
 CONDITIONS = Registry(
@@ -170,6 +186,7 @@ COPIES = Registry(
         "circle": "bemkit.scene.copies:CircleCopies",
         "list": "bemkit.scene.copies:ListedCopies",
     },
+    protocol="bemkit.scene.copies:Copies",
 )
 
 BODY_FORCES = Registry(
@@ -195,6 +212,7 @@ OBSTACLES = Registry(
         "self-affine": "bemkit.contact.rough_profile:SelfAffineProfile",
     },
     "bemkit.obstacles",
+    protocol="bemkit.contact.obstacle:Obstacle",
 )
 
 LAWS = Registry(
@@ -208,6 +226,7 @@ LAWS = Registry(
         "rate-strengthening": "bemkit.contact.further_laws:RateStrengthening",
     },
     "bemkit.laws",
+    protocol="bemkit.contact.laws:FrictionLaw",
 )
 
 DISCRETISATIONS = Registry(
@@ -221,6 +240,7 @@ DISCRETISATIONS = Registry(
     },
     "bemkit.discretisations",
     {("galerkin", "degree", "hp"): "hp"},
+    protocol="bemkit.scene.discretisation:Discretisation",
 )
 
 LINEAR_SOLVERS = Registry(
@@ -234,6 +254,7 @@ LINEAR_SOLVERS = Registry(
     retired={
         "krylov": "take 'hierarchical', faster and smaller for constant, linear and quadratic elements, or 'automatic'"
     },
+    protocol="bemkit.operators.linear.solvers:LinearSolver",
 )
 
 SOLVERS = Registry(
@@ -245,4 +266,17 @@ SOLVERS = Registry(
         "lemke": "bemkit.testing.lemke:LemkePivoting",
     },
     "bemkit.solvers",
+    protocol="bemkit.solvers.base:ContactSolver",
 )
+
+REGISTRIES = (
+    *(SHAPES, SIDES, GRADINGS, CONDITIONS, COPIES, BODY_FORCES),
+    *(OBSTACLES, LAWS, DISCRETISATIONS, LINEAR_SOLVERS, SOLVERS),
+)
+
+HEADINGS = {
+    "bemkit.scene.conditions:Part": "parts",
+    "bemkit.scene.body:Body": "bodies",
+    "bemkit.scene.plane_motion:RigidBody": "rigid",
+}
+"""Classes of which several stand in tables headed by their names, and the word before the name."""

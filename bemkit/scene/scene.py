@@ -17,7 +17,6 @@ from bemkit.contact.laws import FrictionLaw, Frictionless
 from bemkit.contact.problem import LawError
 from bemkit.errors import InputError
 from bemkit.formulas import choices
-from bemkit.geometry.drawn import drawn_shape
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.outline import Outline, Selection
 from bemkit.geometry.shapes import Shape
@@ -30,7 +29,6 @@ from bemkit.scene.discretisation import Discretisation, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
 from bemkit.scene.plane_motion import FarField
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
-from bemkit.scene.symmetry import check_symmetry
 from bemkit.scene.unit_names import UnitNames, check_length_of_file
 from bemkit.solvers.base import ContactSolver
 from bemkit.solvers.ssn import SemismoothNewton
@@ -123,8 +121,8 @@ class Scene(Stated):
         outline = self.shape.outline()
         if outline.surface is not None or self.far is not None:
             _check_half_plane(outline, self.far, self.discretisation, self.mesh, self.parts)
-        if self.units is not None and (drawn := drawn_shape(self.shape)):
-            check_length_of_file(drawn.unit, self.units)
+        if self.units is not None and outline.drawing is not None:
+            check_length_of_file(outline.drawing.unit, self.units)
         if self.body_forces and outline.is_exterior:
             raise InputError(
                 f"body_forces is {self.body_forces!r}, but the body has no end: nothing holds its infinite weight, and "
@@ -220,6 +218,8 @@ class Scene(Stated):
         outline, layers = self.shape.outline(), self.takes_layers
         mesh = self.mesh.divide(outline, self.selections, names, self.symmetry, takes_layers=layers)
         if self.symmetry is not None:
+            from bemkit.scene.symmetry import check_symmetry
+
             check_symmetry(self, mesh)
         return mesh
 

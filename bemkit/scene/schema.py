@@ -21,7 +21,7 @@ from bemkit.formulas import Expression
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.registry import Registry
 from bemkit.scene.scene import Scene
-from bemkit.scene.serialisation import NAMED, options_of, registry_of, unstructure
+from bemkit.scene.serialisation import heading_of, options_of, registry_of, unstructure
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 Schema = dict[str, Any]
@@ -77,10 +77,10 @@ class _Definitions:
 
     def of_type(self, declared: Any) -> Schema:
         """Return the schema of what may stand under a declared type."""
-        for listed, entry, _ in NAMED:
-            if declared == listed:
-                without_name = self._referred(entry.__name__, partial(self.table, entry, leave_out="name"))
-                return {"type": "object", "additionalProperties": without_name}
+        if heading_of(declared):
+            entry = get_args(declared)[0]
+            without_name = self._referred(entry.__name__, partial(self.table, entry, leave_out="name"))
+            return {"type": "object", "additionalProperties": without_name}
         registry = registry_of(declared)
         if registry is not None:
             return self._referred(_slug(registry.role), partial(self._kinds, registry))

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
-from functools import cache, partial
-from operator import eq
+from functools import cache
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -23,60 +22,11 @@ from cattrs.gen import make_dict_structure_fn
 
 from bemkit.arrays import FloatArray
 from bemkit.contact.laws import FrictionLaw
-from bemkit.contact.obstacle import Obstacle
 from bemkit.errors import InputError
 from bemkit.formulas import Expression, closest, shorten
-from bemkit.geometry.drawn import DrawnSide
-from bemkit.geometry.files.shape_file import ShapeFile
-from bemkit.geometry.meshing.discretise import Grading
-from bemkit.geometry.shapes import Shape
-from bemkit.operators.linear.solvers import LinearSolver, LinearSolverChoice
-from bemkit.scene.body import Body
-from bemkit.scene.body_forces import BodyForce
-from bemkit.scene.conditions import Condition, Part
-from bemkit.scene.copies import Copies
-from bemkit.scene.discretisation import Discretisation
-from bemkit.scene.explanations import explain
-from bemkit.scene.plane_motion import RigidBody
-from bemkit.scene.registry import (
-    BODY_FORCES,
-    CONDITIONS,
-    COPIES,
-    DISCRETISATIONS,
-    GRADINGS,
-    LAWS,
-    LINEAR_SOLVERS,
-    OBSTACLES,
-    SHAPES,
-    SIDES,
-    SOLVERS,
-    Registry,
-)
-from bemkit.solvers.base import ContactSolver
+from bemkit.scene.registry import HEADINGS, LAWS, REGISTRIES, Registry, reference_of
 
 T = TypeVar("T")
-
-_REGISTRIES: tuple[tuple[Any, Registry], ...] = (
-    (Shape, SHAPES),
-    (DrawnSide, SIDES),
-    (Grading, GRADINGS),
-    (Condition, CONDITIONS),
-    (Copies, COPIES),
-    (BodyForce, BODY_FORCES),
-    (Obstacle, OBSTACLES),
-    (FrictionLaw, LAWS),
-    (Discretisation, DISCRETISATIONS),
-    (LinearSolverChoice, LINEAR_SOLVERS),
-    (LinearSolver, LINEAR_SOLVERS),
-    (ContactSolver, SOLVERS),
-)
-
-NAMED: tuple[tuple[Any, type, str], ...] = (
-    (tuple[Part, ...], Part, "parts"),
-    (tuple[Body, ...], Body, "bodies"),
-    (tuple[RigidBody, ...], RigidBody, "rigid"),
-)
-"""Tuples whose entries stand in tables headed by their names."""
 
 
 class StructureError(InputError):
@@ -109,6 +59,8 @@ def structure(table: object, wanted: type[T]) -> T:
     except RecursionError:
         raise StructureError("nested too deeply: simplify it") from None
     except Exception as error:  # whatever a constructor raised, it rejects what the user wrote
+        from bemkit.scene.explanations import explain
+
         raise StructureError(explain(error)) from error
 
 
@@ -148,15 +100,20 @@ def unstructure(value: Any, declared: Any = None, path: str = "", *, keep_defaul
     if isinstance(value, Mapping):
         inner = get_args(declared)[1] if get_args(declared) else None
         return {key: unstructure(item, inner, f"{path}.{key}") for key, item in value.items()}
-    if isinstance(value, ShapeFile):  # texts hold what the file held, and need it no more
-        value = value.shape
     if is_dataclass(value):
-        return _unstructure_dataclass(value, declared, path, keep_defaults)
+        return _unstructure_dataclass(_without_file(value), declared, path, keep_defaults)
     if callable(value):
         raise UnstructureError(f"{path}: a Python function cannot be written to TOML: use Expression('...') instead")
     raise UnstructureError(
         f"{path}: {shorten(repr(value))} cannot be written to TOML: use numbers, texts or Expression"
     )
+
+
+def _without_file(value: Any) -> Any:
+    """Return what a file of a shape holds in its place: texts need it no more."""
+    from bemkit.geometry.files.shape_file import ShapeFile  # heavy, and only for what is written
+
+    return value.shape if isinstance(value, ShapeFile) else value
 
 
 def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: bool) -> Any:
@@ -166,7 +123,7 @@ def _unstructure_dataclass(value: Any, declared: Any, path: str, keep_defaults: 
         entry.name: unstructure(content, hints[entry.name], prefix + entry.name)
         for entry, content in _written_fields(value, keep_defaults)
     }
-    registry = registry_of(FrictionLaw if isinstance(value, FrictionLaw) else declared)
+    registry = LAWS if isinstance(value, FrictionLaw) else registry_of(declared)
     if registry is None:
         return table
     try:
@@ -211,16 +168,21 @@ def _converter() -> Converter:
     converter.register_structure_hook_factory(is_dataclass, lambda wanted: _table_hook(converter, wanted))
     add(lambda wanted: wanted is Expression, lambda value, _: Expression(value))
     add(lambda wanted: registry_of(wanted) is not None, lambda value, wanted: _tagged(converter, value, wanted))
-    for declared, entry, heading in NAMED:
-        add(partial(eq, declared), partial(_named, converter, entry, heading))
+    add(lambda wanted: bool(heading_of(wanted)), lambda value, wanted: _named(converter, value, wanted))
     return converter
 
 
 def registry_of(declared: Any) -> Registry | None:
     """Return the registry whose words name the classes that stand under a declared type, None if there is none."""
-    options = options_of(declared)
-    declared = options[0] if len(options) == 1 else declared
-    return next((registry for wanted, registry in _REGISTRIES if declared == wanted), None)
+    alternatives = options_of(declared) or (declared,)
+    return next((registry for registry in REGISTRIES if registry.holds(alternatives)), None)
+
+
+def heading_of(declared: Any) -> str:
+    """Return the word that heads the tables of the entries of a tuple, each by its name; empty if none does."""
+    inner = get_args(declared)
+    is_listed = get_origin(declared) is tuple and inner[1:] == (Ellipsis,)
+    return HEADINGS.get(reference_of(inner[0]), "") if is_listed else ""
 
 
 def _is_class(wanted: Any, parent: type) -> bool:
@@ -354,9 +316,11 @@ def _tagged(converter: Converter, value: object, wanted: Any) -> Any:
     return converter.structure({key: item for key, item in table.items() if key != "kind"}, found)
 
 
-def _named(converter: Converter, wanted: type, heading: str, value: object, _: Any) -> tuple[Any, ...]:
+def _named(converter: Converter, value: object, declared: Any) -> tuple[Any, ...]:
     found: list[Any] = []
-    written = f"[{heading}.NAME]" + (", in one of several bodies [bodies.BODY.parts.NAME]" if wanted is Part else "")
+    wanted, heading = get_args(declared)[0], heading_of(declared)
+    of_bodies = ", in one of several bodies [bodies.BODY.parts.NAME]" if heading == "parts" else ""
+    written = f"[{heading}.NAME]{of_bodies}"
     for name, options in _exactly(value, dict, f"a table of {heading}: write {written}").items():
         with _at(name):
             table = _exactly(options, dict, "a table of keys and values")

@@ -10,11 +10,10 @@ from dataclasses import fields, replace
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 from bemkit.errors import InputError, printable
 from bemkit.formulas import closest
-from bemkit.scene.assembly import Assembly
 from bemkit.scene.discretisation import Discretisation, Galerkin, HpGalerkin
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.mesh_options import MeshOptions
@@ -22,6 +21,9 @@ from bemkit.scene.registry import FILE_KINDS, SOLVERS
 from bemkit.scene.scene import Scene
 from bemkit.scene.serialisation import UnstructureError, structure, unstructure
 from bemkit.solvers.base import ContactSolver
+
+if TYPE_CHECKING:
+    from bemkit.scene.assembly import Assembly
 
 MAX_BYTES = 1_000_000
 
@@ -109,7 +111,7 @@ def load_single_body(source: str | Path) -> Scene:
 
 def single_body(scene: Scene | Assembly, name: str) -> Scene:
     """Return a scene, and refuse an assembly; the name is for the message."""
-    if isinstance(scene, Assembly):
+    if not isinstance(scene, Scene):
         raise SceneError(f"{name}: there are {len(scene.placed_bodies)} bodies: only scenes of one body can do this")
     return scene
 
@@ -152,12 +154,20 @@ def scene_from_table(table: dict[str, Any], folder: Path | None = None) -> Scene
     """
     table = _with_places_of_files(table, folder, "")
     try:
-        scene: Scene | Assembly = structure(table, Assembly) if "bodies" in table else structure(table, Scene)
+        scene = structure(table, _kind_of(table))
         if scene.steps:
             _ = load_steps(scene)  # whatever a step changes is checked
     except InputError as error:
         raise SceneError(printable(str(error))) from error
     return scene
+
+
+def _kind_of(table: dict[str, Any]) -> type[Scene | Assembly]:
+    if "bodies" not in table:
+        return Scene
+    from bemkit.scene.assembly import Assembly
+
+    return Assembly
 
 
 def _with_places_of_files(table: dict[str, Any], folder: Path | None, path: str) -> dict[str, Any]:
@@ -198,7 +208,7 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
         table = unstructure(scene, keep_defaults=True)
     except UnstructureError as error:
         raise SceneError(str(error)) from error
-    if isinstance(scene, Assembly):
+    if not isinstance(scene, Scene):
         for body in table["bodies"]:
             body["parts"] = _named(body.get("parts", []), _PART_KEYS)
         table["bodies"] = _named(table["bodies"], _BODY_KEYS)
@@ -212,7 +222,7 @@ def scene_to_toml(scene: Scene | Assembly) -> str:
     return tomli_w.dumps(_ordered(table, _SCENE_KEYS), multiline_strings=True)
 
 
-AnyScene = TypeVar("AnyScene", bound=Scene | Assembly)
+AnyScene = TypeVar("AnyScene", bound="Scene | Assembly")
 
 
 def with_overrides(
@@ -265,7 +275,7 @@ def with_overrides(
             changes["solver"] = structure(solver, cast(Any, ContactSolver))
         if rho is not None:
             changes["solver"] = _with_rho(changes.get("solver", scene.solver), rho)
-        if isinstance(scene, Assembly):
+        if not isinstance(scene, Scene):
             own: dict[str, Any] = {name: None for name in ("mesh", "discretisation") if name in changes}
             changes["bodies"] = tuple(replace(body, **own) for body in scene.bodies)
         return replace(scene, **changes)

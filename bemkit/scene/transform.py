@@ -143,7 +143,7 @@ class TransformedShape(CheckedShape):
             tuple(Side(side.name, _transformed_curve(side.curve, self.affine), side.group) for side in loop)
             for loop in outline.loops
         )
-        return Outline(loops, outline.is_exterior, outline.surface)
+        return Outline(loops, outline.is_exterior, outline.surface, outline.drawing)
 
 
 def transformed_scene(

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum, auto
+from typing import TYPE_CHECKING
 
 from bemkit.contact.problem import ContactProblem, ContactState
 from bemkit.solvers.active_sets import ActiveSets, ProjectionEquations, Residual
 from bemkit.solvers.base import Iterate, Status, check_count, check_max_steps, check_rho
-from bemkit.solvers.homotopy import AffineBound, follow_path, why_no_path
 from bemkit.solvers.newton import WEAKEST_AFTER, carried_on, merit, negligible, respond
+
+if TYPE_CHECKING:
+    from bemkit.solvers.homotopy import PathEnd
 
 PATH_MESSAGE, SPRINGS_MESSAGE = "path of", "springs of"
 """How the messages of steps begin that follow a path of solutions, and that hold all bodies by springs."""
@@ -261,6 +264,8 @@ class SemismoothNewton:
 
     def _rescued(self, problem: ContactProblem, iterate: NewtonIterate, status: Status, reason: str) -> NewtonIterate:
         """Return the iterate with the next more patient phase to come, or ended with `status` if there is none."""
+        from bemkit.solvers.homotopy import why_no_path
+
         hindrance = why_no_path(problem) if self.follows_path else ""
         # springs that have become weaker leave few nodes wrong, whose path is short even where responses are costly
         hindrance_if_short = why_no_path(problem, is_short=iterate.spring > 0.0)
@@ -276,11 +281,7 @@ class SemismoothNewton:
         return replace(iterate, ended=status, message="; ".join(filter(None, (reason, hindrance))))
 
     def _path_step(self, problem: ContactProblem, iterate: NewtonIterate) -> NewtonIterate:
-        bound = AffineBound.tangent(problem, iterate.state.sigma_n)
-        if iterate.phase is Phase.PATH:
-            end = follow_path(problem, bound)
-        else:
-            end = follow_path(problem, bound, iterate.sets, max_pieces=_few_pieces(problem))
+        end = _followed(problem, iterate.state, None if iterate.phase is Phase.PATH else iterate.sets)
         following = replace(iterate, linear_solves=iterate.linear_solves + end.linear_solves)
         if end.state is None:
             return self._rescued(problem, following, Status.STALLED, end.reason)
@@ -290,8 +291,7 @@ class SemismoothNewton:
         share = _WEAKER ** (iterate.n_in_phase + 1)
         weaker = replace(self._equations(problem), friction_share=share)
         residual, sets, linear_solves = _with_full_steps(weaker, problem.sticking_state)
-        bound = AffineBound.tangent(problem, residual.state.sigma_n)
-        end = follow_path(problem, bound, sets, max_pieces=_few_pieces(problem))
+        end = _followed(problem, residual.state, sets)
         following = replace(
             iterate,
             linear_solves=iterate.linear_solves + linear_solves + end.linear_solves,
@@ -361,6 +361,14 @@ def _sprung(problem: ContactProblem, iterate: NewtonIterate, reason: str) -> New
 
 def _few_pieces(problem: ContactProblem) -> int:
     return _COSTLY_PIECES if problem.body.is_costly else _FEW_PIECES + problem.n_contact // 8
+
+
+def _followed(problem: ContactProblem, state: ContactState, sets: ActiveSets | None) -> "PathEnd":
+    """Follow the path of solutions under the tangent of the law at a state; from given statuses a short way."""
+    from bemkit.solvers.homotopy import AffineBound, follow_path
+
+    most = None if sets is None else _few_pieces(problem)
+    return follow_path(problem, AffineBound.tangent(problem, state.sigma_n), sets, max_pieces=most)
 
 
 def _with_full_steps(equations: ProjectionEquations, start: ContactState) -> tuple[Residual, ActiveSets, int]:

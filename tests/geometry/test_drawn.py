@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bemkit.geometry.curves import Arc, Curve, is_analytic, reverse_curve
-from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo, drawn_shape
+from bemkit.geometry.drawn import ArcTo, DrawnSide, LineTo, Loop, NurbsTo, OutlineShape, SplineTo
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.meshing.discretise import discretise
 from bemkit.geometry.nurbs import Nurbs, clamped_knots, conic_arc
-from bemkit.geometry.outline import Selection
+from bemkit.geometry.outline import Drawing, Selection
 from bemkit.geometry.shapes import ExteriorOf, Rectangle
 from bemkit.testing.spaces import check_curve
 
@@ -111,8 +111,8 @@ def test_exterior_of_a_drawn_outline() -> None:
     shape = OutlineShape((Loop((0.0, 0.0), SQUARE),), ("as read",))
     exterior = ExteriorOf(shape)
     assert exterior.outline().is_exterior
-    assert drawn_shape(exterior) is shape
-    assert drawn_shape(Rectangle(1.0, 1.0)) is None
+    assert exterior.outline().drawing == Drawing(("as read",), "")
+    assert Rectangle(1.0, 1.0).outline().drawing is None
 
 
 def curve_of(side: DrawnSide) -> Curve:

@@ -12,7 +12,8 @@ import pytest
 import bemkit as bk
 from bemkit.model.contact_model import build_model
 from bemkit.model.prepared import prepare
-from bemkit.operators.steklov_poincare import CollocationElasticity, GalerkinElasticity
+from bemkit.operators.steklov_poincare.collocation import CollocationElasticity
+from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.runs.history import run_history
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.load_history import load_steps, with_scaled_loads

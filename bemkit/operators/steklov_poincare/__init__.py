@@ -1,6 +1,7 @@
 """Elasticity of a body seen from its boundary, from displacements to tractions, by Galerkin or by collocation.
 
-Scenes take `GalerkinElasticity` and `CollocationElasticity`; `maps` makes linear operators of scipy of them.
+Scenes take `galerkin.GalerkinElasticity` or `collocation.CollocationElasticity`; `maps` makes linear operators of scipy
+of them.
 
 On bounded bodies both maps hold their tractions in exact equilibrium of forces and moments, as the continuous map
 does. Discretisation alone would break it slightly, and with it the independence of the arbitrary constant in the
@@ -11,9 +12,6 @@ resultant F. The displacement then grows like F log(r / r0) with the distance r,
 diameter of the mesh, fixes its constant; without a resultant it vanishes at infinity, rotation included.
 """
 
-from bemkit.operators.steklov_poincare.collocation import CollocationElasticity as CollocationElasticity
-from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity as GalerkinElasticity
-from bemkit.operators.steklov_poincare.galerkin import GalerkinFactors as GalerkinFactors
 from bemkit.operators.steklov_poincare.nodal_conditions import TractionField as TractionField
 from bemkit.operators.steklov_poincare.protocol import CondensedMap as CondensedMap
 from bemkit.operators.steklov_poincare.protocol import SteklovPoincare as SteklovPoincare

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from bemkit.geometry.local_values import values_on_elements
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.material import Material
-from bemkit.operators.particular_solutions import ParticularSolution
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, integrate_traction
 from bemkit.operators.steklov_poincare.protocol import CondensedMap, SteklovPoincare
+
+if TYPE_CHECKING:
+    from bemkit.operators.particular_solutions import ParticularSolution
 
 _MORE_POINTS = 5
 

@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.compiled_sweep import why
 from bemkit.operators.counts import Entries, Factorisation, FactorKind, OperationCounts
 from bemkit.operators.integrals.pairs import Degrees
-from bemkit.operators.integrals.sweep import CHUNK_PAIRS, sweep_memory
 from bemkit.operators.linear.solvers import ChosenLinearSolver, DenseCholesky
 from bemkit.operators.linear.threads import n_threads
 from bemkit.operators.material import Material
@@ -156,6 +154,9 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     degree : int
         Of the displacements.
     """
+    from bemkit.operators.compiled_sweep import why
+    from bemkit.operators.integrals.sweep import sweep_memory
+
     t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained
     mesh = case.mesh
     assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
@@ -284,6 +285,8 @@ def _zero_columns(name: str, reason: str, n_columns: int, n_all: int) -> PlanIte
 
 def _pairs_in_chunks(mesh: BoundaryMesh) -> int:
     """Return how many element pairs are evaluated at the same time."""
+    from bemkit.operators.collocation.assembly import CHUNK_PAIRS
+
     n_pairs = mesh.n_elements * mesh.whole.n_elements
     return min(n_pairs, n_threads(n_pairs) * CHUNK_PAIRS)
 

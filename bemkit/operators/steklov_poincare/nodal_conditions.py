@@ -11,7 +11,6 @@ from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
-from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, dof_points
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
@@ -257,6 +256,8 @@ def _mirrors(space: BoundarySpace) -> list[Support]:
     """Return the supports that stand for symmetry lines: no displacement across them."""
     if space.mesh.symmetry is None:
         return []
+    from bemkit.geometry.reflection import antisymmetric_dofs
+
     held = antisymmetric_dofs(space).reshape(-1, 2)[space.element_dofs]
     elements = np.flatnonzero(held.any(axis=(1, 2)))
     if not elements.size:
