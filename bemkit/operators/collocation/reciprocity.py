@@ -39,9 +39,9 @@ class Reciprocity:
 
     Parameters
     ----------
-    on_traction : (n_loops, 2 n_elements) array [m^2/Pa]
-    on_displacement : (n_loops, 2 n_elements) array [m]
-    fields : (2 n_elements, n_loops) array
+    on_traction : (n_loops, 2 n_elements) array [m/Pa]
+    on_displacement : (n_loops, 2 n_elements) array [-]
+    fields : (2 n_elements, n_loops) array [-]
         The fields at the midpoints: errors of the displacement equation that make room for these equations. They are
         as smooth as the fields, so that elements at corners, however short, are not torn apart.
     """

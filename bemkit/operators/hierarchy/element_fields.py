@@ -36,9 +36,9 @@ class Constants:
     Parameters
     ----------
     single : float [1/Pa]
-        A / (2 pi) and so on: 1 / (8 pi mu (1 - nu)).
+        A = 1 / (8 pi mu (1 - nu)).
     double : float [-]
-        1 / (4 pi (1 - nu)).
+        B = 1 / (4 pi (1 - nu)).
     poisson_ratio : float [-]
         Of plane strain.
     log_length : float [m]

@@ -129,7 +129,7 @@ class GalerkinColumns:
 
     @cached_property
     def units(self) -> FloatArray:
-        """(n_places,) array [Pa, or 1 at nodes]: of the tractions, by which their equations are multiplied, too."""
+        """(n_places,) array [Pa/m, or 1 at nodes]: of the tractions, by which their equations are multiplied, too."""
         return np.where(self.is_node, 1.0, self.material.plane_modulus / self.lengths)
 
     @property
