@@ -228,7 +228,7 @@ class HierarchicalBody(LinearBody):
         points = dof_points(loaded.map.displacement_space)
         size = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
         of_contact = (fields.force - self.force) / loaded.map.weights[:, None]
-        at_nodes = np.einsum("nkc,nc->nk", self.conditions.frame, of_contact)[self.nodes.nodes]
+        at_nodes = self.conditions.in_frames(of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
         missing = float(np.abs(self.weights[:, None] * (state.traction - at_nodes)).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))

@@ -235,7 +235,7 @@ class MixedSystem:
             known, of_sweep = self._sweep(data)
             base, factor = _Solved(data, self._solution(data, known)), 1.0
             work = of_sweep + OperationCounts(right_hand_sides=1)
-        traction = np.einsum("nkc,nc->nk", self._conditions.frame, force).ravel() / self._weights
+        traction = self._conditions.in_frames(force).ravel() / self._weights
         loaded = _Loaded(self, base, factor * base.at_rest, traction, data.displacement.ravel())
         own, retained = self._weights[self._retained], self._retained
         load = own * (traction[retained] - loaded.at_rest[retained])
@@ -246,13 +246,12 @@ class MixedSystem:
 
     def displaced(self, retained: FloatArray, loaded: _Loaded) -> tuple[FloatArray, FloatArray]:
         """Return displacement and force (n_elements, 2) in x and y of all elements."""
-        frame, is_free = self._conditions.frame, self._conditions.is_free.ravel()
+        is_free = self._conditions.is_free.ravel()
         unknowns = loaded.at_rest + self._response @ retained
         local = np.where(is_free, unknowns, loaded.given)
         local[self._retained] = retained
         force = self._weights * np.where(is_free, loaded.traction, unknowns)
-        displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
-        return displacement, np.einsum("nkc,nk->nc", frame, force.reshape(-1, 2))
+        return self._conditions.in_plane(local), self._conditions.in_plane(force)
 
     def response(self, directions: IntArray) -> FloatArray:
         """Return the displacements (k, n_retained) of free directions under those of the retained ones."""

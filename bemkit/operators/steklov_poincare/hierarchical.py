@@ -95,7 +95,7 @@ class _Condensed:
         loaded, load = self.loaded, np.zeros(0)
         if loaded.retained.size:
             _, forces = self.recover(np.zeros(loaded.retained.size))
-            load = -np.einsum("nkc,nc->nk", loaded.conditions.frame, forces - loaded.force).ravel()[loaded.retained]
+            load = -loaded.conditions.in_frames(forces - loaded.force).ravel()[loaded.retained]
         return CondensedMap(self.stiffness, load, self.recover, self.under, self.follow)
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,8 +106,8 @@ class _Condensed:
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """See `CondensedMap`."""
         displacement, _ = self.recover(np.zeros(self.loaded.retained.size))
-        local = np.einsum("nkc,nc->nk", self.loaded.conditions.frame, displacement)
-        return self.loaded.responses(directions)[1], local.ravel()[directions]
+        at_rest = self.loaded.conditions.in_frames(displacement).ravel()[directions]
+        return self.loaded.responses(directions)[1], at_rest
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """See `CondensedMap`."""
@@ -215,7 +215,7 @@ class LoadedSystem:
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
         loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
         if conditions.later and isinstance(map.options, Hierarchical):
-            later = (loaded.under(given.displacement, given.force_in(conditions.frame)) for given in conditions.later)
+            later = (loaded.under(given.displacement, conditions.in_plane(given.force)) for given in conditions.later)
             system.expect(each.known.given for each in (loaded, *later))
         return loaded
 
@@ -243,8 +243,8 @@ class LoadedSystem:
         """Return the equations of what is left of the displacements beside a further rigid motion (n_motions,)."""
         other = replace(self, travel=self.travel + travel)
         conditions = self.conditions
-        motion = np.einsum("nkc,nc->nk", conditions.frame, other.motion)
-        traction = np.einsum("nkc,nc->nk", conditions.frame, self.force) / self.map.weights[:, None]
+        motion = conditions.in_frames(other.motion)
+        traction = conditions.in_frames(self.force) / self.map.weights[:, None]
         given = np.where(conditions.is_fixed, conditions.displacement - motion, 0.0)
         known = self.system.laws(NodeConditions.given(~conditions.is_free, traction, given))
         return replace(other, known=known)
@@ -290,8 +290,8 @@ class LoadedSystem:
         held = np.einsum("nkc,nk->nc", self.conditions.frame[elements], displacement[elements])
         travel = None if elements.size == 0 else self.travel_of(elements, held)
         loaded = self if travel is None else self.moved(travel)
-        motion = np.einsum("nkc,nc->nk", self.conditions.frame, loaded.motion)
-        traction = np.einsum("nkc,nc->nk", self.conditions.frame, self.force) / self.map.weights[:, None]
+        motion = self.conditions.in_frames(loaded.motion)
+        traction = self.conditions.in_frames(self.force) / self.map.weights[:, None]
         given = NodeConditions.given(
             ~self.conditions.is_free[elements], traction[elements], (displacement - motion)[elements]
         )

@@ -68,9 +68,8 @@ class SchurCondensation:
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
-        frame = self.conditions.frame
         prescribed = displacement.ravel()[self._fixed]
-        known = np.einsum("nkc,nc->nk", frame, force).ravel() - self._of_fixed @ prescribed
+        known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
         at_rest, pressure = self._held.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
         load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
         under_load = _Loaded(self, prescribed, at_rest, pressure)
@@ -86,7 +85,7 @@ class SchurCondensation:
         local = np.empty(len(self.matrix))
         local[self._fixed], local[self._retained] = prescribed, retained
         local[self._free] = at_rest + self._response @ retained
-        displacement = np.einsum("nkc,nk->nc", self.conditions.frame, local.reshape(-1, 2))
+        displacement = self.conditions.in_plane(local)
         force = self.matrix @ displacement.ravel()
         force += self.volume.change @ (pressure + self._pressures @ retained)
         return displacement, force.reshape(-1, 2)
