@@ -12,7 +12,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.columns import Columns
-from bemkit.operators.hierarchy.proxies import Discs, extents, n_proxies
+from bemkit.operators.hierarchy.proxies import discs_of, extents, n_proxies
 from bemkit.operators.hierarchy.skeletons import CollocationView, LevelView, Skeleton
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
@@ -68,7 +68,7 @@ class Compression:
         extent = extents(columns)
         levels: list[tuple[Skeleton, ...]] = []
         for level in range(tree.n_levels):
-            discs = Discs.of(columns, tree, level)
+            discs = discs_of(columns, tree, level)
             view = (view_of or CollocationView)(
                 columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0
             )
