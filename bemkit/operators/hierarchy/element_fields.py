@@ -22,7 +22,6 @@ from typing import TypeVar
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.series import FAR, REST, SERIES
 from bemkit.operators.material import Material
 
@@ -81,9 +80,6 @@ def element_fields(
     -----
     p is a constant traction, v a constant displacement and s its slope by the coordinate t, from -1 to 1.
     """
-    if (fast := compiled.functions()) is not None:
-        values: ComplexArray = fast.element_fields(constants.numbers, x, places, start, end)
-        return values
     near = _Near(x, start, end, places)
     half = 0.5 * np.abs(end - start)
     tangent = (end - start) / (2.0 * half)
