@@ -12,11 +12,10 @@ from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, fields_of
 from bemkit.operators.hierarchy.compact_laws import CompactLaws
-from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_for_two
 from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.gmres import SingleArray, gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
@@ -136,8 +135,7 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def laws(self, conditions: NodeConditions) -> CompactLaws:  # type: ignore[override]  # what `state` takes
         """Return what conditions on all elements make of their tractions and displacements, in their frames."""
-        of_all = conditions.on_traction, conditions.on_displacement, conditions.value
-        parts = (self._solved(NodeConditions(*(of[some] for of in of_all))) for some in self._elements.chunks())
+        parts = (conditions.take(some).solved(self._unit) for some in self._elements.chunks())
         return CompactLaws.joined([CompactLaws.of(each) for each in parts])
 
     def state(self, known: CompactLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:  # type: ignore[override]
@@ -151,7 +149,7 @@ class MatrixFreeSystem(HierarchicalSystem):
             If the steps do not suffice.
         """
         self._n_answers += 1
-        laws, before = known.replaced(elements, self._solved(conditions)), self._laws
+        laws, before = known.replaced(elements, conditions.solved(self._unit)), self._laws
         if before is None or not laws.has_factors_of(before):
             self._begin_with(laws)
             self._inverse = None  # before another is made
@@ -173,14 +171,6 @@ class MatrixFreeSystem(HierarchicalSystem):
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
         t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
         return self._left(t, u, self._x[2 * self._n_elements :])[0][elements]
-
-    def _solved(self, conditions: NodeConditions) -> SolvedConditions:
-        """Return what conditions make of tractions and displacements in the frames of their elements."""
-        of = conditions.on_traction, conditions.on_displacement, conditions.value
-        solved = solve_for_two(*of, self._unit)
-        if not solved.is_determined.all():
-            raise UndeterminedError("the two conditions at a contact node are not independent")
-        return solved
 
     def _units(self, laws: CompactLaws, elements: IntArray) -> FloatArray:
         """Return the units (n, 2) of the unknowns of some elements in the iteration."""

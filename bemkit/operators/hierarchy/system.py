@@ -9,8 +9,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.element_laws import solve_conditions
-from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.element_laws import ElementLaws, SolvedConditions, solve_for_two
+from bemkit.operators.hierarchy.factor import Border, HierarchicalFactor
 from bemkit.operators.linear.dense import SingularMatrixError
 
 
@@ -44,6 +44,23 @@ class NodeConditions:
         known = np.einsum("nrk,nk->nr", self.on_traction, traction)
         known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
         return replace(self, value=self.value - known)
+
+    def take(self, elements: IntArray) -> NodeConditions:
+        """Return those at some of the elements."""
+        return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
+
+    def solved(self, displacement_unit: float) -> SolvedConditions:
+        """Return what they make of tractions and displacements, in the frames of the elements; see `solve_for_two`.
+
+        Raises
+        ------
+        UndeterminedError
+            If the two conditions at an element are not independent.
+        """
+        solved = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
+        if not solved.is_determined.all():
+            raise UndeterminedError("the two conditions at a contact node are not independent")
+        return solved
 
 
 class UndeterminedError(SingularMatrixError):
@@ -119,7 +136,7 @@ class HierarchicalSystem:
         """
         factors, given = known.factors, known.given
         places = self._place[elements]
-        local = self.local_laws(conditions)
+        local = conditions.solved(self._unit).in_full()
         if elements.size:
             own = turned(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
@@ -199,16 +216,7 @@ class HierarchicalSystem:
         n_holes = self._order.size - self.n_elements
         free = NodeConditions.given(np.ones((n_holes, 2), bool), *np.zeros((2, n_holes, 2)))
         every = NodeConditions(*map(np.concatenate, zip(vars(conditions).values(), vars(free).values(), strict=True)))
-        return turned(self.local_laws(every), self._frame).take(self._order)
-
-    def local_laws(self, conditions: NodeConditions) -> ElementLaws:
-        """Return what conditions make of tractions and displacements, in the frames of their elements."""
-        factors, given, is_determined = solve_conditions(
-            conditions.on_traction, conditions.on_displacement, conditions.value, self._unit
-        )
-        if not is_determined.all():
-            raise UndeterminedError("the two conditions at a contact node are not independent")
-        return ElementLaws(factors, given)
+        return turned(every.solved(self._unit).in_full(), self._frame).take(self._order)
 
     def _states(self) -> FloatArray:
         """Return (t_x, t_y, u_x, u_y) at all places under the conditions of the last `state`."""

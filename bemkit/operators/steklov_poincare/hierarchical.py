@@ -12,7 +12,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.collocation_system import collocation_system
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
