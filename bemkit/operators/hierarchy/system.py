@@ -182,15 +182,12 @@ class HierarchicalSystem:
 
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        state = np.empty((self._order.size, 4))
-        state[self._order] = self._states()
-        return state[: self.n_elements, :2], state[: self.n_elements, 2:]
+        state = self._states()[self._place[: self.n_elements]]
+        return state[:, :2], state[:, 2:]
 
     def beyond(self) -> FloatArray:
         """Return the tractions (n, 2), in x and y, at the places beyond the elements, under the same conditions."""
-        state = np.empty((self._order.size, 4))
-        state[self._order] = self._states()
-        return state[self.n_elements :, :2]
+        return self._states()[self._place[self.n_elements :], :2]
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements, nothing compressed, as displacements.
