@@ -11,7 +11,6 @@ import pytest
 
 from bemkit.arrays import ComplexArray, IntArray
 from bemkit.geometry import BoundaryMesh, PlateWithHole, Rectangle, Symmetry, discretise
-from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
 from bemkit.operators.hierarchy.curved_elements import CurvedElements
@@ -20,6 +19,7 @@ from bemkit.operators.hierarchy.folded_columns import boundary_columns
 from bemkit.operators.hierarchy.proxies import point_forces
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.material import Material
+from tests.operators.collocation_matrices import collocation_matrices
 
 MATERIAL = Material(2.0, 0.3)
 
