@@ -58,6 +58,7 @@ class BoundaryColumns:
     slopes: ComplexArray | None
     means: ComplexArray | None
     curved: CurvedElements | None = None
+    is_symmetric = False
 
     @classmethod
     def of(
@@ -116,11 +117,6 @@ class BoundaryColumns:
     def reach(self) -> IntArray:
         """(k, n_elements) places on which each element acts: itself, and with slopes its neighbours."""
         return self.neighbours[1:2] if self.slopes is None else self.neighbours
-
-    @property
-    def is_symmetric(self) -> bool:
-        """False."""
-        return False
 
     @property
     def sizes(self) -> FloatArray:
@@ -189,7 +185,15 @@ class BoundaryColumns:
         traction, displacement : (n_elements, 2) arrays
             By place.
         """
-        result = self.layers(places, np.arange(self.start.size), self.densities(traction, displacement))
+        x, densities = self.centre[places], self.densities(traction, displacement)
+        if self.curved is None and (fast := compiled.functions()) is not None:
+            result: ComplexArray = fast.applied(self.constants.numbers, x, places, self.start, self.end, *densities)
+        else:
+            result = np.zeros(x.size, complex)
+            every, step = np.arange(self.start.size), max(1, _PAIRS // max(places.size, 1))
+            for elements in (every[begin : begin + step] for begin in range(0, every.size, step)):
+                fields = self._element_fields(x, places, elements)
+                result += caused(fields, *(each[elements] for each in densities))
         return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[places]
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
@@ -202,30 +206,6 @@ class BoundaryColumns:
             mean += self.means[k] * u[places]
             slope += self.slopes[k] * u[places]
         return t, mean, slope
-
-    def layers(self, places: IntArray, elements: IntArray, densities: Densities) -> ComplexArray:
-        """Return T u - U t, complex (n,), in the middle of some elements, as caused by other ones.
-
-        Parameters
-        ----------
-        places : (n,) array
-        elements : (m,) array
-            Ascending.
-        densities : tuple of (n_elements,) complex arrays
-            As `densities` returns them.
-        """
-        x = self.centre[places]
-        t, u, s = (each[elements] for each in densities)
-        if self.curved is None and (fast := compiled.functions()) is not None:
-            ends = self.start[elements], self.end[elements]
-            values: ComplexArray = fast.applied(self.constants.numbers, x, counted(places, elements), *ends, t, u, s)
-            return values
-        result = np.zeros(x.size, complex)
-        step = max(1, _PAIRS // max(places.size, 1))
-        for begin in range(0, t.size, step):
-            some = slice(begin, begin + step)
-            result += caused(self._element_fields(x, places, elements[some]), t[some], u[some], s[some])
-        return result
 
     def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
         """Return complex displacements (n_points, n_columns)."""

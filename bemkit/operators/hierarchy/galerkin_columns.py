@@ -82,6 +82,7 @@ class GalerkinColumns:
     mass: csr_array
     proxy_rule: Rule
     at_proxies: csr_array
+    is_symmetric = True
 
     @classmethod
     def of(
@@ -111,11 +112,6 @@ class GalerkinColumns:
             Rule.of(panels, (_PROXY_POINTS,), degree),
             at_points(spaces, panels, _PROXY_POINTS)[order],
         )
-
-    @property
-    def is_symmetric(self) -> bool:
-        """True."""
-        return True
 
     @property
     def n_elements(self) -> int:
