@@ -93,8 +93,7 @@ class BoundaryColumns:
         slopes = means = None
         if takes_slopes:
             of = GradientReconstruction.of(mesh, panels)
-            slopes = np.stack([each[order] for each in (of.before, of.own, of.after)])
-            means = np.stack([each[order] for each in (of.mean_before, of.mean_own, of.mean_after)])
+            slopes, means = np.take(of.slopes, order, axis=1), np.take(of.means, order, axis=1)
         return cls(
             Constants.of(material, log_length),
             order,

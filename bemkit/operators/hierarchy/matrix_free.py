@@ -10,7 +10,7 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, fields_of
+from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, reciprocal_fields
 from bemkit.operators.hierarchy.compact_laws import CompactLaws
 from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
@@ -50,7 +50,9 @@ class WholeBoundary:
     @classmethod
     def of(cls, elements: StraightElements, material: Material) -> WholeBoundary:
         """Return those of a mesh."""
-        return cls(elements, material, fields_of(elements.mesh))
+        loops = zip(elements.mesh.loops, elements.mesh.loop_areas, strict=True)
+        fields = [field for loop, area in loops for field in reciprocal_fields(elements.mesh, loop, area)]
+        return cls(elements, material, fields)
 
     @property
     def n_unknowns(self) -> int:
