@@ -25,8 +25,6 @@ _ROUND_OFF = 1e-10
 class HalfPlaneElasticity(SurfaceElasticity):
     """Elasticity of a half-plane seen from a strip of its surface; see `SurfaceElasticity`.
 
-    Its flexibility, (n_dofs, n_dofs) [1/Pa], takes forces to displacements, in x and y; see `strip_flexibility`.
-
     Parameters
     ----------
     kept : dict
@@ -35,7 +33,9 @@ class HalfPlaneElasticity(SurfaceElasticity):
 
     kept: dict[str, _Condensation] = field(default_factory=dict, repr=False)
 
-    def _flexibility(self) -> FloatArray:
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """(n_dofs, n_dofs) array [1/Pa] from forces to displacements, in x and y; see `strip_flexibility`."""
         return strip_flexibility(self.mesh, self.material)
 
     def strain_displacement(self, force: FloatArray) -> FloatArray:
