@@ -211,17 +211,18 @@ class BoundaryColumns:
         elements, number = np.unique(columns // 4, return_inverse=True)
         touched = elements if self.slopes is None else np.unique(self.neighbours[:, elements])
         fields = self._element_fields(x, places, touched)
-        own = np.searchsorted(touched, elements)
+        own, about = np.searchsorted(touched, elements), (elements, touched)
         kind, is_along_x = (columns // 2) % 2, columns % 2 == 0
         result = np.empty((x.size, columns.size), complex)
         for of_kind in (0, 1):
             if not np.any(kind == of_kind):
                 continue
-            on, on_conjugate = (
-                (-fields[0][:, own], -fields[1][:, own]) if of_kind == 0 else self._moved(fields, elements, touched)
-            )
-            if of_kind == 1:
-                on = on + 0.5 * (places[:, None] == elements)
+            if of_kind == 0:
+                on, on_conjugate = -fields[0][:, own], -fields[1][:, own]
+            else:
+                on = self.of_displacements(*about, fields[2], fields[4], is_conjugate=False)
+                on += 0.5 * (places[:, None] == elements)
+                on_conjugate = self.of_displacements(*about, fields[3], fields[5], is_conjugate=True)
             for along_x, field in ((True, on + on_conjugate), (False, 1j * (on - on_conjugate))):
                 chosen = (kind == of_kind) & (is_along_x == along_x)
                 result[:, chosen] = field[:, number[chosen]]
@@ -233,19 +234,23 @@ class BoundaryColumns:
             return self.curved.fields(x, places, elements)
         return element_fields(self.constants, x, counted(places, elements), self.start[elements], self.end[elements])
 
-    def _moved(self, fields: ComplexArray, elements: IntArray, touched: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the factors of displacements of elements and of their conjugates, with slopes."""
-        own = np.searchsorted(touched, elements)
-        total, total_conjugate = fields[2][:, own], fields[3][:, own]
+    def of_displacements(
+        self, elements: IntArray, touched: IntArray, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool
+    ) -> ComplexArray:
+        """Return the factors (..., n) of the displacements of elements, or of their conjugates, with slopes.
+
+        From those of the constant parts and slopes, (..., m), on all elements on which these act, `touched`, ascending.
+        """
+        total: ComplexArray = on[..., np.searchsorted(touched, elements)]
         if self.slopes is None or self.means is None:
-            return total, total_conjugate
+            return total
         # an element is the one after its predecessor, itself, and the one before its successor
         for k, acted_on in zip((2, 1, 0), self.neighbours[:, elements], strict=True):
-            at = np.searchsorted(touched, acted_on)
-            slopes, means = self.slopes[k, acted_on], self.means[k, acted_on]
-            total += fields[4][:, at] * slopes + fields[2][:, at] * means
-            total_conjugate += fields[5][:, at] * slopes.conj() + fields[3][:, at] * means.conj()
-        return total, total_conjugate
+            at, slopes, means = np.searchsorted(touched, acted_on), self.slopes[k, acted_on], self.means[k, acted_on]
+            if is_conjugate:
+                slopes, means = slopes.conj(), means.conj()
+            total += on_slope[..., at] * slopes + on[..., at] * means
+        return total
 
 
 def caused(fields: ComplexArray, t: ComplexArray, u: ComplexArray, s: ComplexArray) -> ComplexArray:

@@ -116,7 +116,7 @@ class MatrixFreeSystem(HierarchicalSystem):
     def __init__(
         self, mesh: BoundaryMesh, material: Material, frame: FloatArray, options: MatrixFree, *, slopes: bool
     ) -> None:
-        self._n_elements, self._frame, self._material = mesh.n_elements, frame, material
+        self.n_elements, self._frame, self._material = mesh.n_elements, frame, material
         self._unit = mesh.diameter / mesh.n_elements / material.plane_modulus
         self._tolerance, self._max_steps = options.tolerance, options.max_steps
         self._elements = StraightElements.of(mesh, material, takes_slopes=slopes)
@@ -172,7 +172,7 @@ class MatrixFreeSystem(HierarchicalSystem):
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
         t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
-        return self._left(t, u, self._x[2 * self._n_elements :])[0][elements]
+        return self._left(t, u, self._x[2 * self.n_elements :])[0][elements]
 
     def _units(self, laws: CompactLaws, elements: IntArray) -> FloatArray:
         """Return the units (n, 2) of the unknowns of some elements in the iteration."""
@@ -180,12 +180,12 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def _local(self, laws: CompactLaws, elements: IntArray, x: Vector, *, is_change: bool = False) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements; of a change of the unknowns their change."""
-        unknowns = x[: 2 * self._n_elements].reshape(-1, 2)[elements]
+        unknowns = x[: 2 * self.n_elements].reshape(-1, 2)[elements]
         return laws.state(elements, unknowns * self._units(laws, elements), is_change=is_change)
 
     def _fields(self, laws: CompactLaws, x: Vector, *, is_change: bool = False) -> tuple[ComplexArray, ComplexArray]:
         """Return complex tractions and displacements (n_elements,), in x and y; of a change their change."""
-        traction, displacement = np.empty((2, self._n_elements), complex)
+        traction, displacement = np.empty((2, self.n_elements), complex)
         for some in self._elements.chunks():
             local = self._local(laws, some, x, is_change=is_change)
             directions = self._frame[some] @ [1.0, 1j]
@@ -198,7 +198,7 @@ class MatrixFreeSystem(HierarchicalSystem):
         self._is_solved = False
         if self._laws is None:
             return
-        unknowns = self._x[: 2 * self._n_elements].reshape(-1, 2)
+        unknowns = self._x[: 2 * self.n_elements].reshape(-1, 2)
         for some in self._elements.chunks():
             unknowns[some] = laws.unknowns(some, self._local(self._laws, some, self._x)) / self._units(laws, some)
 
@@ -214,7 +214,7 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def _solve(self, laws: CompactLaws, inverse: Preconditioner) -> None:
         """Find the unknowns that fulfil the equations under laws."""
-        n = 2 * self._n_elements
+        n = 2 * self.n_elements
 
         def preconditioned(x: Vector, *, is_change: bool = True) -> FloatArray:
             equations, balances = self._left(*self._fields(laws, x, is_change=is_change), x[n:])

@@ -95,17 +95,12 @@ class HierarchicalSystem:
         may_change: BoolArray,
     ) -> None:
         self.compression, self._tree, self._columns = compression, compression.tree, compression.columns
-        self._order, self._n_elements, self._unit = self._tree.order, len(frame), displacement_unit
+        self._order, self.n_elements, self._unit = self._tree.order, len(frame), displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
         changing = self._tree.leaves_of(self._place[np.flatnonzero(may_change)])
         self.factor = HierarchicalFactor(compression, border, frozenset(changing.tolist()))
         self._frame = np.concatenate([frame, np.tile(np.eye(2), (self._order.size - len(frame), 1, 1))])
-
-    @property
-    def n_elements(self) -> int:
-        """Number of elements."""
-        return self._n_elements
 
     @property
     def n_answers(self) -> int:
