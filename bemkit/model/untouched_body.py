@@ -85,7 +85,7 @@ class UntouchedBody(LinearBody):
         round_off = round_off_of(displacement, self.condensed.sensitivity)
         resultant, inner = self.condensed.volume_force, self.condensed.inner_force
         total = float(np.abs(force).sum()) + inner or 1.0
-        missing = np.einsum("nkc,nc->nk", self.conditions.frame, force - self.force)[self.conditions.is_free]
+        missing = self.conditions.in_frames(force - self.force)[self.conditions.is_free]
         residual = Imbalance(float(np.abs(missing).max(initial=0.0)) / total, 0.0, round_off / total)
         return residual.joined(resultant_imbalance(points, force, balanced, round_off, resultant, inner))
 

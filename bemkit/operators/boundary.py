@@ -205,7 +205,7 @@ def single_layer(trial: BoundarySpace, test: BoundarySpace, material: Material) 
     Returns
     -------
     SingleLayer
-        Matrix entries [m^3/Pa]: traction dofs [Pa] to tested displacements.
+        Matrix entries [m^2/Pa]: traction dofs [Pa] to tested displacements [m^2].
 
     Notes
     -----

@@ -45,7 +45,7 @@ def measured(n_elements: int, name: str) -> dict[str, Any]:
         systems[:] = [make(self, *arguments)]
         return systems[0]
 
-    compiled.products()
+    compiled.functions()
     scene = bk.load_scene("paper-1")
     small = replace(scene, mesh=replace(scene.mesh, elements=400), linear_solver=SOLVERS[name])
     bk.run(small)  # whatever is loaded and compiled on first use

@@ -1,6 +1,6 @@
 """Speed of assembly and solve as ratios against LAPACK, measured side by side in one run.
 
-    python tests/benchmarks/speed.py [N ...]
+    python -m tests.benchmarks.speed [N ...]
 
 For each number of elements N (default 320 1000 2000) it prints medians of
 
@@ -25,7 +25,7 @@ from rich.table import Table
 from scipy.linalg.lapack import dgetrf, dpotrf
 
 import bemkit as bk
-from bemkit.operators.collocation.assembly import collocation_matrices
+from tests.operators.collocation_matrices import collocation_matrices
 
 
 def keep_memory() -> None:

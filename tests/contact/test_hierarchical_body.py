@@ -18,7 +18,8 @@ from bemkit.errors import InputError
 from bemkit.model.contact_model import Model, build_model
 from bemkit.model.prepared import prepare
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.factor import HierarchicalFactor
 from bemkit.operators.hierarchy.system import HierarchicalSystem
 from bemkit.operators.linear import threads
 from bemkit.operators.linear.solvers import DenseCholesky, Hierarchical

@@ -31,7 +31,6 @@ from bemkit.geometry import (
 )
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.placement import Placement
-from bemkit.operators.collocation.assembly import collocation_matrices
 from bemkit.operators.integrals.inner import inner_integrals, inner_on_element
 from bemkit.operators.integrals.pairs import Degrees, PairIntegrals
 from bemkit.operators.integrals.panels import Panels
@@ -39,6 +38,7 @@ from bemkit.operators.integrals.sweep import PairSweep
 from bemkit.operators.material import Material
 from bemkit.operators.rigid_modes import rigid_motions
 from bemkit.operators.steklov_poincare.maps import CollocationMap, GalerkinMap
+from tests.operators.collocation_matrices import collocation_matrices
 from tests.slow import slow_except, slow_only
 
 DEGREES = Degrees(log=(1, 1), double=(1, 2))

@@ -38,6 +38,18 @@ def test_mean_logarithms_agree_with_sixty_digits(given: np.ndarray) -> None:
                 assert means[i, j] == pytest.approx(exact, rel=1e-12), (i, j)
 
 
+def test_the_series_of_distant_intervals_has_all_digits() -> None:
+    means = mean_logarithms(np.linspace(0.0, 1.0, 61))[0]
+    with workdps(60):
+        ends = [mpf(float(place)) for place in np.linspace(0.0, 1.0, 61)]
+        for j in range(21, 60):  # from 20 lengths on
+            sums = _twice_integrated(ends[j + 1]) - _twice_integrated(ends[j + 1] - ends[1])
+            sums += _twice_integrated(ends[j] - ends[1]) - _twice_integrated(ends[j])
+            exact = float(sums / (ends[1] * (ends[j + 1] - ends[j])))
+            # the term of the tenth power is 1.5e-3 / 20^10; round-off of the logarithm itself
+            assert means[j] == pytest.approx(exact, abs=1e-15), j
+
+
 def _twice_integrated(x: mpf) -> mpf:
     return x**2 / 2 * (log(abs(x)) - mpf(3) / 2) if x else mpf(0)
 

@@ -165,7 +165,7 @@ class HierarchicalBody(LinearBody):
     def work(self) -> OperationCounts:
         """The order of the contact system; whole matrices there are none."""
         n_retained = int(np.count_nonzero(self.conditions.is_retained))
-        return self.loaded.work + OperationCounts(contact_unknowns=n_retained)
+        return OperationCounts(contact_unknowns=n_retained)
 
     def respond(self, conditions: LinearConditions) -> ContactState:
         """Return the response; leaves whose conditions are those of the last one are not factored again.
@@ -228,7 +228,7 @@ class HierarchicalBody(LinearBody):
         points = dof_points(loaded.map.displacement_space)
         size = float(np.abs(without_motion(mesh, points, fields.displacement - loaded.motion)).max())
         of_contact = (fields.force - self.force) / loaded.map.weights[:, None]
-        at_nodes = np.einsum("nkc,nc->nk", self.conditions.frame, of_contact)[self.nodes.nodes]
+        at_nodes = self.conditions.in_frames(of_contact)[self.nodes.nodes]
         at_nodes = np.einsum("nij,nj->ni", self._elements.of_traction, at_nodes)
         missing = float(np.abs(self.weights[:, None] * (state.traction - at_nodes)).max())
         largest = max(float(np.abs(fields.force).max()), float((self.weights[:, None] * np.abs(state.traction)).max()))
@@ -252,7 +252,7 @@ class HierarchicalBody(LinearBody):
         if response is None or response.answer != self._moving.system.n_answers:
             self._solved(stick(state.u_n, state.u_t) if response is None else response.conditions)
         loaded = self._moving
-        strained, traction = loaded.everywhere()
+        traction, strained = loaded.system.everywhere()
         displacement, force = strained + loaded.motion, traction * loaded.map.weights[:, None]
         if self.inside is not None:
             displacement, force = displacement + self.inside.displacement, force + self.inside.force
@@ -380,5 +380,5 @@ def hierarchical_body(
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    loaded = elastic.loaded(*_left_of(conditions, force, inside))
+    loaded = LoadedSystem.of(elastic, *_left_of(conditions, force, inside))
     return HierarchicalBody(loaded, contact, conditions, force, inside)

@@ -304,8 +304,8 @@ class CondensedBody(DenseBody):
         reach, of_forces = float(np.abs(displacement).max()), round_off_of(displacement, self.condensed.sensitivity)
         round_off = max(of_forces, np.finfo(float).eps * reach * float(self._column_sizes[1].sum()))
         noise = NOISE_FACTOR * round_off
-        reaction = float(np.abs(self._in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
-        given = self._in_frames(self.force)[~self.conditions.is_fixed]
+        reaction = float(np.abs(self.conditions.in_frames(force)[self.conditions.is_fixed]).max(initial=0.0))
+        given = self.conditions.in_frames(self.force)[~self.conditions.is_fixed]
         resultant, inner = self.condensed.volume_force, self.condensed.inner_force
         if resultant is not None:
             given = np.append(given, [*resultant[:2], inner])
@@ -313,10 +313,6 @@ class CondensedBody(DenseBody):
         if not self.balanced or (np.abs(force).sum() <= noise and self._only_moves(displacement)):
             return of_contact
         return of_contact.joined(resultant_imbalance(self.points, force, self.balanced, of_forces, resultant, inner))
-
-    def _in_frames(self, force: FloatArray) -> FloatArray:
-        """Return forces (n_nodes, 2) in the frames of the nodes."""
-        return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, force))
 
     def _only_moves(self, displacement: FloatArray) -> bool:
         """Whether the body has moved rigidly."""

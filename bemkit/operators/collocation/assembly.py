@@ -5,10 +5,10 @@ With complex tractions p and displacements v on an element from a to b, chord di
     U p = A l ([1 - kappa (2 log(l / r0) + L)] p + tau^2 [Q / 2] conj(p)),                   A = 1 / (8 pi mu (1 - nu))
     T v = [D / (2 pi) - i B (1 - 2 nu) lambda] v + (i B / 2) [rho / conj(rho)]_a^b conj(v),  B = 1 / (4 pi (1 - nu))
 
-where kappa = 3 - 4 nu, L, Q, D are the inner integrals (`pairs.Inner`) of log|rho|, rho / conj(rho) and 2 pi k over the
-element of half length 1, and lambda = log(|x - a| / |x - b|): of the double layer only k is left to integrate, the rest
-are differences between the ends, on straight and on curved elements alike. On its own element D is a principal value;
-on straight ones it is zero. Then (1/2 I + T) u = U t.
+where kappa = 3 - 4 nu, r0 is the diameter of the mesh, L, Q, D are the inner integrals (`pairs.Inner`) of log|rho|,
+rho / conj(rho) and 2 pi k over the element of half length 1, and lambda = log(|x - a| / |x - b|): of the double layer
+only k is left to integrate, the rest are differences between the ends, on straight and on curved elements alike. On its
+own element D is a principal value; on straight ones it is zero. Then (1/2 I + T) u = U t.
 """
 
 from __future__ import annotations
@@ -27,37 +27,6 @@ from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
 
 CHUNK_PAIRS = 32768
-
-
-def collocation_matrices(
-    mesh: BoundaryMesh, material: Material, *, takes_slopes: bool = False
-) -> tuple[FloatArray, FloatArray]:
-    """Return the single and the double layer of constant densities at the element midpoints.
-
-    Parameters
-    ----------
-    mesh : BoundaryMesh
-        x is the point in the middle of the arc of each element.
-    material : Material
-    takes_slopes : bool
-        As in `sweep_rows`.
-
-    Returns
-    -------
-    single, double : (2 n_elements, 2 n_elements) arrays
-        Rows and columns are 2 * element + component. single maps tractions [Pa] to displacements [m]; its logarithm
-        is log(|r| / r0) with r0 the diameter of the mesh. double maps displacements to displacements, without the
-        free term 1/2.
-    """
-    n = mesh.n_elements
-    single, double = np.empty((n, 2, n, 2)), np.empty((n, 2, n, 2))
-
-    def store(rows: slice, block: Coefficients) -> None:
-        write_columns(block.on_traction, block.on_conjugate_traction, single[rows, 0], single[rows, 1])
-        write_columns(block.on_displacement, block.on_conjugate_displacement, double[rows, 0], double[rows, 1])
-
-    sweep_rows(mesh, material, store, needs_single=np.ones(n, bool), needs_double=True, takes_slopes=takes_slopes)
-    return single.reshape(2 * n, 2 * n), double.reshape(2 * n, 2 * n)
 
 
 @assembling()

@@ -113,33 +113,6 @@ class _ElementIntegrals:
     quotient_change: ComplexArray
     moments: tuple[FloatArray | ComplexArray, FloatArray | ComplexArray, ComplexArray] | None
 
-    def combine(
-        self,
-        result: Coefficients,
-        where: tuple[slice | IntArray, ...],
-        columns: slice | IntArray,
-        panels: Panels,
-        material: Material,
-        r0: float,
-    ) -> None:
-        """Write the coefficients of the densities on some elements where they belong."""
-        nu = material.effective_poisson_ratio
-        b = -1.0 / (4.0 * np.pi * (1.0 - nu))
-        turned, rates = b * panels.tangent[columns] ** 2, (0.5 / np.pi, b * (1.0 - 2.0 * nu))
-        _join(result.on_displacement, where, self.double * rates[0], self.log_ratio * rates[1])
-        _multiply(result.on_conjugate_displacement, where, self.quotient_change, turned)
-        if self.moments is not None:
-            double, log_ratio, quotient_change = self.moments
-            _join(result.on_slope, where, double * rates[0], log_ratio * rates[1])
-            _multiply(result.on_conjugate_slope, where, quotient_change, turned)
-        if self.log is not None and self.half_quotient is not None:
-            kappa = 3.0 - 4.0 * nu
-            half = panels.half[columns]
-            a = half / (8.0 * np.pi * material.shear_modulus * (1.0 - nu))
-            _multiply(result.on_traction, where, self.log, -a * kappa)
-            result.on_traction[where] += a * (1.0 - 2.0 * kappa * np.log(half / r0))
-            _multiply(result.on_conjugate_traction, where, self.half_quotient, a * panels.tangent[columns] ** 2)
-
 
 @dataclass(frozen=True, eq=False)
 class CollocationPoints:
@@ -179,14 +152,14 @@ class CollocationPoints:
                     integrals, is_close = _straight_far(self.panels, rows, columns, distance, has_single, has_slopes)
                 else:
                     integrals, is_close = _curved_far(self.panels, rows, columns, has_single, has_slopes)
-                integrals.combine(result, (everywhere, columns), columns, self.panels, self.material, self.r0)
+                self._combine(integrals, result, (everywhere, columns), columns)
             row, column = np.nonzero(is_close)
             if row.size:
                 point, element = row + rows.start, column + columns.start
                 exact = _listed(
                     self.panels, self.panels.centre[point], element, point == element, has_single, has_slopes
                 )
-                exact.combine(result, (row, element), element, self.panels, self.material, self.r0)
+                self._combine(exact, result, (row, element), element)
         return result
 
     def at(self, x: ComplexArray, elements: IntArray, is_own: BoolArray) -> Coefficients:
@@ -205,8 +178,32 @@ class CollocationPoints:
             if chosen.size:
                 own = elements[chosen]
                 exact = _listed(self.panels, x[chosen], own, is_own[chosen], True, True)
-                exact.combine(result, (chosen,), own, self.panels, self.material, self.r0)
+                self._combine(exact, result, (chosen,), own)
         return result
+
+    def _combine(
+        self,
+        integrals: _ElementIntegrals,
+        result: Coefficients,
+        where: tuple[slice | IntArray, ...],
+        columns: slice | IntArray,
+    ) -> None:
+        """Write the coefficients of the densities on some elements where they belong."""
+        nu, panels = self.material.effective_poisson_ratio, self.panels
+        b = -1.0 / (4.0 * np.pi * (1.0 - nu))
+        turned, rates = b * panels.tangent[columns] ** 2, (0.5 / np.pi, b * (1.0 - 2.0 * nu))
+        _join(result.on_displacement, where, integrals.double * rates[0], integrals.log_ratio * rates[1])
+        _multiply(result.on_conjugate_displacement, where, integrals.quotient_change, turned)
+        if integrals.moments is not None:
+            double, log_ratio, quotient_change = integrals.moments
+            _join(result.on_slope, where, double * rates[0], log_ratio * rates[1])
+            _multiply(result.on_conjugate_slope, where, quotient_change, turned)
+        if integrals.log is not None and integrals.half_quotient is not None:
+            kappa, half = self.material.kappa, panels.half[columns]
+            a = half / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
+            _multiply(result.on_traction, where, integrals.log, -a * kappa)
+            result.on_traction[where] += a * (1.0 - 2.0 * kappa * np.log(half / self.r0))
+            _multiply(result.on_conjugate_traction, where, integrals.half_quotient, a * panels.tangent[columns] ** 2)
 
 
 def constant_runs(*labels: BoolArray) -> list[slice]:

@@ -28,26 +28,21 @@ CORNER_ANGLE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class GradientReconstruction:
-    """Slopes as combinations of midpoint values: s = before u_previous + own u + after u_following.
+    """Slopes as combinations of the midpoint values of an element and its neighbours.
 
     Parameters
     ----------
-    previous, following : (n_elements,) array
-        Neighbours along the boundary.
-    before, own, after : (n_elements,) complex array
-        Their weights; they sum to zero.
-    mean_before, mean_own, mean_after : (n_elements,) complex array
+    neighbours : (3, n_elements) array
+        The element before, the element itself, and the one after it along the boundary.
+    slopes : (3, n_elements) complex array
+        Weights of their values in the slope; they sum to zero.
+    means : (3, n_elements) complex array
         Weights of the same values in what is added to the constant part; they sum to zero.
     """
 
-    previous: IntArray
-    following: IntArray
-    before: ComplexArray
-    own: ComplexArray
-    after: ComplexArray
-    mean_before: ComplexArray
-    mean_own: ComplexArray
-    mean_after: ComplexArray
+    neighbours: IntArray
+    slopes: ComplexArray
+    means: ComplexArray
 
     @classmethod
     def of(cls, mesh: BoundaryMesh, panels: Panels) -> GradientReconstruction:
@@ -89,7 +84,7 @@ class GradientReconstruction:
         counts[:, counts.sum(axis=0) == 1] = True
         arm = np.where(counts, centre - np.mean(centre, axis=0, where=counts), 0.0)
         weights = arm.conj() / np.sum(np.square(arm.real) + np.square(arm.imag), axis=0)
-        return cls(neighbours[0], neighbours[2], *(weights * half), *_means(centre, half, is_smooth))
+        return cls(neighbours, weights * half, _means(centre, half, is_smooth))
 
     def add_to(self, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool) -> None:
         """Add what slopes contribute to coefficients (n_rows, n_elements) of displacements, or of their conjugates."""
@@ -102,15 +97,12 @@ class GradientReconstruction:
 
     def _of_value(self, on: ComplexArray, on_slope: ComplexArray, is_conjugate: bool) -> tuple[ComplexArray, ...]:
         """Return the coefficients of the values before, on and after each element."""
-        slopes = np.array([self.before, self.own, self.after])
-        means = np.array([self.mean_before, self.mean_own, self.mean_after])
-        if is_conjugate:
-            slopes, means = slopes.conj(), means.conj()
+        slopes, means = (self.slopes.conj(), self.means.conj()) if is_conjugate else (self.slopes, self.means)
         return tuple(on_slope * slope + on * mean for slope, mean in zip(slopes, means, strict=True))
 
     @cached_property
     def _runs(self) -> tuple[list[Run], list[Run]]:
-        return consecutive_runs(self.previous), consecutive_runs(self.following)
+        return consecutive_runs(self.neighbours[0]), consecutive_runs(self.neighbours[2])
 
 
 def _means(centre: ComplexArray, half: ComplexArray, is_smooth: BoolArray) -> ComplexArray:

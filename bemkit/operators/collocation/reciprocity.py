@@ -39,9 +39,9 @@ class Reciprocity:
 
     Parameters
     ----------
-    on_traction : (n_loops, 2 n_elements) array [m^2/Pa]
-    on_displacement : (n_loops, 2 n_elements) array [m]
-    fields : (2 n_elements, n_loops) array
+    on_traction : (n_loops, 2 n_elements) array [m/Pa]
+    on_displacement : (n_loops, 2 n_elements) array [-]
+    fields : (2 n_elements, n_loops) array [-]
         The fields at the midpoints: errors of the displacement equation that make room for these equations. They are
         as smooth as the fields, so that elements at corners, however short, are not torn apart.
     """
@@ -64,39 +64,29 @@ class Reciprocity:
         has_holes : bool
             Whether those of holes are among them.
         """
-        panels = Panels(mesh.whole)
-        reconstruction = GradientReconstruction.of(mesh.whole, panels) if takes_slopes else None
+        whole = mesh.whole
+        panels, centres = Panels(whole), _plane(whole.centres)
+        reconstruction = GradientReconstruction.of(whole, panels) if takes_slopes else None
         on_tractions, on_displacements, fields = [], [], []
         for loop, area in zip(mesh.loops, mesh.loop_areas, strict=True):
             if area <= 0.0 and not has_holes:
                 continue
-            field = _dilatation(mesh, material) if area > 0.0 else _source(mesh, material, loop)
-            row = field.displacement[None, :]
+            images = reciprocal_fields(mesh, loop, area)
+            arcs = Arcs.of(whole, _POINTS_OF_LINES if area > 0.0 and whole.is_straight.all() else _POINTS)
+            works = zip(*(field.work(arcs, material) for field in images), strict=True)
+            on_traction, on_displacement, on_gradient = (np.sum(each, axis=0) for each in works)
             if reconstruction is not None:
-                on_slope = field.gradient / (panels.half * panels.tangent)
-                reconstruction.add_to(row, on_slope[None, :], is_conjugate=False)
-            on_tractions.append(_folded(mesh, field.traction))
-            on_displacements.append(_folded(mesh, row[0]))
-            fields.append(np.stack([field.value.real, field.value.imag], axis=1)[: mesh.n_elements].ravel())
+                on_slope = on_gradient / (panels.half * panels.tangent)
+                reconstruction.add_to(on_displacement[None, :], on_slope[None, :], is_conjugate=False)
+            on_tractions.append(_folded(mesh, on_traction))
+            on_displacements.append(_folded(mesh, on_displacement))
+            value = np.sum([field.value(centres) for field in images], axis=0)
+            fields.append(np.stack([value.real, value.imag], axis=1)[: mesh.n_elements].ravel())
         shape = -1, 2 * mesh.n_elements
-        on_traction, on_displacement, values = (
+        of_traction, of_displacement, values = (
             np.reshape(rows, shape) for rows in (on_tractions, on_displacements, fields)
         )
-        return cls(on_traction, on_displacement, values.T)
-
-
-@dataclass(frozen=True, eq=False)
-class _Field:
-    """Work of densities on w and t(w) / (2 mu): Re sum of (traction t), and of (displacement u + gradient g).
-
-    Each is an (n_elements,) complex array of the whole body; the displacement on an element is u + g (y - x). `value`
-    is the field at x.
-    """
-
-    value: ComplexArray
-    traction: ComplexArray
-    displacement: ComplexArray
-    gradient: ComplexArray
+        return cls(of_traction, of_displacement, values.T)
 
 
 class ReciprocalField(Protocol):
@@ -106,7 +96,11 @@ class ReciprocalField(Protocol):
         """Return the field at points, or a multiple of it."""
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work of tractions, displacements and gradients; see `_Field`."""
+        """Return the work, (n_elements,) each, of densities on w and t(w) / (2 mu).
+
+        Re sum of (traction t) and of (displacement u + gradient g); the displacement on an element is u + g (y - x), x
+        its middle.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,26 +126,13 @@ class Dilatation:
         return np.asarray((z - self.centre) / self.diameter)
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work of tractions, displacements and gradients; see `_Field`."""
+        """Return the work of tractions, displacements and gradients; see `ReciprocalField.work`."""
         factor = (1.0 - 2.0 * material.effective_poisson_ratio) / (2.0 * material.shear_modulus * self.diameter)
         return (
             np.sum((arcs.z - self.centre).conj() * np.abs(arcs.dz), axis=1) * factor,
             1j * (arcs.end - arcs.start).conj() / self.diameter,
             1j * np.sum(arcs.arm * arcs.dz.conj(), axis=1) / self.diameter,
         )
-
-
-def fields_of(mesh: BoundaryMesh) -> list[ReciprocalField]:
-    """Return one field for each closed curve of a mesh without symmetry."""
-    loops = zip(mesh.loops, mesh.loop_areas, strict=True)
-    return [Dilatation.of(mesh) if area > 0.0 else HoleSource.of(mesh, loop) for loop, area in loops]
-
-
-def _dilatation(mesh: BoundaryMesh, material: Material) -> _Field:
-    """Return the field of the outer curve."""
-    whole, field = mesh.whole, Dilatation.of(mesh)
-    arcs = Arcs.of(whole, _POINTS_OF_LINES if whole.is_straight.all() else _POINTS)
-    return _Field(field.value(_plane(whole.centres)), *field.work(arcs, material))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +160,7 @@ class HoleSource:
         return np.asarray(self.radius / (z - self.centre).conj())
 
     def work(self, arcs: Arcs, material: Material) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Return the work of tractions, displacements and gradients; see `_Field`."""
+        """Return the work of tractions, displacements and gradients; see `ReciprocalField.work`."""
         c, a = self.centre, self.radius
         return (
             np.sum(np.abs(arcs.dz) / (arcs.z - c), axis=1) * (a / (2.0 * material.shear_modulus)),
@@ -188,15 +169,16 @@ class HoleSource:
         )
 
 
-def _source(mesh: BoundaryMesh, material: Material, loop: IntArray) -> _Field:
-    """Return the field of a source of volume in a hole, and in its images."""
-    arcs, middle, one = Arcs.of(mesh.whole), _plane(mesh.whole.centres), HoleSource.of(mesh, loop)
-    place = np.array([one.centre.real, one.centre.imag])
-    images = [place] if mesh.symmetry is None else [mesh.symmetry.reflected(place, g) for g in mesh.symmetry.images]
-    sources = [HoleSource(complex(*image), one.radius) for image in images]
-    works = [source.work(arcs, material) for source in sources]
-    traction, displacement, gradient = (sum(each) for each in zip(*works, strict=True))
-    return _Field(sum(source.value(middle) for source in sources), traction, displacement, gradient)  # type: ignore[arg-type]  # sums of arrays
+def reciprocal_fields(mesh: BoundaryMesh, loop: IntArray, area: float) -> list[ReciprocalField]:
+    """Return the field of a closed curve: a dilatation, or a source in a hole, and those in its images."""
+    if area > 0.0:
+        return [Dilatation.of(mesh)]
+    source = HoleSource.of(mesh, loop)
+    if mesh.symmetry is None:
+        return [source]
+    place = np.array([source.centre.real, source.centre.imag])
+    images = (mesh.symmetry.reflected(place, signs) for signs in mesh.symmetry.images)
+    return [HoleSource(complex(*image), source.radius) for image in images]
 
 
 def _largest_circle(mesh: BoundaryMesh, loop: IntArray) -> tuple[FloatArray, float]:

@@ -14,7 +14,7 @@ from bemkit.operators.half_plane.far_drive import FarDrive
 from bemkit.operators.half_plane.flexibility import strip_flexibility
 from bemkit.operators.half_plane.surface import SurfaceElasticity
 from bemkit.operators.linear.dense import Cholesky, SingularMatrixError
-from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, rotated
+from bemkit.operators.steklov_poincare.nodal_conditions import GivenData, NodalConditions, rotated
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 
 _ROUND_OFF = 1e-10
@@ -25,8 +25,6 @@ _ROUND_OFF = 1e-10
 class HalfPlaneElasticity(SurfaceElasticity):
     """Elasticity of a half-plane seen from a strip of its surface; see `SurfaceElasticity`.
 
-    Its flexibility, (n_dofs, n_dofs) [1/Pa], takes forces to displacements, in x and y; see `strip_flexibility`.
-
     Parameters
     ----------
     kept : dict
@@ -35,7 +33,9 @@ class HalfPlaneElasticity(SurfaceElasticity):
 
     kept: dict[str, _Condensation] = field(default_factory=dict, repr=False)
 
-    def _flexibility(self) -> FloatArray:
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """(n_dofs, n_dofs) array [1/Pa] from forces to displacements, in x and y; see `strip_flexibility`."""
         return strip_flexibility(self.mesh, self.material)
 
     def strain_displacement(self, force: FloatArray) -> FloatArray:
@@ -150,11 +150,12 @@ class _Condensation:
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the map under nodal forces (n_nodes, 2) in x and y and fixed displacements in the frames."""
         conditions, drive, retained = self.conditions, self.drive, self.retained
-        given = np.where(conditions.is_free, np.einsum("nkc,nc->nk", conditions.frame, force), 0.0).ravel()
+        data = GivenData.of(conditions, force, displacement)
+        given = data.force.ravel()
         loaded = _Loaded(
             body=self,
             given=given,
-            held=np.where(conditions.is_fixed, displacement, 0.0).ravel()[self.acting],
+            held=data.displacement.ravel()[self.acting],
             rest=self.flexibility @ given + self.motions @ np.array(drive.motion),
             load=np.array(drive.load)[list(drive.driven)] + self.driven.T @ given,
         )
@@ -220,8 +221,7 @@ class _Loaded:
         """See `CondensedMap`."""
         at = self.held.copy()
         at[self.body.retained] = retained_displacement
-        back = self.body.conditions.frame.transpose(0, 2, 1)
-        displaced, total = (np.einsum("nck,nk->nc", back, each.reshape(-1, 2)) for each in self.response(at))
+        displaced, total = map(self.body.conditions.in_plane, self.response(at))
         return displaced, total
 
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:

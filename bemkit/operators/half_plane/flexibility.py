@@ -91,7 +91,8 @@ def _by_moments(distance: FloatArray, h: FloatArray, k: FloatArray) -> FloatArra
     second = (h + k) / 12.0
     fourth = (h**2 + k**2) / 80.0 + h * k / 24.0
     sixth = (h**3 + k**3) / 448.0 + h * k * (h + k) / 64.0
-    return np.asarray(np.log(distance) - second / 2.0 - fourth / 4.0 - sixth / 6.0)
+    eighth = (h**4 + k**4) / 2304.0 + h * k * (h**2 + k**2) / 192.0 + 7.0 * (h * k) ** 2 / 640.0
+    return np.asarray(np.log(distance) - second / 2.0 - fourth / 4.0 - sixth / 6.0 - eighth / 8.0)
 
 
 def _by_points(distance: FloatArray, longer: FloatArray, shorter: FloatArray) -> FloatArray:

@@ -53,8 +53,6 @@ def wave_flexibility(n_elements: int, period: float, material: Material) -> Floa
 class PeriodicElasticity(SurfaceElasticity):
     """Elasticity of a periodic half-plane seen from equal elements of its surface; no matrix is ever formed.
 
-    Its flexibility, (n_elements,) [m/Pa], is that of each wave; see `wave_flexibility`.
-
     Raises
     ------
     InputError
@@ -69,7 +67,9 @@ class PeriodicElasticity(SurfaceElasticity):
                 "period: leave out the grading, and let parts end where equal elements do"
             )
 
-    def _flexibility(self) -> FloatArray:
+    @cached_property
+    def flexibility(self) -> FloatArray:
+        """(n_elements,) array [m/Pa], that of each wave; see `wave_flexibility`."""
         return wave_flexibility(self.mesh.n_elements, float(self.mesh.lengths.sum()), self.material)
 
     @cached_property

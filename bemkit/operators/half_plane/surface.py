@@ -45,13 +45,10 @@ class SurfaceElasticity(ABC):
         """Constants on elements."""
         return self.displacement_space
 
-    @cached_property
-    def flexibility(self) -> FloatArray:
-        """What tractions displace, without the motion far away."""
-        return self._flexibility()
-
+    @property
     @abstractmethod
-    def _flexibility(self) -> FloatArray: ...
+    def flexibility(self) -> FloatArray:
+        """What tractions displace, without the motion far away; computed once."""
 
     def driven_by(self, drive: FarDrive) -> Self:
         """Return the same half-plane under another drive; nothing is integrated again."""

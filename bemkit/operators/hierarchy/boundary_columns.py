@@ -58,6 +58,7 @@ class BoundaryColumns:
     slopes: ComplexArray | None
     means: ComplexArray | None
     curved: CurvedElements | None = None
+    is_symmetric = False
 
     @classmethod
     def of(
@@ -92,8 +93,7 @@ class BoundaryColumns:
         slopes = means = None
         if takes_slopes:
             of = GradientReconstruction.of(mesh, panels)
-            slopes = np.stack([each[order] for each in (of.before, of.own, of.after)])
-            means = np.stack([each[order] for each in (of.mean_before, of.mean_own, of.mean_after)])
+            slopes, means = np.take(of.slopes, order, axis=1), np.take(of.means, order, axis=1)
         return cls(
             Constants.of(material, log_length),
             order,
@@ -116,11 +116,6 @@ class BoundaryColumns:
     def reach(self) -> IntArray:
         """(k, n_elements) places on which each element acts: itself, and with slopes its neighbours."""
         return self.neighbours[1:2] if self.slopes is None else self.neighbours
-
-    @property
-    def is_symmetric(self) -> bool:
-        """False."""
-        return False
 
     @property
     def sizes(self) -> FloatArray:
@@ -189,7 +184,15 @@ class BoundaryColumns:
         traction, displacement : (n_elements, 2) arrays
             By place.
         """
-        result = self.layers(places, np.arange(self.start.size), self.densities(traction, displacement))
+        x, densities = self.centre[places], self.densities(traction, displacement)
+        if self.curved is None and (fast := compiled.functions()) is not None:
+            result: ComplexArray = fast.applied(self.constants.numbers, x, places, self.start, self.end, *densities)
+        else:
+            result = np.zeros(x.size, complex)
+            every, step = np.arange(self.start.size), max(1, _PAIRS // max(places.size, 1))
+            for elements in (every[begin : begin + step] for begin in range(0, every.size, step)):
+                fields = self._element_fields(x, places, elements)
+                result += caused(fields, *(each[elements] for each in densities))
         return np.stack([result.real, result.imag], axis=1) + 0.5 * displacement[places]
 
     def densities(self, traction: FloatArray, displacement: FloatArray) -> Densities:
@@ -203,46 +206,23 @@ class BoundaryColumns:
             slope += self.slopes[k] * u[places]
         return t, mean, slope
 
-    def layers(self, places: IntArray, elements: IntArray, densities: Densities) -> ComplexArray:
-        """Return T u - U t, complex (n,), in the middle of some elements, as caused by other ones.
-
-        Parameters
-        ----------
-        places : (n,) array
-        elements : (m,) array
-            Ascending.
-        densities : tuple of (n_elements,) complex arrays
-            As `densities` returns them.
-        """
-        x = self.centre[places]
-        t, u, s = (each[elements] for each in densities)
-        if self.curved is None and (fast := compiled.functions()) is not None:
-            ends = self.start[elements], self.end[elements]
-            values: ComplexArray = fast.applied(self.constants.numbers, x, counted(places, elements), *ends, t, u, s)
-            return values
-        result = np.zeros(x.size, complex)
-        step = max(1, _PAIRS // max(places.size, 1))
-        for begin in range(0, t.size, step):
-            some = slice(begin, begin + step)
-            result += caused(self._element_fields(x, places, elements[some]), t[some], u[some], s[some])
-        return result
-
     def _some_fields(self, x: ComplexArray, places: IntArray, columns: IntArray) -> ComplexArray:
         """Return complex displacements (n_points, n_columns)."""
         elements, number = np.unique(columns // 4, return_inverse=True)
         touched = elements if self.slopes is None else np.unique(self.neighbours[:, elements])
         fields = self._element_fields(x, places, touched)
-        own = np.searchsorted(touched, elements)
+        own, about = np.searchsorted(touched, elements), (elements, touched)
         kind, is_along_x = (columns // 2) % 2, columns % 2 == 0
         result = np.empty((x.size, columns.size), complex)
         for of_kind in (0, 1):
             if not np.any(kind == of_kind):
                 continue
-            on, on_conjugate = (
-                (-fields[0][:, own], -fields[1][:, own]) if of_kind == 0 else self._moved(fields, elements, touched)
-            )
-            if of_kind == 1:
-                on = on + 0.5 * (places[:, None] == elements)
+            if of_kind == 0:
+                on, on_conjugate = -fields[0][:, own], -fields[1][:, own]
+            else:
+                on = self.of_displacements(*about, fields[2], fields[4], is_conjugate=False)
+                on += 0.5 * (places[:, None] == elements)
+                on_conjugate = self.of_displacements(*about, fields[3], fields[5], is_conjugate=True)
             for along_x, field in ((True, on + on_conjugate), (False, 1j * (on - on_conjugate))):
                 chosen = (kind == of_kind) & (is_along_x == along_x)
                 result[:, chosen] = field[:, number[chosen]]
@@ -254,19 +234,23 @@ class BoundaryColumns:
             return self.curved.fields(x, places, elements)
         return element_fields(self.constants, x, counted(places, elements), self.start[elements], self.end[elements])
 
-    def _moved(self, fields: ComplexArray, elements: IntArray, touched: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the factors of displacements of elements and of their conjugates, with slopes."""
-        own = np.searchsorted(touched, elements)
-        total, total_conjugate = fields[2][:, own], fields[3][:, own]
+    def of_displacements(
+        self, elements: IntArray, touched: IntArray, on: ComplexArray, on_slope: ComplexArray, *, is_conjugate: bool
+    ) -> ComplexArray:
+        """Return the factors (..., n) of the displacements of elements, or of their conjugates, with slopes.
+
+        From those of the constant parts and slopes, (..., m), on all elements on which these act, `touched`, ascending.
+        """
+        total: ComplexArray = on[..., np.searchsorted(touched, elements)]
         if self.slopes is None or self.means is None:
-            return total, total_conjugate
+            return total
         # an element is the one after its predecessor, itself, and the one before its successor
         for k, acted_on in zip((2, 1, 0), self.neighbours[:, elements], strict=True):
-            at = np.searchsorted(touched, acted_on)
-            slopes, means = self.slopes[k, acted_on], self.means[k, acted_on]
-            total += fields[4][:, at] * slopes + fields[2][:, at] * means
-            total_conjugate += fields[5][:, at] * slopes.conj() + fields[3][:, at] * means.conj()
-        return total, total_conjugate
+            at, slopes, means = np.searchsorted(touched, acted_on), self.slopes[k, acted_on], self.means[k, acted_on]
+            if is_conjugate:
+                slopes, means = slopes.conj(), means.conj()
+            total += on_slope[..., at] * slopes + on[..., at] * means
+        return total
 
 
 def caused(fields: ComplexArray, t: ComplexArray, u: ComplexArray, s: ComplexArray) -> ComplexArray:

@@ -28,6 +28,29 @@ class Discs:
     centre: ComplexArray
     radius: FloatArray
 
+    @classmethod
+    def around(cls, tree: ClusterTree, level: int, points: ComplexArray, held: ComplexArray | None = None) -> Discs:
+        """Return discs about the middles of the boxes around points of each cluster.
+
+        Parameters
+        ----------
+        tree : ClusterTree
+        level : int
+        points : (k, n) complex array [m]
+            Of the element at each place.
+        held : (m, n) complex array, optional [m]
+            The points that the discs hold; by default the same.
+        """
+        begins = tree.bounds[: -1 : 2**level]
+        counts = np.diff(np.append(begins, points.shape[1]))
+        low, high = (
+            of.reduceat(of.reduce(points.real), begins) + 1j * of.reduceat(of.reduce(points.imag), begins)
+            for of in (np.minimum, np.maximum)
+        )
+        centre = 0.5 * (low + high)
+        farthest = np.abs((points if held is None else held) - np.repeat(centre, counts)).max(axis=0)
+        return cls(centre, np.maximum.reduceat(farthest, begins))
+
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
@@ -46,7 +69,7 @@ class Clusters:
     @classmethod
     def around(cls, tree: ClusterTree, points: ComplexArray) -> Clusters:
         """Return clusters whose discs hold some points (k, n) of the element at each place."""
-        return cls(tree, tuple(_discs(tree, points, level) for level in range(tree.n_levels + 1)))
+        return cls(tree, tuple(Discs.around(tree, level, points) for level in range(tree.n_levels + 1)))
 
     def divided(
         self, n_points: int, is_far: Callable[[int, IntArray, IntArray], BoolArray]
@@ -83,16 +106,3 @@ def consecutive(begins: IntArray, counts: IntArray) -> IntArray:
     ends = np.cumsum(counts)
     numbers: IntArray = np.arange(counts.sum()) + np.repeat(begins - (ends - counts), counts)
     return numbers
-
-
-def _discs(tree: ClusterTree, points: ComplexArray, level: int) -> Discs:
-    """Return discs around the clusters of a level, about the middles of the boxes around their points."""
-    begins = tree.bounds[: -1 : 2**level]
-    counts = np.diff(np.append(begins, points.shape[1]))
-    low, high = (
-        of.reduceat(of.reduce(points.real), begins) + 1j * of.reduceat(of.reduce(points.imag), begins)
-        for of in (np.minimum, np.maximum)
-    )
-    centre = 0.5 * (low + high)
-    farthest = np.abs(points - np.repeat(centre, counts)).max(axis=0)
-    return Discs(centre, np.maximum.reduceat(farthest, begins))

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
-from bemkit.operators.hierarchy.element_laws import KNOWN, UNKNOWN, SolvedConditions
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.element_laws import KNOWN, UNKNOWN, ElementLaws, SolvedConditions
 
 
 @dataclass(frozen=True, eq=False)

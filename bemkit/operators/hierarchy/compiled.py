@@ -1,7 +1,8 @@
 """The closed forms of `element_fields` compiled by numba, if the extra ``fast`` is installed and works.
 
-The compiled functions stand in `compiled_fields`, which only this module imports. Compiling takes some seconds, once
-for an installation: numba keeps the result on disk. `bemkit.operators.hierarchy.warm_up` compiles all of them.
+The modules beside this one that import numba are imported only where `functions` says that it works. Compiling takes
+some seconds, once for an installation: numba keeps the result on disk. `bemkit.operators.hierarchy.warm_up` compiles
+all of them.
 """
 
 from __future__ import annotations
@@ -31,17 +32,8 @@ def why() -> str:
 
 
 def functions() -> ModuleType | None:
-    """Return the module of the compiled functions, None if numpy has to do."""
+    """Return the module `compiled_fields`, None if numpy has to do."""
     return _loaded()[0]
-
-
-def products() -> ModuleType | None:
-    """Return the module of the compiled products, None if numpy has to do."""
-    if functions() is None:
-        return None
-    from bemkit.operators.hierarchy import compiled_products
-
-    return compiled_products
 
 
 @cache
@@ -53,9 +45,9 @@ def _loaded() -> tuple[ModuleType | None, str]:
 
         if not is_cached(compiled_fields.__name__):
             announce("compile kernels, once for this installation")
-        point, element = np.array([0.5 + 1.0j]), np.array([0.0j])
-        values = compiled_fields.element_fields(
-            np.array([1.0, 1.0, 0.3, 1.0]), point, np.array([-1]), element, element + 1.0
+        point, start, one = np.array([0.5 + 1.0j]), np.array([0.0j]), np.ones(1, complex)
+        values = compiled_fields.applied(
+            np.array([1.0, 1.0, 0.3, 1.0]), point, np.array([-1]), start, start + 1.0, one, one, one
         )
         if not np.isfinite(values).all():
             return None, "numba computes wrong numbers here: the kernels run in numpy"

@@ -1,4 +1,4 @@
-"""The closed forms of `element_fields` as loops for numba; import it through `compiled` alone.
+"""Columns of the boundary equations as loops for numba; import it through `compiled` alone.
 
 What one element causes at all points stands in the tables of `compiled_tables`, from which columns are put together.
 """
@@ -22,8 +22,6 @@ from bemkit.operators.hierarchy.compiled_tables import (
     UC,
     T,
     U,
-    correct_double,
-    correct_single,
     tabulate_double,
     tabulate_single,
 )
@@ -42,60 +40,6 @@ def _in_blocks(x: ComplexArray) -> tuple[FloatArray, FloatArray]:
         point = x[min(i, x.size - 1)]
         x_x[i], x_y[i] = point.real, point.imag
     return x_x, x_y
-
-
-@numba.njit(**OPTIONS)
-def _of_traction(
-    constants: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-    places: IntArray,
-    number: int,
-    start: complex,
-    end: complex,
-    table: FloatArray,
-) -> None:
-    """Fill a table for the element of a number; see `tabulate_single`."""
-    tabulate_single(constants, x, y, start, end, table)
-    for i in range(places.size):
-        if places[i] == number:
-            correct_single(constants, complex(x[i], y[i]), start, end, table, i)
-
-
-@numba.njit(**OPTIONS)
-def _of_displacement(
-    constants: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-    places: IntArray,
-    number: int,
-    start: complex,
-    end: complex,
-    table: FloatArray,
-) -> None:
-    """Fill a table for the element of a number; see `tabulate_double`."""
-    tabulate_double(constants, x, y, start, end, table)
-    for i in range(places.size):
-        if places[i] == number:
-            correct_double(constants, complex(x[i], y[i]), start, end, table, i)
-
-
-@numba.njit(**OPTIONS)
-def element_fields(
-    constants: FloatArray, x: ComplexArray, places: IntArray, start: ComplexArray, end: ComplexArray
-) -> ComplexArray:
-    """See `element_fields.element_fields`."""
-    x_x, x_y = _in_blocks(x)
-    single, double = np.empty((N_SINGLE, x_x.size)), np.empty((N_DOUBLE, x_x.size))
-    result = np.empty((6, x.size, start.size), np.complex128)
-    for j in range(start.size):
-        _of_traction(constants, x_x, x_y, places, j, start[j], end[j], single)
-        _of_displacement(constants, x_x, x_y, places, j, start[j], end[j], double)
-        for i in range(x.size):
-            result[0, i, j], result[1, i, j] = single[U, i], complex(single[UC, i], single[UC + 1, i])
-            for k in range(4):
-                result[2 + k, i, j] = complex(double[2 * k, i], double[2 * k + 1, i])
-    return result
 
 
 @numba.njit(**OPTIONS)
@@ -157,7 +101,7 @@ def columns(
     for c in range(wanted.size):
         element, kind, component = wanted[c] >> 2, (wanted[c] >> 1) & 1, wanted[c] & 1
         if ready[kind] != element and kind == 0:
-            _of_traction(constants, x_x, x_y, places, element, start[element], end[element], single)
+            tabulate_single(constants, x_x, x_y, places, element, start[element], end[element], single)
             # with its sign in the equations
             for i in range(x_x.size):
                 on[0, 0, i], on[0, 1, i], on[0, 2, i], on[0, 3, i] = (
@@ -178,9 +122,7 @@ def columns(
                 slot = _slot_of(acted_on, around, held)
                 if held[slot] != acted_on:
                     held[slot] = acted_on
-                    _of_displacement(
-                        constants, x_x, x_y, places, acted_on, start[acted_on], end[acted_on], tables[slot]
-                    )
+                    tabulate_double(constants, x_x, x_y, places, acted_on, start[acted_on], end[acted_on], tables[slot])
                 mean, slope = (1.0 + 0j if k == 1 else 0j), 0j
                 if slopes.size:  # an element is the one after its predecessor, itself, and the one before its successor
                     mean, slope = mean + means[2 - k, acted_on], slopes[2 - k, acted_on]
@@ -238,11 +180,11 @@ def applied(
     for j in range(start.size):
         t, u, s = traction[j], displacement[j], slope[j]
         if t != 0.0:
-            _of_traction(constants, x_x, x_y, places, j, start[j], end[j], single)
+            tabulate_single(constants, x_x, x_y, places, j, start[j], end[j], single)
             # conj(p) has the factors of a complex number, p those of a real one
             real -= t.real * single[U] + t.real * single[UC] + t.imag * single[UC + 1]
             imaginary -= t.imag * single[U] + t.real * single[UC + 1] - t.imag * single[UC]
-        _of_displacement(constants, x_x, x_y, places, j, start[j], end[j], double)
+        tabulate_double(constants, x_x, x_y, places, j, start[j], end[j], double)
         _add(real, imaginary, double[T : T + 2], u, double[TS : TS + 2], s)
         _add(real, imaginary, double[TC : TC + 2], u.conjugate(), double[TSC : TSC + 2], s.conjugate())
     return real[: x.size] + 1j * imaginary[: x.size]

@@ -1,6 +1,6 @@
 """Products with the layers of straight elements nearby, as loops for numba; import it through `compiled` alone.
 
-The closed forms are those of `compiled_fields`, in the axes of each element and summed at once. Errors count by the
+The closed forms are those of `compiled_tables`, in the axes of each element and summed at once. Errors count by the
 largest term, not by each one, so that constant densities need no series at any distance.
 """
 

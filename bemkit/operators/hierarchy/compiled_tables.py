@@ -12,7 +12,7 @@ import math
 import numba
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import FloatArray, IntArray
 from bemkit.operators.hierarchy.compiled_functions import MATHEMATICS, OPTIONS, atan2, log
 from bemkit.operators.hierarchy.series import FAR, REST, SERIES
 
@@ -214,37 +214,7 @@ def _run(x: FloatArray, y: FloatArray, begin: int, start: complex, end: complex)
 
 
 @numba.njit(**OPTIONS)
-def tabulate_single(
-    constants: FloatArray, x: FloatArray, y: FloatArray, start: complex, end: complex, table: FloatArray
-) -> None:
-    """Fill a table (N_SINGLE, n_points) with what a traction causes at points none of which is its middle."""
-    following = 0
-    while following < x.size:
-        begin = following
-        following, is_far = _run(x, y, begin, start, end)
-        if is_far:
-            _single_far(constants, x[begin:following], y[begin:following], begin, start, end, table)
-        else:
-            _single_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
-
-
-@numba.njit(**OPTIONS)
-def tabulate_double(
-    constants: FloatArray, x: FloatArray, y: FloatArray, start: complex, end: complex, table: FloatArray
-) -> None:
-    """Fill a table (N_DOUBLE, n_points) with what a displacement and its slope cause."""
-    following = 0
-    while following < x.size:
-        begin = following
-        following, is_far = _run(x, y, begin, start, end)
-        if is_far:
-            _double_far(constants, x[begin:following], y[begin:following], begin, start, end, table)
-        else:
-            _double_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
-
-
-@numba.njit(**OPTIONS)
-def correct_single(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
+def _correct_single(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
     """Replace the values at a point that is the middle of the element: zeta is zero."""
     single, _, nu, log_length = constants
     half, _, _, _, turn_x, turn_y = _shape(start, end)
@@ -254,10 +224,51 @@ def correct_single(constants: FloatArray, x: complex, start: complex, end: compl
 
 
 @numba.njit(**OPTIONS)
-def correct_double(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
-    """Do the same for a displacement: the angle is a principal value."""
+def _correct_double(constants: FloatArray, x: complex, start: complex, end: complex, table: FloatArray, i: int) -> None:
+    """Do the same for a displacement and its slope: the angle is a principal value."""
     _, double, nu, _ = constants
     of_ratio = -double * (1.0 - 2.0 * nu)
     table[:, i] = 0.0
     table[T + 1, i] = of_ratio * (math.log(abs(x - start)) - math.log(abs(x - end)))
     table[TS + 1, i] = -2.0 * of_ratio
+
+
+@numba.njit(**OPTIONS)
+def tabulate_single(
+    constants: FloatArray, x: FloatArray, y: FloatArray, places: IntArray, number: int, start: complex, end: complex,
+    table: FloatArray,
+) -> None:  # fmt: skip
+    """Fill a table (N_SINGLE, n_points) with what a traction on the element of a number causes at points.
+
+    `places` are the numbers of the elements in whose middle the first points are, those behind in none.
+    """
+    following = 0
+    while following < x.size:
+        begin = following
+        following, is_far = _run(x, y, begin, start, end)
+        if is_far:
+            _single_far(constants, x[begin:following], y[begin:following], begin, start, end, table)
+        else:
+            _single_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
+    for i in range(places.size):
+        if places[i] == number:
+            _correct_single(constants, complex(x[i], y[i]), start, end, table, i)
+
+
+@numba.njit(**OPTIONS)
+def tabulate_double(
+    constants: FloatArray, x: FloatArray, y: FloatArray, places: IntArray, number: int, start: complex, end: complex,
+    table: FloatArray,
+) -> None:  # fmt: skip
+    """Fill a table (N_DOUBLE, n_points) with what a displacement and its slope cause; see `tabulate_single`."""
+    following = 0
+    while following < x.size:
+        begin = following
+        following, is_far = _run(x, y, begin, start, end)
+        if is_far:
+            _double_far(constants, x[begin:following], y[begin:following], begin, start, end, table)
+        else:
+            _double_near(constants, x[begin:following], y[begin:following], begin, start, end, table)
+    for i in range(places.size):
+        if places[i] == number:
+            _correct_double(constants, complex(x[i], y[i]), start, end, table, i)

@@ -12,8 +12,9 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.columns import Columns
-from bemkit.operators.hierarchy.proxies import Discs, extents, n_proxies
-from bemkit.operators.hierarchy.skeletons import CollocationView, LevelView, Skeleton
+from bemkit.operators.hierarchy.proxies import discs_of, extents, n_proxies
+from bemkit.operators.hierarchy.skeletons import CollocationView, Skeleton
+from bemkit.operators.hierarchy.symmetric_skeletons import SymmetricView
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.threads import for_each_chunk
 
@@ -38,14 +39,7 @@ class Compression:
     skeletons: tuple[tuple[Skeleton, ...], ...]
 
     @classmethod
-    def of(
-        cls,
-        columns: Columns,
-        tree: ClusterTree,
-        may_differ: BoolArray,
-        tolerance: float,
-        view_of: type[LevelView] | None = None,
-    ) -> Compression:
+    def of(cls, columns: Columns, tree: ClusterTree, may_differ: BoolArray, tolerance: float) -> Compression:
         """Compress the equations.
 
         Parameters
@@ -57,8 +51,6 @@ class Compression:
             By place: which tractions and displacements may differ from zero.
         tolerance : float
             Of the skeletons of leaves; those above are finer, so that errors do not grow with the number of elements.
-        view_of : class, optional
-            What chooses the skeletons of a level; by default that of collocation.
         """
         every = np.arange(4 * columns.n_elements).reshape(-1, 4)
         leaves = [tree.places(0, leaf) for leaf in range(tree.n_leaves)]
@@ -67,11 +59,10 @@ class Compression:
         candidates = [columns.felt(each) for each in unknowns]
         extent = extents(columns)
         levels: list[tuple[Skeleton, ...]] = []
+        view_of = SymmetricView if columns.is_symmetric else CollocationView
         for level in range(tree.n_levels):
-            discs = Discs.of(columns, tree, level)
-            view = (view_of or CollocationView)(
-                columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0
-            )
+            discs = discs_of(columns, tree, level)
+            view = view_of(columns, discs, rows, candidates, extent, tolerance, is_lowest=level == 0)
             n_integrals = columns.n_elements * n_proxies(tolerance)
             skeletons = tuple(for_each_chunk(view.skeleton, range(len(rows)), n_integrals=n_integrals))
             levels.append(skeletons)

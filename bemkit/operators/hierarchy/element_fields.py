@@ -22,7 +22,6 @@ from typing import TypeVar
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
-from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.series import FAR, REST, SERIES
 from bemkit.operators.material import Material
 
@@ -36,9 +35,9 @@ class Constants:
     Parameters
     ----------
     single : float [1/Pa]
-        A / (2 pi) and so on: 1 / (8 pi mu (1 - nu)).
+        A = 1 / (8 pi mu (1 - nu)).
     double : float [-]
-        1 / (4 pi (1 - nu)).
+        B = 1 / (4 pi (1 - nu)).
     poisson_ratio : float [-]
         Of plane strain.
     log_length : float [m]
@@ -81,9 +80,6 @@ def element_fields(
     -----
     p is a constant traction, v a constant displacement and s its slope by the coordinate t, from -1 to 1.
     """
-    if (fast := compiled.functions()) is not None:
-        values: ComplexArray = fast.element_fields(constants.numbers, x, places, start, end)
-        return values
     near = _Near(x, start, end, places)
     half = 0.5 * np.abs(end - start)
     tangent = (end - start) / (2.0 * half)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,24 @@ KNOWN = np.array(list(itertools.combinations(range(4), 2)))
 """(6, 2): the pairs of (t_1, t_2, u_1, u_2) for which two conditions can be solved."""
 UNKNOWN = np.array([sorted(set(range(4)) - set(pair), key=lambda k: k % 2) for pair in KNOWN.tolist()])
 """(6, 2): the others, those along the first direction before those along the second one."""
+
+
+@dataclass(frozen=True, eq=False)
+class ElementLaws:
+    """What is known on each element: (t_x, t_y, u_x, u_y) = factors @ z + given.
+
+    Parameters
+    ----------
+    factors : (n_elements, 4, 2) array
+    given : (n_elements, 4) array
+    """
+
+    factors: FloatArray
+    given: FloatArray
+
+    def take(self, rows: IntArray) -> ElementLaws:
+        """Return those of some elements."""
+        return ElementLaws(self.factors[rows], self.given[rows])
 
 
 class SolvedConditions(NamedTuple):
@@ -35,11 +54,29 @@ class SolvedConditions(NamedTuple):
     given: FloatArray
     is_determined: BoolArray
 
+    def in_full(self) -> ElementLaws:
+        """Return all four quantities; what the conditions were solved for follows exactly, the others are z."""
+        n = len(self.choice)
+        factors, given, nodes = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
+        factors[nodes, KNOWN[self.choice]] = self.coupling
+        factors[nodes, UNKNOWN[self.choice], [0, 1]] = self.is_determined[:, None]
+        given[nodes, KNOWN[self.choice]] = self.given
+        return ElementLaws(factors, given)
+
 
 def solve_for_two(
     on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
 ) -> SolvedConditions:
-    """Solve two conditions a node for two of its four quantities; see `solve_conditions`."""
+    """Solve two conditions a node for two of its four quantities; the other two remain unknown.
+
+    Parameters
+    ----------
+    on_traction, on_displacement : (n, 2, 2) arrays
+        Axes node, condition, component.
+    value : (n, 2) array
+    displacement_unit : float [m/Pa]
+        Typical displacement per traction, by which the choice compares the two.
+    """
     conditions = np.concatenate([on_traction, on_displacement], axis=2)
     scaled = conditions * np.array([1.0, 1.0, displacement_unit, displacement_unit])
     sizes = np.abs(scaled).max(axis=2, keepdims=True)
@@ -59,36 +96,6 @@ def solve_for_two(
     coupling[nodes] = -inverse @ of_unknown
     given[nodes] = (inverse @ value[nodes, :, None])[:, :, 0]
     return SolvedConditions(choice.astype(np.int8), coupling, given, best > 0.0)
-
-
-def solve_conditions(
-    on_traction: FloatArray, on_displacement: FloatArray, value: FloatArray, displacement_unit: float
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Solve two conditions a node for two of its four quantities; the other two remain unknown.
-
-    Parameters
-    ----------
-    on_traction, on_displacement : (n, 2, 2) arrays
-        Axes node, condition, component.
-    value : (n, 2) array
-    displacement_unit : float [m/Pa]
-        Typical displacement per traction, by which the choice compares the two.
-
-    Returns
-    -------
-    factors : (n, 4, 2) array
-    given : (n, 4) array
-        (t_1, t_2, u_1, u_2) = factors @ z + given. What is solved for follows exactly; the others are the unknowns z.
-    is_determined : (n,) bool array
-        Whether the conditions are two.
-    """
-    choice, coupling, known, is_determined = solve_for_two(on_traction, on_displacement, value, displacement_unit)
-    n = len(value)
-    factors, given, nodes = np.zeros((n, 4, 2)), np.zeros((n, 4)), np.arange(n)[:, None]
-    factors[nodes, KNOWN[choice]] = coupling
-    factors[nodes, UNKNOWN[choice], [0, 1]] = is_determined[:, None]
-    given[nodes, KNOWN[choice]] = known
-    return factors, given, is_determined
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:

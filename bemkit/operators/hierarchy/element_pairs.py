@@ -126,11 +126,6 @@ class ElementPairs:
         rule = Rule.of(panels, tuple(n for n, _ in RULES), degree)
         return cls(degree, panels.centre, panels.half, reach, rule, begins, columns, np.concatenate(parts))
 
-    @property
-    def n_bytes(self) -> int:
-        """Memory [bytes]."""
-        return self.near.nbytes + self.columns.nbytes + self.rule.point.nbytes + self.rule.tangent.nbytes
-
     def integrals(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return the integrals (n_channels, n_rows, n_columns) of some elements, ascending, in any two sets."""
         rule = self.rule

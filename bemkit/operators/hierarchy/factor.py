@@ -20,6 +20,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.compression import Compression
+from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.known_loads import KnownLoads
 from bemkit.operators.hierarchy.skeletons import Skeleton
 from bemkit.operators.linear.dense import SingularMatrixError
@@ -27,24 +28,6 @@ from bemkit.operators.linear.threads import for_each_chunk
 
 _SMALLEST_PIVOT = 1e-13
 """Pivots below this share of the largest entry of their column are round-off."""
-
-
-@dataclass(frozen=True, eq=False)
-class ElementLaws:
-    """What is known on each element: (t_x, t_y, u_x, u_y) = factors @ z + given.
-
-    Parameters
-    ----------
-    factors : (n_elements, 4, 2) array
-    given : (n_elements, 4) array
-    """
-
-    factors: FloatArray
-    given: FloatArray
-
-    def take(self, rows: IntArray) -> ElementLaws:
-        """Return those of some elements."""
-        return ElementLaws(self.factors[rows], self.given[rows])
 
 
 @dataclass(frozen=True, eq=False)

@@ -117,12 +117,14 @@ class FastMultipole(_LinearOperator):
     def _add_nearby(self, densities: Densities, result: ComplexArray) -> None:
         """Add what the elements of the leaves that are not far from each one cause there."""
         elements, tree, near, first = self.elements, self.tree, self._near.source, self._near.first
-        fast, constants = compiled.products(), elements.constants
+        is_compiled, constants = compiled.functions() is not None, elements.constants
 
         def add_to_leaves(some: slice) -> None:
-            if fast is not None:
+            if is_compiled:
+                from bemkit.operators.hierarchy.compiled_products import add_nearby
+
                 geometry = elements.nodes, elements.mesh.elements, tree.order, tree.bounds
-                fast.add_nearby(constants.numbers, *geometry, *densities, first, near, some.start, some.stop, result)
+                add_nearby(constants.numbers, *geometry, *densities, first, near, some.start, some.stop, result)
                 return
             for leaf in range(some.start, some.stop):
                 own = tree.order[tree.places(0, leaf)]

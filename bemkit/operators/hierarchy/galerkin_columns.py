@@ -82,6 +82,7 @@ class GalerkinColumns:
     mass: csr_array
     proxy_rule: Rule
     at_proxies: csr_array
+    is_symmetric = True
 
     @classmethod
     def of(
@@ -113,11 +114,6 @@ class GalerkinColumns:
         )
 
     @property
-    def is_symmetric(self) -> bool:
-        """True."""
-        return True
-
-    @property
     def n_elements(self) -> int:
         """Number of places."""
         return self.order.size
@@ -129,7 +125,7 @@ class GalerkinColumns:
 
     @cached_property
     def units(self) -> FloatArray:
-        """(n_places,) array [Pa, or 1 at nodes]: of the tractions, by which their equations are multiplied, too."""
+        """(n_places,) array [Pa/m, or 1 at nodes]: of the tractions, by which their equations are multiplied, too."""
         return np.where(self.is_node, 1.0, self.material.plane_modulus / self.lengths)
 
     @property

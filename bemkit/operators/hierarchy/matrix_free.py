@@ -10,13 +10,12 @@ import numpy as np
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.errors import NoResultError
 from bemkit.geometry.mesh import BoundaryMesh
-from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, fields_of
+from bemkit.operators.collocation.reciprocity import Arcs, ReciprocalField, reciprocal_fields
 from bemkit.operators.hierarchy.compact_laws import CompactLaws
-from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_for_two
 from bemkit.operators.hierarchy.fast_multipole import FastMultipole
 from bemkit.operators.hierarchy.preconditioner import Preconditioner
 from bemkit.operators.hierarchy.straight_elements import StraightElements, pairs
-from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
+from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.gmres import SingleArray, gmres
 from bemkit.operators.linear.solvers import MatrixFree
 from bemkit.operators.material import Material
@@ -51,7 +50,9 @@ class WholeBoundary:
     @classmethod
     def of(cls, elements: StraightElements, material: Material) -> WholeBoundary:
         """Return those of a mesh."""
-        return cls(elements, material, fields_of(elements.mesh))
+        loops = zip(elements.mesh.loops, elements.mesh.loop_areas, strict=True)
+        fields = [field for loop, area in loops for field in reciprocal_fields(elements.mesh, loop, area)]
+        return cls(elements, material, fields)
 
     @property
     def n_unknowns(self) -> int:
@@ -115,7 +116,7 @@ class MatrixFreeSystem(HierarchicalSystem):
     def __init__(
         self, mesh: BoundaryMesh, material: Material, frame: FloatArray, options: MatrixFree, *, slopes: bool
     ) -> None:
-        self._n_elements, self._frame, self._material = mesh.n_elements, frame, material
+        self.n_elements, self._frame, self._material = mesh.n_elements, frame, material
         self._unit = mesh.diameter / mesh.n_elements / material.plane_modulus
         self._tolerance, self._max_steps = options.tolerance, options.max_steps
         self._elements = StraightElements.of(mesh, material, takes_slopes=slopes)
@@ -136,8 +137,7 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def laws(self, conditions: NodeConditions) -> CompactLaws:  # type: ignore[override]  # what `state` takes
         """Return what conditions on all elements make of their tractions and displacements, in their frames."""
-        of_all = conditions.on_traction, conditions.on_displacement, conditions.value
-        parts = (self._solved(NodeConditions(*(of[some] for of in of_all))) for some in self._elements.chunks())
+        parts = (conditions.take(some).solved(self._unit) for some in self._elements.chunks())
         return CompactLaws.joined([CompactLaws.of(each) for each in parts])
 
     def state(self, known: CompactLaws, elements: IntArray, conditions: NodeConditions) -> FloatArray:  # type: ignore[override]
@@ -151,7 +151,7 @@ class MatrixFreeSystem(HierarchicalSystem):
             If the steps do not suffice.
         """
         self._n_answers += 1
-        laws, before = known.replaced(elements, self._solved(conditions)), self._laws
+        laws, before = known.replaced(elements, conditions.solved(self._unit)), self._laws
         if before is None or not laws.has_factors_of(before):
             self._begin_with(laws)
             self._inverse = None  # before another is made
@@ -172,15 +172,7 @@ class MatrixFreeSystem(HierarchicalSystem):
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements; see `HierarchicalSystem.residual`."""
         t, u = (each @ np.array([1.0, 1j]) for each in (traction, displacement))
-        return self._left(t, u, self._x[2 * self._n_elements :])[0][elements]
-
-    def _solved(self, conditions: NodeConditions) -> SolvedConditions:
-        """Return what conditions make of tractions and displacements in the frames of their elements."""
-        of = conditions.on_traction, conditions.on_displacement, conditions.value
-        solved = solve_for_two(*of, self._unit)
-        if not solved.is_determined.all():
-            raise UndeterminedError("the two conditions at a contact node are not independent")
-        return solved
+        return self._left(t, u, self._x[2 * self.n_elements :])[0][elements]
 
     def _units(self, laws: CompactLaws, elements: IntArray) -> FloatArray:
         """Return the units (n, 2) of the unknowns of some elements in the iteration."""
@@ -188,12 +180,12 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def _local(self, laws: CompactLaws, elements: IntArray, x: Vector, *, is_change: bool = False) -> FloatArray:
         """Return (t_1, t_2, u_1, u_2) of some elements; of a change of the unknowns their change."""
-        unknowns = x[: 2 * self._n_elements].reshape(-1, 2)[elements]
+        unknowns = x[: 2 * self.n_elements].reshape(-1, 2)[elements]
         return laws.state(elements, unknowns * self._units(laws, elements), is_change=is_change)
 
     def _fields(self, laws: CompactLaws, x: Vector, *, is_change: bool = False) -> tuple[ComplexArray, ComplexArray]:
         """Return complex tractions and displacements (n_elements,), in x and y; of a change their change."""
-        traction, displacement = np.empty((2, self._n_elements), complex)
+        traction, displacement = np.empty((2, self.n_elements), complex)
         for some in self._elements.chunks():
             local = self._local(laws, some, x, is_change=is_change)
             directions = self._frame[some] @ [1.0, 1j]
@@ -206,7 +198,7 @@ class MatrixFreeSystem(HierarchicalSystem):
         self._is_solved = False
         if self._laws is None:
             return
-        unknowns = self._x[: 2 * self._n_elements].reshape(-1, 2)
+        unknowns = self._x[: 2 * self.n_elements].reshape(-1, 2)
         for some in self._elements.chunks():
             unknowns[some] = laws.unknowns(some, self._local(self._laws, some, self._x)) / self._units(laws, some)
 
@@ -222,7 +214,7 @@ class MatrixFreeSystem(HierarchicalSystem):
 
     def _solve(self, laws: CompactLaws, inverse: Preconditioner) -> None:
         """Find the unknowns that fulfil the equations under laws."""
-        n = 2 * self._n_elements
+        n = 2 * self.n_elements
 
         def preconditioned(x: Vector, *, is_change: bool = True) -> FloatArray:
             equations, balances = self._left(*self._fields(laws, x, is_change=is_change), x[n:])

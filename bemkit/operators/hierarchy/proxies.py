@@ -8,12 +8,11 @@ way round [MartinssonRokhlin2005].
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy import compiled
+from bemkit.operators.hierarchy.clusters import Discs
 from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.tree import ClusterTree
 
@@ -21,46 +20,26 @@ PROXY_RATIO = 2.0
 """Radius of the proxy circle by that of the cluster: what varies m times along the circle decays like 2^-m inside."""
 
 
-@dataclass(frozen=True, eq=False)
-class Discs:
-    """Discs around the clusters of one level, with all elements on which their unknowns act.
+def discs_of(columns: Columns, tree: ClusterTree, level: int) -> Discs:
+    """Return discs around the clusters of a level, with all elements on which their unknowns act."""
+    ends = np.stack([columns.start, columns.centre, columns.end])
+    n = columns.n_elements
+    return Discs.around(tree, level, ends[:, :n], ends[:, columns.reach].reshape(-1, n))
 
-    Parameters
-    ----------
-    centre : (n_clusters,) complex array [m]
-    radius : (n_clusters,) array [m]
-    """
 
-    centre: ComplexArray
-    radius: FloatArray
+def near_clusters(discs: Discs, cluster: int) -> IntArray:
+    """Return the other clusters of a level that reach into the proxy circle of one."""
+    distance = np.abs(discs.centre - discs.centre[cluster])
+    distance[cluster] = np.inf
+    found: IntArray = np.flatnonzero(distance < discs.radius + PROXY_RATIO * discs.radius[cluster])
+    return found
 
-    @classmethod
-    def of(cls, columns: Columns, tree: ClusterTree, level: int) -> Discs:
-        """Return the discs of a level of a tree."""
-        begins = tree.bounds[: -1 : 2**level]
-        counts = np.diff(np.append(begins, columns.n_elements))
-        ends = np.stack([columns.start, columns.centre, columns.end])
-        own = ends[:, : columns.n_elements]
-        low, high = (
-            of.reduceat(bound.real, begins) + 1j * of.reduceat(bound.imag, begins)
-            for of, bound in ((np.minimum, _box(np.minimum, own)), (np.maximum, _box(np.maximum, own)))
-        )
-        centre = 0.5 * (low + high)
-        farthest = np.abs(ends[:, columns.reach] - np.repeat(centre, counts)).max(axis=(0, 1))
-        return cls(centre, np.maximum.reduceat(farthest, begins))
 
-    def near(self, cluster: int) -> IntArray:
-        """Return the other clusters that reach into the proxy circle of one."""
-        distance = np.abs(self.centre - self.centre[cluster])
-        distance[cluster] = np.inf
-        found: IntArray = np.flatnonzero(distance < self.radius + PROXY_RATIO * self.radius[cluster])
-        return found
-
-    def points(self, cluster: int, n_points: int) -> ComplexArray:
-        """Return points on the proxy circle of a cluster."""
-        turns = np.exp(2j * np.pi * np.arange(n_points) / n_points)
-        points: ComplexArray = self.centre[cluster] + PROXY_RATIO * self.radius[cluster] * turns
-        return points
+def proxy_points(discs: Discs, cluster: int, n_points: int) -> ComplexArray:
+    """Return points on the proxy circle of a cluster."""
+    turns = np.exp(2j * np.pi * np.arange(n_points) / n_points)
+    points: ComplexArray = discs.centre[cluster] + PROXY_RATIO * discs.radius[cluster] * turns
+    return points
 
 
 def n_proxies(tolerance: float) -> int:
@@ -99,8 +78,3 @@ def point_forces(x: ComplexArray, sources: ComplexArray, poisson_ratio: float, l
     turned = arm / squared
     result = np.stack([log + arm.real * turned, 1j * log + arm.imag * turned], axis=1)
     return result.reshape(2 * sources.size, x.size).view(float)
-
-
-def _box(of: np.ufunc, ends: ComplexArray) -> ComplexArray:
-    bound: ComplexArray = of.reduce(ends.real) + 1j * of.reduce(ends.imag)
-    return bound

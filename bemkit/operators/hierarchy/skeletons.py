@@ -14,9 +14,10 @@ import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.boundary_columns import NOWHERE, BoundaryColumns
+from bemkit.operators.hierarchy.clusters import Discs
 from bemkit.operators.hierarchy.columns import Columns
 from bemkit.operators.hierarchy.interpolative import Block, Interpolation, sketched
-from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, n_proxies, point_forces
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, n_proxies, near_clusters, point_forces, proxy_points
 
 _FLOOR = 2e-13
 """No tolerance of a level is smaller: below, round-off of the entries would be compressed."""
@@ -66,7 +67,7 @@ class LevelView(ABC):
 
     def near(self, cluster: int) -> tuple[IntArray, IntArray]:
         """Return the rows and columns of other clusters that lie in the proxy circle of one, or reach into it."""
-        near = self.discs.near(cluster)
+        near = near_clusters(self.discs, cluster)
         if not near.size:
             return np.zeros(0, np.intp), np.zeros(0, np.intp)
         rows = np.concatenate([self.rows[other] for other in near])
@@ -99,7 +100,7 @@ class LevelView(ABC):
 
     def proxies(self, cluster: int) -> ComplexArray:
         """Return the points that stand for all that is far from a cluster."""
-        return self.discs.points(cluster, n_proxies(self.tolerance))
+        return proxy_points(self.discs, cluster, n_proxies(self.tolerance))
 
 
 class CollocationView(LevelView):

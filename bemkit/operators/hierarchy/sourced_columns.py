@@ -123,15 +123,9 @@ class SourcedColumns(BoundaryColumns):
         touched = np.unique(inner.reach[:, elements])
         arcs = self.arcs.take(touched)
         traction, displacement, gradient = self.sources[place].work(arcs, self.material)
+        on_slope = gradient / (0.5 * inner.lengths * _tangents(inner))[touched]
+        on_displacement = inner.of_displacements(elements, touched, displacement, on_slope, is_conjugate=False)
         own = np.searchsorted(touched, elements)
-        on_displacement = displacement[own].copy()
-        if inner.slopes is not None and inner.means is not None:
-            on_slope = gradient * (0.5 * inner.lengths * _tangents(inner))[touched] ** -1
-            for k, acted_on in zip((2, 1, 0), inner.neighbours[:, elements], strict=True):
-                at = np.searchsorted(touched, acted_on)
-                on_displacement += (
-                    on_slope[at] * inner.slopes[k, acted_on] + displacement[at] * inner.means[k, acted_on]
-                )
         # Re(factor v) of v = 1 and v = i
         factor = np.where((columns // 2) % 2 == 0, traction[own][number], -on_displacement[number])
         return np.where(columns % 2 == 0, factor.real, -factor.imag)

@@ -79,8 +79,8 @@ class StraightElements:
             half = 0.5 * (self.nodes[ends[1]] - self.nodes[ends[0]])
             of = GradientReconstruction.between(neighbours, centres, half, self.is_corner[ends])
             values = displacement[neighbours]
-            mean[some] += of.mean_before * values[0] + of.mean_own * values[1] + of.mean_after * values[2]
-            slope[some] = of.before * values[0] + of.own * values[1] + of.after * values[2]
+            mean[some] += np.sum(of.means * values, axis=0)
+            slope[some] = np.sum(of.slopes * values, axis=0)
         return mean, slope
 
 

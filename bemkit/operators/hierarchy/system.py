@@ -9,8 +9,8 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.element_laws import solve_conditions
-from bemkit.operators.hierarchy.factor import Border, ElementLaws, HierarchicalFactor
+from bemkit.operators.hierarchy.element_laws import ElementLaws, SolvedConditions, solve_for_two
+from bemkit.operators.hierarchy.factor import Border, HierarchicalFactor
 from bemkit.operators.linear.dense import SingularMatrixError
 
 
@@ -45,6 +45,23 @@ class NodeConditions:
         known += np.einsum("nrk,nk->nr", self.on_displacement, displacement)
         return replace(self, value=self.value - known)
 
+    def take(self, elements: IntArray) -> NodeConditions:
+        """Return those at some of the elements."""
+        return NodeConditions(self.on_traction[elements], self.on_displacement[elements], self.value[elements])
+
+    def solved(self, displacement_unit: float) -> SolvedConditions:
+        """Return what they make of tractions and displacements, in the frames of the elements; see `solve_for_two`.
+
+        Raises
+        ------
+        UndeterminedError
+            If the two conditions at an element are not independent.
+        """
+        solved = solve_for_two(self.on_traction, self.on_displacement, self.value, displacement_unit)
+        if not solved.is_determined.all():
+            raise UndeterminedError("the two conditions at a contact node are not independent")
+        return solved
+
 
 class UndeterminedError(SingularMatrixError):
     """Two conditions at an element that are only one."""
@@ -78,17 +95,12 @@ class HierarchicalSystem:
         may_change: BoolArray,
     ) -> None:
         self.compression, self._tree, self._columns = compression, compression.tree, compression.columns
-        self._order, self._n_elements, self._unit = self._tree.order, len(frame), displacement_unit
+        self._order, self.n_elements, self._unit = self._tree.order, len(frame), displacement_unit
         self._place = np.empty_like(self._order)
         self._place[self._order] = np.arange(self._order.size)
         changing = self._tree.leaves_of(self._place[np.flatnonzero(may_change)])
         self.factor = HierarchicalFactor(compression, border, frozenset(changing.tolist()))
         self._frame = np.concatenate([frame, np.tile(np.eye(2), (self._order.size - len(frame), 1, 1))])
-
-    @property
-    def n_elements(self) -> int:
-        """Number of elements."""
-        return self._n_elements
 
     @property
     def n_answers(self) -> int:
@@ -119,7 +131,7 @@ class HierarchicalSystem:
         """
         factors, given = known.factors, known.given
         places = self._place[elements]
-        local = self.local_laws(conditions)
+        local = conditions.solved(self._unit).in_full()
         if elements.size:
             own = turned(local, self._frame[elements])
             factors, given = factors.copy(), given.copy()
@@ -165,15 +177,12 @@ class HierarchicalSystem:
 
     def everywhere(self) -> tuple[FloatArray, FloatArray]:
         """Return tractions and displacements (n_elements, 2) in x and y under the conditions of the last `state`."""
-        state = np.empty((self._order.size, 4))
-        state[self._order] = self._states()
-        return state[: self.n_elements, :2], state[: self.n_elements, 2:]
+        state = self._states()[self._place[: self.n_elements]]
+        return state[:, :2], state[:, 2:]
 
     def beyond(self) -> FloatArray:
         """Return the tractions (n, 2), in x and y, at the places beyond the elements, under the same conditions."""
-        state = np.empty((self._order.size, 4))
-        state[self._order] = self._states()
-        return state[self.n_elements :, :2]
+        return self._states()[self._place[self.n_elements :], :2]
 
     def residual(self, elements: IntArray, traction: FloatArray, displacement: FloatArray) -> FloatArray:
         """Return what is left (n, 2) of the equations of some elements, nothing compressed, as displacements.
@@ -199,16 +208,7 @@ class HierarchicalSystem:
         n_holes = self._order.size - self.n_elements
         free = NodeConditions.given(np.ones((n_holes, 2), bool), *np.zeros((2, n_holes, 2)))
         every = NodeConditions(*map(np.concatenate, zip(vars(conditions).values(), vars(free).values(), strict=True)))
-        return turned(self.local_laws(every), self._frame).take(self._order)
-
-    def local_laws(self, conditions: NodeConditions) -> ElementLaws:
-        """Return what conditions make of tractions and displacements, in the frames of their elements."""
-        factors, given, is_determined = solve_conditions(
-            conditions.on_traction, conditions.on_displacement, conditions.value, self._unit
-        )
-        if not is_determined.all():
-            raise UndeterminedError("the two conditions at a contact node are not independent")
-        return ElementLaws(factors, given)
+        return turned(every.solved(self._unit).in_full(), self._frame).take(self._order)
 
     def _states(self) -> FloatArray:
         """Return (t_x, t_y, u_x, u_y) at all places under the conditions of the last `state`."""

@@ -21,7 +21,7 @@ from bemkit.operators.hierarchy.source_series import SEPARATION, SourceSeries
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.kernels import legendre_values
 from bemkit.operators.material import Material
-from bemkit.operators.somigliana.moments import N_POINTS, CurvedElements
+from bemkit.operators.somigliana.moments import N_POINTS, ArcQuadrature
 
 ORDER = 34
 """Largest power of the series: stresses of single clusters err by 1e-13, each power is worth a factor of three."""
@@ -35,7 +35,7 @@ class FarFields:
     ----------
     clusters : Clusters
     panels : Panels
-    curved : CurvedElements
+    curved : ArcQuadrature
     material : Material
     displacement, traction : (n_elements, n) complex arrays [m], [Pa]
         Coefficients of Legendre polynomials.
@@ -47,7 +47,7 @@ class FarFields:
         self,
         clusters: Clusters,
         panels: Panels,
-        curved: CurvedElements,
+        curved: ArcQuadrature,
         material: Material,
         displacement: ComplexArray,
         traction: ComplexArray,

@@ -37,7 +37,6 @@ from bemkit.operators.somigliana.moments import (
     CENTRE,
     END,
     START,
-    CurvedElements,
     straight_displacement_moments,
     straight_gradient_moments,
 )
@@ -125,7 +124,7 @@ class InteriorFields:
         self._displacement = _element_polynomials(mesh, displacement_space, displacement_dofs, "displacement")
         self._traction = _element_polynomials(mesh, traction_space, traction_dofs, "traction")
         self._locator = Locator(mesh)
-        self._curved = CurvedElements(mesh, mesh.centre)
+        self._curved = self._locator.curved
         centre = (float(mesh.centre[0]), float(mesh.centre[1]))
         curves = tuple(MovedCurve(curve, centre, 1.0) for curve in mesh.curves)
         self._panels = Panels(mesh.unchecked_copy(mesh.nodes - mesh.centre, curves))

@@ -12,7 +12,7 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.pieces import RESOLUTION
 from bemkit.operators.hierarchy.clusters import Clusters, consecutive
 from bemkit.operators.hierarchy.tree import ClusterTree
-from bemkit.operators.somigliana.moments import CurvedElements
+from bemkit.operators.somigliana.moments import ArcQuadrature
 
 LEAF_SIZE = 20
 """Elements of a leaf."""
@@ -60,7 +60,7 @@ class Locator:
 
     def __init__(self, mesh: BoundaryMesh) -> None:
         self._mesh = mesh
-        self._curved = CurvedElements(mesh, mesh.centre)
+        self.curved = ArcQuadrature(mesh, mesh.centre)
         self._centre = complex(*mesh.centre)
         n_chords = np.where(mesh.is_straight, 1, N_CHORDS)
         self._owner: IntArray = np.repeat(np.arange(mesh.n_elements), n_chords)
@@ -87,7 +87,7 @@ class Locator:
         )
         points: ComplexArray = (0.5 - 0.5 * xi) * start + (0.5 + 0.5 * xi) * end
         curved = np.flatnonzero(~self._mesh.is_straight[self._owner])
-        points[curved] = self._curved.place(self._owner[curved], xi[curved, None])[0][:, 0]
+        points[curved] = self.curved.place(self._owner[curved], xi[curved, None])[0][:, 0]
         return points
 
     def locate(self, points: FloatArray) -> Location:
@@ -159,16 +159,16 @@ class Locator:
 
         Return its local coordinate, the way from there to the point, and the tangent there.
         """
-        _, ends = self._curved.place(element, np.tile([-1.0, 1.0], (element.size, 1)))
+        _, ends = self.curved.place(element, np.tile([-1.0, 1.0], (element.size, 1)))
         bend = 0.5 * (ends[:, 1] - ends[:, 0])
         for _ in range(N_REFINEMENTS):
-            y, slope = self._curved.place(element, xi[:, None])
+            y, slope = self.curved.place(element, xi[:, None])
             way, square = x - y[:, 0], np.abs(slope[:, 0]) ** 2
             step = (way * slope[:, 0].conj()).real / np.maximum(square - (way * bend.conj()).real, 0.5 * square)
             before, xi = xi, np.clip(xi + step, -1.0, 1.0)
             if np.abs(xi - before).max() <= _STANDS:
                 break
-        y, slope = self._curved.place(element, xi[:, None])
+        y, slope = self.curved.place(element, xi[:, None])
         return xi, x - y[:, 0], slope[:, 0]
 
 

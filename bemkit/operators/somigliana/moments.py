@@ -163,7 +163,7 @@ def _local(panels: Panels, x: ComplexArray, elements: IntArray) -> tuple[Complex
     return plus, minus, kernels.local_coordinate(plus, minus).imag
 
 
-class CurvedElements:
+class ArcQuadrature:
     """Quadrature over curved elements that follows how near a point is.
 
     Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -148,7 +149,7 @@ class MixedSystem:
 
     def condensed(self) -> CondensedMap:
         """Return the condensed map under the first load."""
-        return self.condensed_under(self._force, self._base.data, self._base, self._work)
+        return self._condensed(self._force, self._base.data, self._base, 1.0, self._work)
 
     def _find_balances(self, motions: FloatArray, reciprocity: Reciprocity) -> None:
         """Find on_traction @ t == on_displacement @ u for resultants and reciprocities, (n_balances, n_dofs) each.
@@ -226,75 +227,55 @@ class MixedSystem:
         balances = self._on_traction @ traction - self._on_displacement @ displacement
         return self._factor.solve(np.concatenate([known, balances]))[: traction.size]
 
-    def condensed_under(
-        self, force: FloatArray, data: GivenData, base: _Solved | None = None, work: OperationCounts | None = None
+    def _condensed(
+        self, force: FloatArray, data: GivenData, base: _Solved, factor: float, work: OperationCounts
     ) -> CondensedMap:
-        """Return the condensed map under data, solved for unless they are a multiple of others."""
-        factor = None if base is None else data.factor_of(base.data)
-        if base is None or factor is None:
+        """Return the condensed map under forces (n_elements, 2) and data that are a multiple of others."""
+        traction = self._conditions.in_frames(force).ravel() / self._weights
+        at_rest = factor * base.at_rest
+        own, retained = self._weights[self._retained], self._retained
+        return CondensedMap(
+            stiffness=own[:, None] * self._response[retained],
+            load=own * (traction[retained] - at_rest[retained]),
+            recover=partial(self._recovered, at_rest, traction, data.displacement.ravel()),
+            under=partial(self._under, base),
+            follow=partial(self._followed, at_rest),
+            work=work,
+        )
+
+    def _recovered(
+        self, at_rest: FloatArray, traction: FloatArray, given: FloatArray, retained: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return displacement and force of all elements; see `CondensedMap.recover`.
+
+        Parameters
+        ----------
+        at_rest : (n_dofs,) array
+            The unknowns with the retained displacements at rest.
+        traction, given : (n_dofs,) arrays [Pa], [m]
+            Given tractions and displacements in the frames.
+        retained : (n_retained,) array [m]
+        """
+        is_free = self._conditions.is_free.ravel()
+        unknowns = at_rest + self._response @ retained
+        local = np.where(is_free, unknowns, given)
+        local[self._retained] = retained
+        force = self._weights * np.where(is_free, traction, unknowns)
+        return self._conditions.in_plane(local), self._conditions.in_plane(force)
+
+    def _followed(self, at_rest: FloatArray, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do; see `CondensedMap.follow`."""
+        return self._response[directions], at_rest[directions]
+
+    def _under(self, base: _Solved, force: FloatArray, displacement: FloatArray) -> CondensedMap:
+        """Return the condensed map under other data; load factors, the usual case, take no other solution."""
+        data, work = GivenData.of(self._conditions, force, displacement), OperationCounts()
+        factor = data.factor_of(base.data)
+        if factor is None:
             known, of_sweep = self._sweep(data)
             base, factor = _Solved(data, self._solution(data, known)), 1.0
             work = of_sweep + OperationCounts(right_hand_sides=1)
-        traction = np.einsum("nkc,nc->nk", self._conditions.frame, force).ravel() / self._weights
-        loaded = _Loaded(self, base, factor * base.at_rest, traction, data.displacement.ravel())
-        own, retained = self._weights[self._retained], self._retained
-        load = own * (traction[retained] - loaded.at_rest[retained])
-        stiffness = own[:, None] * self._response[retained]
-        return CondensedMap(
-            stiffness, load, loaded.recover, loaded.under, loaded.follow, work=work or OperationCounts()
-        )
-
-    def displaced(self, retained: FloatArray, loaded: _Loaded) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force (n_elements, 2) in x and y of all elements."""
-        frame, is_free = self._conditions.frame, self._conditions.is_free.ravel()
-        unknowns = loaded.at_rest + self._response @ retained
-        local = np.where(is_free, unknowns, loaded.given)
-        local[self._retained] = retained
-        force = self._weights * np.where(is_free, loaded.traction, unknowns)
-        displacement = np.einsum("nkc,nk->nc", frame, local.reshape(-1, 2))
-        return displacement, np.einsum("nkc,nk->nc", frame, force.reshape(-1, 2))
-
-    def response(self, directions: IntArray) -> FloatArray:
-        """Return the displacements (k, n_retained) of free directions under those of the retained ones."""
-        return self._response[directions]
-
-    def under(self, force: FloatArray, displacement: FloatArray, base: _Solved) -> CondensedMap:
-        """Return the condensed map under other data; load factors, the usual case, take no other solution."""
-        return self.condensed_under(force, GivenData.of(self._conditions, force, displacement), base)
-
-
-@dataclass(frozen=True, eq=False)
-class _Loaded:
-    """A body under one load.
-
-    Parameters
-    ----------
-    body : MixedSystem
-    base : _Solved
-        What this load is a multiple of.
-    at_rest : (n_dofs,) array
-        The unknowns with the retained displacements at rest.
-    traction, given : (n_dofs,) arrays [Pa], [m]
-        Given tractions and displacements in the frames.
-    """
-
-    body: MixedSystem
-    base: _Solved
-    at_rest: FloatArray
-    traction: FloatArray
-    given: FloatArray
-
-    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
-        return self.body.displaced(retained_displacement, self)
-
-    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
-        return self.body.response(directions), self.at_rest[directions]
-
-    def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
-        """See `CondensedMap`."""
-        return self.body.under(force, displacement, self.base)
+        return self._condensed(force, data, base, factor, work)
 
 
 def _dofs(elements: IntArray) -> IntArray:

@@ -97,7 +97,7 @@ class ForcesInside:
 
     def left_of(self, conditions: NodalConditions, force: FloatArray) -> tuple[NodalConditions, FloatArray]:
         """Return the conditions and the given forces (n_nodes, 2) [N/m] less what the particular solution takes."""
-        own = np.einsum("nkc,nc->nk", conditions.frame, self.displacement)
+        own = conditions.in_frames(self.displacement)
         displacement = np.where(conditions.is_fixed, conditions.displacement - own, 0.0)
         return replace(conditions, displacement=displacement), force - self.force
 
@@ -118,7 +118,7 @@ class _Heavy:
     @cached_property
     def own(self) -> FloatArray:
         """(n_nodes, 2) array [m]: the particular solution in the frames."""
-        return np.asarray(np.einsum("nkc,nc->nk", self.conditions.frame, self.inside.displacement))
+        return self.conditions.in_frames(self.inside.displacement)
 
     @property
     def shift(self) -> FloatArray:

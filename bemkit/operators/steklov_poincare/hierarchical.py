@@ -10,9 +10,8 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.counts import OperationCounts
 from bemkit.operators.hierarchy.collocation_system import collocation_system
-from bemkit.operators.hierarchy.factor import ElementLaws
+from bemkit.operators.hierarchy.element_laws import ElementLaws
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.linear.solvers import Hierarchical, MatrixFree
@@ -60,7 +59,7 @@ class HierarchicalMap(ABC):
             If the boundary equations, all integrals in closed form and none compressed, are not fulfilled by a sample
             of the solutions.
         """
-        loaded = self.loaded(conditions, force)
+        loaded = LoadedSystem.of(self, conditions, force)
         condensed = _Condensed(self, loaded, loaded.stiffness()).map()
         residual = loaded.residual(np.cos(np.arange(loaded.retained.size)))
         if residual > _LARGEST_RESIDUAL * self.options.tolerance:
@@ -69,10 +68,6 @@ class HierarchicalMap(ABC):
                 "of the displacements: choose the linear solver 'direct' for this body"
             )
         return condensed
-
-    def loaded(self, conditions: NodalConditions, force: FloatArray) -> LoadedSystem:
-        """Return the compressed equations of the body under supports and given nodal forces (n_elements, 2)."""
-        return LoadedSystem.of(self, conditions, force)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +90,7 @@ class _Condensed:
         loaded, load = self.loaded, np.zeros(0)
         if loaded.retained.size:
             _, forces = self.recover(np.zeros(loaded.retained.size))
-            load = -np.einsum("nkc,nc->nk", loaded.conditions.frame, forces - loaded.force).ravel()[loaded.retained]
+            load = -loaded.conditions.in_frames(forces - loaded.force).ravel()[loaded.retained]
         return CondensedMap(self.stiffness, load, self.recover, self.under, self.follow)
 
     def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -106,8 +101,8 @@ class _Condensed:
     def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
         """See `CondensedMap`."""
         displacement, _ = self.recover(np.zeros(self.loaded.retained.size))
-        local = np.einsum("nkc,nc->nk", self.loaded.conditions.frame, displacement)
-        return self.loaded.responses(directions)[1], local.ravel()[directions]
+        at_rest = self.loaded.conditions.in_frames(displacement).ravel()[directions]
+        return self.loaded.responses(directions)[1], at_rest
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """See `CondensedMap`."""
@@ -215,7 +210,7 @@ class LoadedSystem:
         nothing = ElementLaws(np.zeros((0, 4, 2)), np.zeros((0, 4)))
         loaded = cls(map, conditions, system, nothing, may_be_loaded, may_move, force, motions, at_rest).moved(at_rest)
         if conditions.later and isinstance(map.options, Hierarchical):
-            later = (loaded.under(given.displacement, given.force_in(conditions.frame)) for given in conditions.later)
+            later = (loaded.under(given.displacement, conditions.in_plane(given.force)) for given in conditions.later)
             system.expect(each.known.given for each in (loaded, *later))
         return loaded
 
@@ -229,11 +224,6 @@ class LoadedSystem:
         return replace(self, conditions=conditions, force=force).moved(-self.travel)
 
     @property
-    def work(self) -> OperationCounts:
-        """Nothing that is counted: neither whole operators nor their factorisations."""
-        return OperationCounts()
-
-    @property
     def motion(self) -> FloatArray:
         """(n_elements, 2) array [m]: the rigid motion that is left out, in x and y."""
         motion: FloatArray = self.motions @ self.travel
@@ -243,11 +233,13 @@ class LoadedSystem:
         """Return the equations of what is left of the displacements beside a further rigid motion (n_motions,)."""
         other = replace(self, travel=self.travel + travel)
         conditions = self.conditions
-        motion = np.einsum("nkc,nc->nk", conditions.frame, other.motion)
-        traction = np.einsum("nkc,nc->nk", conditions.frame, self.force) / self.map.weights[:, None]
-        given = np.where(conditions.is_fixed, conditions.displacement - motion, 0.0)
-        known = self.system.laws(NodeConditions.given(~conditions.is_free, traction, given))
-        return replace(other, known=known)
+        given = np.where(conditions.is_fixed, conditions.displacement - conditions.in_frames(other.motion), 0.0)
+        return replace(other, known=self.system.laws(self._held(given)))
+
+    def _held(self, displacement: FloatArray) -> NodeConditions:
+        """Return conditions of given tractions on free directions, and of displacements (n_elements, 2) on others."""
+        traction = self.conditions.in_frames(self.force) / self.map.weights[:, None]
+        return NodeConditions.given(~self.conditions.is_free, traction, displacement)
 
     def travel_of(self, elements: IntArray, displacement: FloatArray) -> FloatArray | None:
         """Return the rigid motion of some elements if it is far larger than what is left of their displacements."""
@@ -290,14 +282,10 @@ class LoadedSystem:
         held = np.einsum("nkc,nk->nc", self.conditions.frame[elements], displacement[elements])
         travel = None if elements.size == 0 else self.travel_of(elements, held)
         loaded = self if travel is None else self.moved(travel)
-        motion = np.einsum("nkc,nc->nk", self.conditions.frame, loaded.motion)
-        traction = np.einsum("nkc,nc->nk", self.conditions.frame, self.force) / self.map.weights[:, None]
-        given = NodeConditions.given(
-            ~self.conditions.is_free[elements], traction[elements], (displacement - motion)[elements]
-        )
-        loaded.system.state(loaded.known, elements, given)
-        strained, all_traction = loaded.everywhere()
-        return strained + loaded.motion, all_traction
+        given = self._held(displacement - self.conditions.in_frames(loaded.motion)).take(elements)
+        self.system.state(loaded.known, elements, given)
+        traction, strained = self.system.everywhere()
+        return strained + loaded.motion, traction
 
     def residual(self, retained_displacement: FloatArray) -> float:
         """Return the residual of the boundary equations at some elements by the largest displacement."""
@@ -306,11 +294,6 @@ class LoadedSystem:
         sampled = np.unique(np.linspace(0, n - 1, _SAMPLED).astype(int))
         size = float(np.abs(displacement).max())
         return float(np.abs(self.system.residual(sampled, traction, displacement)).max()) / size if size else 0.0
-
-    def everywhere(self) -> tuple[FloatArray, FloatArray]:
-        """Return displacements without `motion` and tractions (n_elements, 2), in x and y, of the last response."""
-        traction, displacement = self.system.everywhere()
-        return displacement, traction
 
 
 def _loaded(conditions: NodalConditions, force: FloatArray) -> tuple[BoolArray, BoolArray]:

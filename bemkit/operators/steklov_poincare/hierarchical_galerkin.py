@@ -14,7 +14,6 @@ from bemkit.operators.forms import mass_product
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.factor import Border
 from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
-from bemkit.operators.hierarchy.symmetric_skeletons import SymmetricView
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.linear.solvers import Hierarchical
@@ -92,7 +91,7 @@ class HierarchicalGalerkin(HierarchicalMap, GalerkinElasticity):
         """The equations, compressed on first use, whatever the conditions are."""
         is_node = self.columns.is_node
         may_differ = np.repeat(np.stack([np.ones_like(is_node), is_node], axis=1), 2, axis=1)
-        return Compression.of(self.columns, self._tree, may_differ, self.options.tolerance, SymmetricView)
+        return Compression.of(self.columns, self._tree, may_differ, self.options.tolerance)
 
     @cached_property
     def _tree(self) -> ClusterTree:

@@ -87,9 +87,8 @@ def assemble_layers(
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator", overwrite=True)
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     motions = traction_free_modes(mesh, dof_points(u))
+    resultants = mass_product(u, t, motions)
     values, rows, columns = mass_entries(u, t)
-    resultants = np.zeros((t.n_dofs, motions.shape[1]))
-    np.add.at(resultants, rows, values[:, None] * motions[columns])
     np.add.at(k, (rows, columns), 0.5 * values)
     # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])

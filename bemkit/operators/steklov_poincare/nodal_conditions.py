@@ -94,6 +94,14 @@ class NodalConditions:
         free: BoolArray = ~(self.is_fixed | self.is_retained)
         return free
 
+    def in_frames(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors (n_nodes, 2) in x and y by their components along the directions of the nodes."""
+        return np.asarray(np.einsum("nkc,nc->nk", self.frame, vectors))
+
+    def in_plane(self, components: FloatArray) -> FloatArray:
+        """Return vectors in x and y, (n_nodes, 2) or flat, from their components along the directions of the nodes."""
+        return np.asarray(np.einsum("nkc,nk->nc", self.frame, components.reshape(-1, 2)))
+
 
 @dataclass(frozen=True, eq=False)
 class GivenData:
@@ -113,12 +121,8 @@ class GivenData:
     @classmethod
     def of(cls, conditions: NodalConditions, force: FloatArray, displacement: FloatArray) -> GivenData:
         """Return the data of nodal forces in x and y, and of displacements in the frames."""
-        local = np.einsum("nkc,nc->nk", conditions.frame, force)
+        local = conditions.in_frames(force)
         return cls(np.where(conditions.is_free, local, 0.0), np.where(conditions.is_fixed, displacement, 0.0))
-
-    def force_in(self, frame: FloatArray) -> FloatArray:
-        """Return the forces (n_nodes, 2) in x and y, by the frames (n_nodes, 2, 2) of the nodes."""
-        return np.asarray(np.einsum("nkc,nk->nc", frame, self.force))
 
     @property
     def n_loaded(self) -> int:
@@ -150,9 +154,8 @@ def supporting_forces(conditions: NodalConditions, given: FloatArray, total: Flo
         The given forces, and all that act on the boundary of the body but those of contact: a support may hold a node
         obliquely to what it touches.
     """
-    local, own = (np.einsum("nkc,nc->nk", conditions.frame, each) for each in (total, given))
-    acting = np.where(conditions.is_fixed, local, own)
-    return np.asarray(np.einsum("nkc,nk->nc", conditions.frame, acting)).ravel()
+    acting = np.where(conditions.is_fixed, conditions.in_frames(total), conditions.in_frames(given))
+    return conditions.in_plane(acting).ravel()
 
 
 def integrate_traction(space: BoundarySpace, elements: IntArray, field: TractionField) -> FloatArray:

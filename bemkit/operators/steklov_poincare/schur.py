@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -68,58 +69,42 @@ class SchurCondensation:
 
     def under(self, force: FloatArray, displacement: FloatArray) -> CondensedMap:
         """Return the condensed map under given forces (n_nodes, 2), and displacements (n_nodes, 2) in the frames."""
-        frame = self.conditions.frame
         prescribed = displacement.ravel()[self._fixed]
-        known = np.einsum("nkc,nc->nk", frame, force).ravel() - self._of_fixed @ prescribed
+        known = self.conditions.in_frames(force).ravel() - self._of_fixed @ prescribed
         at_rest, pressure = self._held.solve(known[self._free], -self._volume[self._fixed].T @ prescribed)
         load = known[self._retained] - self._coupling.T @ at_rest - self._volume[self._retained] @ pressure
-        under_load = _Loaded(self, prescribed, at_rest, pressure)
-        work = OperationCounts(right_hand_sides=1)
         return CondensedMap(
-            self._stiffness, load, under_load.recover, self.under, under_load.follow, self._sensitivity, work=work
+            self._stiffness,
+            load,
+            partial(self._recovered, prescribed, at_rest, pressure),
+            self.under,
+            partial(self._followed, at_rest),
+            self._sensitivity,
+            work=OperationCounts(right_hand_sides=1),
         )
 
-    def displaced(
-        self, retained: FloatArray, prescribed: FloatArray, at_rest: FloatArray, pressure: FloatArray
+    def _recovered(
+        self, prescribed: FloatArray, at_rest: FloatArray, pressure: FloatArray, retained: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return displacement and force (n_nodes, 2) of all nodes in x and y; see `_Loaded`."""
+        """Return displacement and force of all nodes; see `CondensedMap.recover`.
+
+        Parameters
+        ----------
+        prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
+            Displacements of fixed directions, and of free ones with the retained ones at rest.
+        pressure : (n_pressures,) array
+            As `VolumeConstraint.solve` gives it.
+        retained : (n_retained,) array [m]
+        """
         local = np.empty(len(self.matrix))
         local[self._fixed], local[self._retained] = prescribed, retained
         local[self._free] = at_rest + self._response @ retained
-        displacement = np.einsum("nkc,nk->nc", self.conditions.frame, local.reshape(-1, 2))
+        displacement = self.conditions.in_plane(local)
         force = self.matrix @ displacement.ravel()
         force += self.volume.change @ (pressure + self._pressures @ retained)
         return displacement, force.reshape(-1, 2)
 
-    def rows(self, directions: IntArray) -> tuple[FloatArray, IntArray]:
-        """Return the response of free directions, and where they stand among these."""
+    def _followed(self, at_rest: FloatArray, directions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return what free directions do; see `CondensedMap.follow`."""
         rows = np.searchsorted(self._free, directions)
-        return self._response[rows], rows
-
-
-@dataclass(frozen=True, eq=False)
-class _Loaded:
-    """A body under one load.
-
-    Parameters
-    ----------
-    body : SchurCondensation
-    prescribed, at_rest : (n_fixed,), (n_free,) arrays [m]
-        Displacements of fixed directions, and of free ones with the retained ones at rest.
-    pressure : (n_pressures,) array
-        As `VolumeConstraint.solve` gives it.
-    """
-
-    body: SchurCondensation
-    prescribed: FloatArray
-    at_rest: FloatArray
-    pressure: FloatArray
-
-    def recover(self, retained_displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
-        return self.body.displaced(retained_displacement, self.prescribed, self.at_rest, self.pressure)
-
-    def follow(self, directions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """See `CondensedMap`."""
-        response, rows = self.body.rows(directions)
-        return response, self.at_rest[rows]
+        return self._response[rows], at_rest[rows]

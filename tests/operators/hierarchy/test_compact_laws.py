@@ -7,7 +7,7 @@ import numpy as np
 from bemkit.arrays import FloatArray
 from bemkit.contact.conditions import LinearConditions, augmented, separated, slip, stick
 from bemkit.operators.hierarchy.compact_laws import CompactLaws
-from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_conditions, solve_for_two
+from bemkit.operators.hierarchy.element_laws import SolvedConditions, solve_for_two
 
 N = 4
 ONE = np.ones(N)
@@ -22,9 +22,8 @@ def of_conditions(conditions: LinearConditions, n: int) -> SolvedConditions:
 
 def solved(conditions: LinearConditions) -> tuple[CompactLaws, FloatArray, FloatArray]:
     """Return laws, and in full their factors and what is given."""
-    of = conditions.on_traction, conditions.on_displacement, conditions.value
-    factors, given, _ = solve_conditions(*of, 1e-3)
-    return CompactLaws.of(of_conditions(conditions, N)), factors, given
+    of_all = of_conditions(conditions, N)
+    return CompactLaws.of(of_all), of_all.in_full().factors, of_all.in_full().given
 
 
 def test_states_are_those_of_laws_in_full() -> None:

@@ -9,7 +9,7 @@ from bemkit.geometry import BoundaryMesh, Polygon, Rectangle, discretise
 from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.boundary_columns import BoundaryColumns
 from bemkit.operators.hierarchy.compression import Compression
-from bemkit.operators.hierarchy.proxies import PROXY_RATIO, Discs, extents, n_proxies
+from bemkit.operators.hierarchy.proxies import PROXY_RATIO, discs_of, extents, n_proxies, near_clusters, proxy_points
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from tests.slow import slow_except
@@ -84,16 +84,17 @@ def test_discs_hold_their_clusters_and_proxies_lie_around_them() -> None:
     tree = ClusterTree.of(mesh.centres, 16)
     columns = BoundaryColumns.of(mesh, Material(1.0, 0.3), tree.order, takes_slopes=True)
     for level in range(tree.n_levels):
-        discs = Discs.of(columns, tree, level)
+        discs = discs_of(columns, tree, level)
         for cluster in range(discs.radius.size):
             places = tree.places(level, cluster)
             acting = columns.reach[:, places].ravel()
             far = max(np.abs(ends[acting] - discs.centre[cluster]).max() for ends in (columns.start, columns.end))
             assert far == pytest.approx(discs.radius[cluster])
-            around = np.abs(discs.points(cluster, 8) - discs.centre[cluster])
+            around = np.abs(proxy_points(discs, cluster, 8) - discs.centre[cluster])
             np.testing.assert_allclose(around, PROXY_RATIO * discs.radius[cluster])
-            assert cluster not in discs.near(cluster)
-            others = np.setdiff1d(np.arange(discs.radius.size), [cluster, *discs.near(cluster)])
+            near = near_clusters(discs, cluster)
+            assert cluster not in near
+            others = np.setdiff1d(np.arange(discs.radius.size), [cluster, *near])
             apart = np.abs(discs.centre[others] - discs.centre[cluster]) - discs.radius[others]
             assert np.all(apart >= PROXY_RATIO * discs.radius[cluster] * (1.0 - 1e-14))
     assert np.all(extents(columns) > columns.lengths)

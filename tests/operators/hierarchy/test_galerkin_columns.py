@@ -16,7 +16,6 @@ from bemkit.operators.hierarchy import compiled
 from bemkit.operators.hierarchy.compression import Compression
 from bemkit.operators.hierarchy.element_pairs import ElementPairs
 from bemkit.operators.hierarchy.galerkin_columns import GalerkinColumns
-from bemkit.operators.hierarchy.symmetric_skeletons import SymmetricView
 from bemkit.operators.hierarchy.tree import ClusterTree
 from bemkit.operators.material import Material
 from tests.slow import slow_except
@@ -127,7 +126,7 @@ def test_products_with_skeletons_are_those_of_the_equations(name: str, degree: i
     values[columns.idle.reshape(-1, 2)[:, [0, 1, 0, 1]]] = 0.0
     places = np.arange(0, columns.n_elements, 11)
     for tolerance in (1e-6, 1e-10):
-        compression = Compression.of(columns, tree, differ, tolerance, SymmetricView)
+        compression = Compression.of(columns, tree, differ, tolerance)
         product = compression.product(values.reshape(-1, 2)).reshape(-1, 2, 2)[places]
         for k, kind in enumerate((True, False)):
             traction, displacement = values[:, :2, k], values[:, 2:, k]

@@ -10,7 +10,8 @@ import pytest
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Rectangle, discretise
 from bemkit.operators.hierarchy.collocation_system import collocation_system
-from bemkit.operators.hierarchy.factor import ElementLaws, HierarchicalFactor, SingularClusterError
+from bemkit.operators.hierarchy.element_laws import ElementLaws
+from bemkit.operators.hierarchy.factor import HierarchicalFactor, SingularClusterError
 from bemkit.operators.hierarchy.system import HierarchicalSystem, NodeConditions, UndeterminedError
 from bemkit.operators.linear.dense import SingularMatrixError
 from bemkit.operators.material import Material
