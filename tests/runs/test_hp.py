@@ -345,12 +345,15 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
 
 @pytest.mark.slow
 def test_statuses_that_flicker_where_clearances_are_round_off_do_not_cost_elements() -> None:
-    assert risen("wavy-obstacle", 2e-9)[-1].is_converged
-    last = risen("wavy-obstacle", 1e-9)[-1]
-    assert traction_error(last) <= 1e-9  # the estimate ends at 1.4e-9
-    assert last.n_elements <= 70
-    assert len(last.transitions) > 1  # all within 3e-9 of each other
-    assert _settled([place.x for place in last.transitions]) == pytest.approx([0.25000030], abs=1e-7)
+    reached = risen("wavy-obstacle", 1e-9)[-1]
+    assert reached.is_converged
+    assert traction_error(reached) <= 1e-9
+    # the estimate ends at 6e-10, on meshes whose places of change are all within 3e-9 of each other
+    flickering = [each for each in risen("wavy-obstacle", 5e-10) if len(each.transitions) > 1]
+    assert flickering
+    for solution in flickering:
+        assert solution.n_elements <= 70
+        assert _settled([place.x for place in solution.transitions]) == pytest.approx([0.25000030], abs=1e-7)
     assert _settled([0.3, 0.1 + 1e-9, 0.3 + 4e-9, 0.1]) == pytest.approx([0.1 + 5e-10, 0.3 + 2e-9], abs=1e-15)
 
 
