@@ -154,6 +154,15 @@ def test_the_first_mesh_in_layers_is_the_last_where_it_may_be() -> None:
         assert fine.is_converged
         assert traction_error(fine) <= 2e-3  # twice what is estimated, at most
     assert [degree_of(solution) for solution in risen("paper-1", 3e-4)] == [2, 4, 5]  # too little for the first
+    scene = bk.load_scene("paper-1")
+    held = tuple(
+        dataclasses.replace(part, condition=bk.Clamped()) if part.name == "foundation" else part for part in scene.parts
+    )
+    mesh = bk.MeshOptions(accuracy=3e-4)
+    no_law = dataclasses.replace(scene, law=bk.Frictionless())
+    scene = dataclasses.replace(no_law, parts=held, discretisation=bk.HpGalerkin(), mesh=mesh)
+    # without contact tractions nothing tells
+    assert [degree_of(solution) for solution in run_adaptive(scene)][:2] == [2, 4]
 
 
 def test_layers_where_loads_jump() -> None:
