@@ -127,7 +127,7 @@ class LayeredMeshes:
         if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
         cuts = [_settled_cuts(member) for member in members]
-        more = int(level.number == 0 and self.accuracy < COARSE and not self._moves_on(solution, NEXT_ERROR))
+        more = int(level.number == 0 and self._may_stop_at_once(solution))
         fresh = [
             layered_partition(each.partition.base, own, n_at_jumps=1 + more)
             for each, own in zip(members, cuts, strict=True)
@@ -163,6 +163,11 @@ class LayeredMeshes:
         if has_moved and level.asked.discretisation.needs_accuracy and isinstance(solution, Solution):
             degrees = self._degrees(errors, level.partition, refined[0], int(higher[0].max()))
         return replace(level, partitions=refined, number=number, degrees=degrees)
+
+    def _may_stop_at_once(self, solution: AnySolution) -> bool:
+        """Whether a first mesh in layers that is better than others may be the last."""
+        error = solution.estimated_traction_error
+        return error is not None and NEXT_ERROR * error <= self.accuracy < COARSE
 
     def _moves_on(self, solution: AnySolution, part: float) -> bool:
         """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
