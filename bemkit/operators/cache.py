@@ -38,7 +38,7 @@ from bemkit.version import __version__
 
 FORMAT = "bemkit-operator"
 SCHEMA_VERSION = 1
-FORMULA_VERSION = 2
+FORMULA_VERSION = 3
 """To be raised whenever a change of the code changes what an operator's matrix holds beyond round-off."""
 FINGERPRINTS = ("operator", "geometry", "material", "spaces", "formulas")
 MARKER = b"bemkit operator cache\n"

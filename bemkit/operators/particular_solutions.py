@@ -24,6 +24,7 @@ from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators.material import Material
+from bemkit.operators.somigliana.stress import gradient_of, stress_of
 
 _POINTS_ON_RAYS = 24
 _POINTS_ON_ELEMENTS = 12
@@ -152,16 +153,13 @@ class ParticularSolution:
 
     def displacement_gradient(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) gradient [-], [:, i, j] = du_i / dx_j, at (n, 2) points [m]."""
-        _, along, across, _, _ = self._state(points)
-        first = np.column_stack([along.real + across.real, across.imag - along.imag])
-        return np.stack([first, np.column_stack([across.imag + along.imag, along.real - across.real])], axis=1)
+        state = self._state(points)
+        return gradient_of(state.along, state.across)
 
     def stress(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) stress [Pa] at (n, 2) points [m]."""
         state = self._state(points)
-        mean, deviator = state.mean_stress, 2.0 * self.material.shear_modulus * state.across
-        first = np.column_stack([mean + deviator.real, deviator.imag])
-        return np.stack([first, np.column_stack([deviator.imag, mean - deviator.real])], axis=1)
+        return stress_of(state.mean_stress, 2.0 * self.material.shear_modulus * state.across)
 
     def traction(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Evaluate the tractions sigma n (n, 2) [Pa] at (n, 2) points [m] with unit normals."""

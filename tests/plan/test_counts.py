@@ -68,6 +68,7 @@ SCENES: dict[str, Callable[[], bk.Scene]] = {
     "curved, linear": lambda: disc("linear"),
     "exterior": lambda: hole("constant"),
     "exterior, quadratic": lambda: hole("quadratic"),
+    "exterior, nu = 1/2": lambda: dataclasses.replace(hole("linear"), material=bk.Material(1.0, 0.5)),
     "load history": lambda: paper(load_factors=(0.5, 1.0)),
     "load history, linear": lambda: paper("linear", load_factors=(0.5, 1.0)),
     "load history from zero": lambda: paper(load_factors=(0.0, 1.0)),

@@ -40,6 +40,7 @@ from bemkit.operators.somigliana.moments import (
     straight_displacement_moments,
     straight_gradient_moments,
 )
+from bemkit.operators.somigliana.stress import gradient_of, stress_of
 
 CHUNK_PAIRS = 8192
 """Points and elements near them that are integrated at a time."""
@@ -163,12 +164,7 @@ class InteriorFields:
         """Evaluate the (n, 2, 2) displacement gradient, [:, i, j] = du_i / dx_j; otherwise as `displacement`."""
         potential, shear = self._potentials(points)
         kappa, two_mu = self.material.kappa, 2.0 * self.material.shear_modulus
-        along = (kappa * potential - potential.conj()) / two_mu
-        across = shear / two_mu
-        # du/dz = (u_x,x + u_y,y + i (u_y,x - u_x,y)) / 2, du/dzbar = (u_x,x - u_y,y + i (u_y,x + u_x,y)) / 2
-        first = np.column_stack([along.real + across.real, across.imag - along.imag])
-        second = np.column_stack([across.imag + along.imag, along.real - across.real])
-        own = np.stack([first, second], axis=1)
+        own = gradient_of((kappa * potential - potential.conj()) / two_mu, shear / two_mu)
         return own if self.background is None else own + self.background.displacement_gradient(points)
 
     def strain(self, points: FloatArray) -> FloatArray:
@@ -179,9 +175,7 @@ class InteriorFields:
     def stress(self, points: FloatArray) -> FloatArray:
         """Evaluate the (n, 2, 2) stress [Pa]; otherwise as `displacement`."""
         potential, shear = self._potentials(points)
-        middle, difference, off = 2.0 * potential.real, shear.real, shear.imag
-        first = np.column_stack([middle + difference, off])
-        own = np.stack([first, np.column_stack([off, middle - difference])], axis=1)
+        own = stress_of(2.0 * potential.real, shear)
         return own if self.background is None else own + self.background.stress(points)
 
     def _potentials(self, points: FloatArray) -> tuple[ComplexArray, ComplexArray]:

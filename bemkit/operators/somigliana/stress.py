@@ -1,11 +1,26 @@
-"""Measures of a plane stress state."""
+"""Plane gradients and stresses from complex numbers, and measures of a stress state."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bemkit.arrays import FloatArray
+from bemkit.arrays import ComplexArray, FloatArray
 from bemkit.operators.material import Plane
+
+
+def gradient_of(along: ComplexArray, across: ComplexArray) -> FloatArray:
+    """Return displacement gradients (n, 2, 2), [:, i, j] = du_i / dx_j, from du/dz and du/dzbar (n,).
+
+    du/dz = (u_x,x + u_y,y + i (u_y,x - u_x,y)) / 2, du/dzbar = (u_x,x - u_y,y + i (u_y,x + u_x,y)) / 2.
+    """
+    first = np.column_stack([along.real + across.real, across.imag - along.imag])
+    return np.stack([first, np.column_stack([across.imag + along.imag, along.real - across.real])], axis=1)
+
+
+def stress_of(mean: FloatArray, deviator: ComplexArray) -> FloatArray:
+    """Return stresses (n, 2, 2) from (sigma_xx + sigma_yy) / 2 and (sigma_xx - sigma_yy) / 2 + i sigma_xy (n,)."""
+    first = np.column_stack([mean + deviator.real, deviator.imag])
+    return np.stack([first, np.column_stack([deviator.imag, mean - deviator.real])], axis=1)
 
 
 def von_mises(stress: FloatArray, poisson_ratio: float, plane: Plane) -> FloatArray:

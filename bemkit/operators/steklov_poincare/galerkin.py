@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -37,6 +38,8 @@ from bemkit.operators.steklov_poincare.volume_constraint import Volume
 _DIRECT = DenseCholesky()
 _MIRRORED = 128
 """Rows that are mirrored at a time, so that they stay in the cache."""
+_NEARLY_INCOMPRESSIBLE = 0.49
+"""Poisson's ratio up to which errors of the pressure in a curved hole are those of the discretisation."""
 _HELD_BODY = "the body held by its supports and its contact boundary"
 
 
@@ -123,7 +126,7 @@ class GalerkinElasticity:
     def _pressures(self) -> FloatArray:
         """(n_traction_dofs, n_pressures) uniform pressures, for which the map takes normals that are exact.
 
-        That of the whole boundary, those of each loop of an incompressible body, none of an exterior.
+        That of the whole boundary, those of each loop of an incompressible body; none of a compressible exterior.
         """
         dofs = self.traction_space.element_dofs
         everywhere = np.arange(self.mesh.n_elements)
@@ -137,19 +140,24 @@ class GalerkinElasticity:
     @property
     def _pressed(self) -> tuple[IntArray, ...]:
         """The elements under each of the uniform pressures."""
-        if self.mesh.is_exterior:
-            return ()
-        return self.mesh.loops if self.material.is_incompressible else (np.arange(self.mesh.n_elements),)
+        if self.material.is_incompressible:
+            return self.mesh.loops
+        return () if self.mesh.is_exterior else (np.arange(self.mesh.n_elements),)
 
     @cached_property
-    def _fluxes(self) -> FloatArray:
-        """(n_dofs, n_pressures) change of volume per displacement dof where each of the pressures acts.
+    def _flux(self) -> FloatArray:
+        """(n_dofs, 1) change of volume per displacement dof; no column for an exterior."""
+        fluxes = self._fluxes(() if self.mesh.is_exterior else self._pressed)
+        return fluxes.sum(axis=1, keepdims=True)[:, : fluxes.shape[1]]
+
+    def _fluxes(self, parts: Sequence[IntArray]) -> FloatArray:
+        """Return the (n_dofs, n_parts) changes of volume per displacement dof on parts of the boundary.
 
         Normals are integrated along the curves: those that traction dofs interpolate let a curved body gain volume.
         """
         fluxes = [
             integrate_traction(self.displacement_space, elements, lambda _, normals: normals).ravel()
-            for elements in self._pressed
+            for elements in parts
         ]
         flux: FloatArray = np.array(fluxes).reshape(-1, self.displacement_space.n_dofs)
         flux[:, antisymmetric_dofs(self.displacement_space)] = 0.0
@@ -167,7 +175,7 @@ class GalerkinElasticity:
         of displacements, the identities V n = beta (1/2 + K) x and (1/2 + K') n = n - beta W x give
         (f - beta W x) u = beta x (f - beta W x) p. On the other tractions, <V n, t> = 0, W x is S x.
         """
-        total = self._fluxes.sum(axis=1, keepdims=True)[:, : self._fluxes.shape[1]]
+        total = self._flux
         if self.material.is_incompressible or self.mesh.is_exterior:
             return Volume(total, 0.0)
         beta, dilatation = self.material.plane_compressibility, dilatation_of(self.displacement_space)[:, None]
@@ -191,7 +199,8 @@ class GalerkinElasticity:
     def tractions(self, displacement: FloatArray) -> FloatArray:
         """Return the traction dofs (n_scalar, 2) [Pa] that belong to nodal displacements (n_nodes, 2) [m].
 
-        Of an incompressible body they lack the pressures, which displacements do not tell.
+        Of an incompressible body they lack the pressures, which displacements do not tell; those on curved loops of a
+        nearly incompressible one they hardly tell.
         """
         rest = self._tractions_without_pressures(displacement.ravel())
         if self.material.is_incompressible or self.mesh.is_exterior:
@@ -205,7 +214,7 @@ class GalerkinElasticity:
     @cached_property
     def _dilatation(self) -> tuple[FloatArray, FloatArray, float]:
         """The work of tractions on the dilatation x, of pressures on displacements, and of pressures on x."""
-        everywhere, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._fluxes[:, 0]
+        everywhere, centre, flux = np.arange(self.mesh.n_elements), self.mesh.centre, self._flux[:, 0]
         arms = integrate_traction(self.traction_space, everywhere, lambda points, _: points - centre).ravel()
         return arms, flux, float(flux @ dilatation_of(self.displacement_space))
 
@@ -215,17 +224,29 @@ class GalerkinElasticity:
         return factors.single_layer.solve_upper(factors.whitened_trace @ displacement)
 
     def element_tractions(self, displacement: FloatArray, force: FloatArray) -> FloatArray:
-        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells."""
+        """Return the (n_elements, n_local, 2) tractions V^-1 (1/2 M + K) u, with the pressures that `force` tells.
+
+        Around a hole V n is of the order of the compressibility. What curved elements leave of it besides, which hold
+        normals n only by interpolation, comes back as a pressure that is wrong by as much, and at last altogether, as
+        Poisson's ratio approaches 1/2.
+        """
         tractions = self.tractions(displacement)
         at_nodes = values_on_elements(self.traction_space, tractions)
-        if self.material.is_incompressible and not self.mesh.is_exterior:
+        if self._needs_forces:
             carried = mass_product(self.traction_space, self.displacement_space, tractions.reshape(-1, 1))
             missing = force.ravel() - carried[:, 0]
-            pressures = np.linalg.lstsq(self._fluxes, missing, rcond=None)[0]
+            pressures = np.linalg.lstsq(self._fluxes(self.mesh.loops), missing, rcond=None)[0]
             normals = self._normals_of_true_mean()
-            for elements, pressure in zip(self._pressed, pressures, strict=True):
+            for elements, pressure in zip(self.mesh.loops, pressures, strict=True):
                 at_nodes[elements] += pressure * normals[elements]
         return at_nodes
+
+    @property
+    def _needs_forces(self) -> bool:
+        """Whether displacements do not tell, or hardly, the pressures on the loops."""
+        has_curved_holes = (self.mesh.is_exterior or len(self.mesh.loops) > 1) and not self.mesh.is_straight.all()
+        is_nearly = self.material.effective_poisson_ratio > _NEARLY_INCOMPRESSIBLE
+        return self.material.is_incompressible or bool(is_nearly and has_curved_holes)
 
     def _normals_of_true_mean(self) -> FloatArray:
         """Return the normals (n_elements, n_local, 2) at the local nodes, with the mean of those along the curve."""

@@ -160,10 +160,10 @@ def galerkin_needs(case: BodyCase, n_tractions: int, degree: int) -> BodyNeeds:
     t, u, f, r = n_tractions, case.n_displacements, case.n_free, case.n_retained
     mesh = case.mesh
     assembled, is_curved = t * t + t * u + u * u, case.n_curved > 0
-    holds_volume = case.material.is_incompressible and not mesh.is_exterior
-    n_pressures = len(mesh.loops) if holds_volume else int(not mesh.is_exterior)
+    is_bounded = not mesh.is_exterior
+    n_pressures = len(mesh.loops) if case.material.is_incompressible else int(is_bounded)
     # of the single layer: the resultants and the pressures; of the body: the one that goes with its volume
-    n_columns = len(admissible_modes(mesh)) + n_pressures + min(n_pressures, 1) + r + len(case.loads) + u
+    n_columns = len(admissible_modes(mesh)) + n_pressures + int(is_bounded) + r + len(case.loads) + u
     factorisations = Factorisation(FactorKind.CHOLESKY, t), Factorisation(FactorKind.CHOLESKY, f)
     # the factor of V, K twice, W and two copies of the sum; of curved elements four of W
     largest = t * t + max(2 * t * u + 3 * u * u, t * u + 4 * u * u if is_curved else 0)
