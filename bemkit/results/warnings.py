@@ -72,7 +72,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
         (title + doubt for title, body in titled.items() for doubt in _coarse_curves(body.mesh)),
         (title + doubt for title, body in titled.items() for doubt in _large_strains(body)),
         _narrow_zones(solution.contact, smooth, remedy),
-        _hidden_overlaps(solution.contacts_between_nodes, solution.units, remedy),
+        _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
     is_one = isinstance(solution, Solution)
     return (*solution.plan.warnings, *chain(*(each if is_one else _first(list(each)) for each in doubts)))
@@ -215,15 +215,21 @@ def _narrow_zones(contact: ContactTable, smooth: Collection[str], remedy: str) -
                 yield _narrow(part, kind, [contact.s[zone] for zone in narrow], remedy)
 
 
-def _hidden_overlaps(contacts: Mapping[str, BetweenNodes], units: UnitNames | None, remedy: str) -> Iterator[str]:
+def _hidden_overlaps(
+    contacts: Mapping[str, BetweenNodes], table: ContactTable, units: UnitNames | None, remedy: str
+) -> Iterator[str]:
     """Doubt contacts whose sides are in each other between the nodes, by more than what contact forces displace."""
+    is_pressed = bool(table.sigma_n.any() or table.sigma_t.any())
+    length = (
+        "the displacement that contact forces cause" if is_pressed else "how far bodies move, without contact forces"
+    )
     for name, between in contacts.items():
         if between.penetration > LARGEST_PENETRATION:
             depth = amount(between.penetration_depth, "length", units, 2)
             share = f"{100.0 * between.penetration:.0f} % of" if between.penetration < 1.0 else "more than"
             yield (
-                f"Between its nodes part {name!r} is {depth} deep in what it touches, {share} the displacement that "
-                f"contact forces cause: {_there(remedy)}."
+                f"Between its nodes part {name!r} is {depth} deep in what it touches, {share} {length}: "
+                f"{_there(remedy)}."
             )
 
 

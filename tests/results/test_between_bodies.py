@@ -17,7 +17,7 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.result_file import read_result, write_result
 from bemkit.results.tables import to_json
-from bemkit.results.warnings import LARGEST_PENETRATION
+from bemkit.results.warnings import LARGEST_PENETRATION, find_warnings
 from tests.runs.test_assembly import SHEAR, patch
 from tests.slow import slow_except
 
@@ -216,6 +216,9 @@ def test_bodies_that_only_touch_between_their_nodes_are_warned_of() -> None:
     told = [text for text in solution.warnings if "deep in what it touches, more than the displacement" in text]
     assert len(told) == 2, solution.warnings
     assert "Between its nodes part 'low.top / disc.down' is 0.0005 deep" in told[0]
+    nothing = np.zeros_like(solution.contact.s)  # instead of round-off
+    idle = replace(solution, contact=replace(solution.contact, sigma_n=nothing, sigma_t=nothing))
+    assert any(", 50 % of how far bodies move, without contact forces" in text for text in find_warnings(idle))
 
 
 def test_one_body_that_touches_between_its_nodes_is_warned_of() -> None:
