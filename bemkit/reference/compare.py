@@ -38,6 +38,8 @@ MEASURES: Mapping[str, str] = MappingProxyType(
 FINEST = 1e-9
 """The accuracy asked for; far below it round-off would decide the status of nodes beside a place of change."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
+FLICKER = 1e-8
+"""Share of a part within which ends of zones are one: clearances, which grow like d**1.5, are round-off there."""
 
 
 @dataclass(frozen=True)
@@ -189,12 +191,15 @@ def answer_of(solution: Solution, places: Sequence[Places]) -> Answer:
     """
     u_n, u_t, sigma_n, sigma_t = np.concatenate([_along(solution, each) for each in places], axis=1)
     is_frictionless = all(law.is_frictionless for law in solution.scene.laws.values())
-    zones = []
+    zones: list[Zone] = []
     for item in solution.transitions:
         words = (item.from_status, item.to_status)
         before, after = ("slip" if is_frictionless and word == "stick" else word for word in words)
-        if before != after:
-            zones.append(Zone(item.part, item.s, before, after))
+        is_near = zones and zones[-1].part == item.part
+        if is_near and item.s - zones[-1].s <= FLICKER * solution.part_length(item.part):
+            before = zones.pop().before
+        zones.append(Zone(item.part, item.s, before, after))
+    zones = [zone for zone in zones if zone.before != zone.after]
     return Answer(
         u_n=u_n,
         u_t=u_t,

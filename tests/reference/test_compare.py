@@ -55,6 +55,19 @@ def test_missing_and_meaningless_errors() -> None:
     assert math.isnan(errors["force_tangential"])
 
 
+def test_statuses_that_flicker_are_one_end_of_a_zone() -> None:
+    solution = bk.run(bk.load_scene("paper-1"))
+    places = known("paper-1").places
+    first, last = solution.transitions
+    back = dataclasses.replace(first, s=first.s + 1e-9, from_status=first.to_status, to_status=first.from_status)
+    again = dataclasses.replace(first, s=first.s + 2e-9)
+    flickering = dataclasses.replace(solution, transitions=(first, back, again, last))
+    kinds = [(zone.before, zone.after) for zone in answer_of(flickering, places).zones]
+    assert kinds == [("separated", "slip"), ("slip", "stick")]
+    apart = dataclasses.replace(solution, transitions=(first, dataclasses.replace(back, s=first.s + 1e-3), last))
+    assert len(answer_of(apart, places).zones) == 3
+
+
 @pytest.mark.parametrize("name", slow_only(WITH_REFERENCE, "paper-2", "disc-between-plates", "wavy-obstacle"))
 def test_computed_solutions_approach_the_references(name: str) -> None:
     scene = bk.load_scene(name)
