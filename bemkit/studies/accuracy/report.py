@@ -172,6 +172,9 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
         if x.size and np.isfinite(rate.value) and series[0].series[:2] not in named:
             named.add(series[0].series[:2])
             _write_order(panel, str(rate), (x[-1], y[-1]), colour)
+    if not any(_points(series, abscissa, measure)[0].size for series in by_series(records)):
+        panel.set(xlim=(1.0, 10.0), ylim=(1e-3, 1.0))
+        panel.text(0.5, 0.5, "no finite error", transform=panel.transAxes, ha="center", va="center")
     panel.set_xscale("log")
     panel.set_yscale("log")
     panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 from pathlib import Path
 
 import matplotlib.image
@@ -251,3 +252,6 @@ def test_figures_name_every_series_and_show_the_front() -> None:
     assert [text.get_text() for text in panels[0].texts] == ["3.3"]
     untimed = [dataclasses.replace(each, seconds=float("nan")) for each in rows]
     assert draw_errors(untimed, ("energy",)).axes[0].get_xlabel() == "number of unknowns"
+    missed = draw_errors([dataclasses.replace(each, transitions=float("inf")) for each in rows], ("transitions",))
+    missed.savefig(io.BytesIO())
+    assert [text.get_text() for text in missed.axes[0].texts] == ["no finite error"]
