@@ -148,7 +148,7 @@ class GalerkinElasticity:
     def _flux(self) -> FloatArray:
         """(n_dofs, 1) change of volume per displacement dof; no column for an exterior."""
         fluxes = self._fluxes(() if self.mesh.is_exterior else self._pressed)
-        return fluxes.sum(axis=1, keepdims=True)[:, : fluxes.shape[1]]
+        return np.asarray(fluxes.sum(axis=1, keepdims=True)[:, : fluxes.shape[1]])
 
     def _fluxes(self, parts: Sequence[IntArray]) -> FloatArray:
         """Return the (n_dofs, n_parts) changes of volume per displacement dof on parts of the boundary.
