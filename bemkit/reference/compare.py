@@ -18,6 +18,7 @@ from bemkit.geometry.meshing.discretise import Algebraic
 from bemkit.geometry.neighbours import along_boundary
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import element_nodes
+from bemkit.results.contact_table import FLICKER
 from bemkit.results.solution import Solution
 from bemkit.scene.discretisation import HpGalerkin, QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
@@ -38,8 +39,6 @@ MEASURES: Mapping[str, str] = MappingProxyType(
 FINEST = 1e-9
 """The accuracy asked for; far below it round-off would decide the status of nodes beside a place of change."""
 COLUMNS = ("u_n", "u_t", "sigma_n", "sigma_t")
-FLICKER = 1e-8
-"""Share of a part within which ends of zones are one: clearances, which grow like d**1.5, are round-off there."""
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,9 @@ STATUS_WORDS: Mapping[NodeStatus, str] = MappingProxyType(
         NodeStatus.SLIP_BACKWARD: "slip",
     }
 )
+FLICKER = 1e-8
+"""Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
+statuses change from node to node."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from bemkit.geometry.meshing.layers import (
 from bemkit.geometry.meshing.partition import Partition
 from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.coefficient_decay import CoefficientErrors
-from bemkit.results.contact_table import resolved_transitions
+from bemkit.results.contact_table import FLICKER, resolved_transitions
 from bemkit.results.solution import Solution
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.element_degrees import below_layers, few_kinds, sufficient_degrees
@@ -55,9 +55,6 @@ have moved away from their nodes (0.01 to 0.1 on the scenes with a reference). A
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
-FLICKER = 1e-8
-"""Share of a side on which all places of change are one: clearances, which grow like d**1.5, are round-off there, and
-statuses change from node to node."""
 MOST_CUTS = 8
 """Places of change at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
 MOST_LOOKS = 3
@@ -166,8 +163,8 @@ class LayeredMeshes:
 
     def _may_stop_at_once(self, solution: AnySolution) -> bool:
         """Whether a first mesh in layers that is better than others may be the last."""
-        error = solution.estimated_traction_error
-        return error is not None and NEXT_ERROR * error <= self.accuracy < COARSE
+        has_error = solution.estimated_traction_error is not None
+        return has_error and self.accuracy < COARSE and not self._moves_on(solution, NEXT_ERROR)
 
     def _moves_on(self, solution: AnySolution, part: float) -> bool:
         """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
