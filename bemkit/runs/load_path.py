@@ -225,6 +225,7 @@ def reach(path: Path, guess: ContactState | None = None, callback: Callback = No
             reached, ends, increment = target, (*ends, end), 2.0 * increment
             if reached == 1.0:
                 break
+            _ = end.acting  # now, while a compressed body still knows this response
         elif is_first or failure.status in _HOPELESS or target - reached <= 0.5**MOST_HALVINGS:
             break
         else:

@@ -162,9 +162,10 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
         x, y = _points(front, "seconds", measure)
         style: dict[str, Any] = {"color": _FRONT, "linewidth": 5, "solid_capstyle": "round", "zorder": 0}
         panel.step(x, y, where="post", **style)
-    named = set()
+    named, n_points = set(), 0
     for series in by_series(records):
         x, y = _points(series, abscissa, measure)
+        n_points += x.size
         colour, line, marker = _style(records, series[0])
         panel.plot(x, y, color=colour, linestyle=line, marker=marker, markersize=4.5, linewidth=1.2)
         rate = fitted_rate(series, measure)
@@ -172,7 +173,7 @@ def _draw_panel(panel: Axes, records: Sequence[ErrorRecord], measure: str) -> No
         if x.size and np.isfinite(rate.value) and series[0].series[:2] not in named:
             named.add(series[0].series[:2])
             _write_order(panel, str(rate), (x[-1], y[-1]), colour)
-    if not any(_points(series, abscissa, measure)[0].size for series in by_series(records)):
+    if not n_points:
         panel.set(xlim=(1.0, 10.0), ylim=(1e-3, 1.0))
         panel.text(0.5, 0.5, "no finite error", transform=panel.transAxes, ha="center", va="center")
     panel.set_xscale("log")
