@@ -49,9 +49,9 @@ enough for two digits more at once. Degree 3 takes hardly less time."""
 COARSE = 2e-3
 """Accuracy that the first mesh in layers may reach with degree 4; for less, if it may be the last, it has a degree
 more, and a layer more where loads jump."""
-NEXT_ERROR, LEAST_NEXT_ERROR = 0.04, 0.013
+NEXT_ERROR = 0.04
 """Part of the error of contact tractions that the next mesh keeps, whatever its degree: places where the status changes
-have moved away from their nodes (0.01 to 0.1 on the scenes with a reference). As a rule, and with luck."""
+have moved away from their nodes (0.01 to 0.1 on the scenes with a reference)."""
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
@@ -137,16 +137,16 @@ class LayeredMeshes:
         has_moved = all(has_same_pieces(old, new) for old, new in zip(level.partitions, fresh, strict=True))
         is_inner = np.concatenate([~is_at_end(partition) for partition in level.partitions])
         needed = self._needed_rise(errors, is_inner) if has_moved else 0
-        moves_on, moves_on_at_best = (
-            level.number == FIRST_NUMBER and self._moves_on(solution, part) for part in (NEXT_ERROR, LEAST_NEXT_ERROR)
-        )
+        moves_on = level.number == FIRST_NUMBER and self._moves_on(solution)
         is_last = has_moved and needed <= LAST_RISE and not moves_on
         rise = needed if is_last else min(needed, LARGEST_RISE)
-        if moves_on_at_best:  # only so far that the mesh after the next one may be the last
+        if moves_on:  # the mesh after the next one may be the last: as coarse as that one allows
             rise = min(rise, max(needed - LAST_RISE, 1))
         number = level.number + rise
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
+        if moves_on:
+            goal /= NEXT_ERROR
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
@@ -164,12 +164,12 @@ class LayeredMeshes:
     def _may_stop_at_once(self, solution: AnySolution) -> bool:
         """Whether a first mesh in layers that is better than others may be the last."""
         has_error = solution.estimated_traction_error is not None
-        return has_error and self.accuracy < COARSE and not self._moves_on(solution, NEXT_ERROR)
+        return has_error and self.accuracy < COARSE and not self._moves_on(solution)
 
-    def _moves_on(self, solution: AnySolution, part: float) -> bool:
+    def _moves_on(self, solution: AnySolution) -> bool:
         """Whether the part of its error that the next mesh keeps, as places of change still move, is too large."""
         error = solution.estimated_traction_error
-        return error is not None and part * error > self.accuracy
+        return error is not None and NEXT_ERROR * error > self.accuracy
 
     def _degrees(self, errors: _Errors, old: Partition, new: Partition, largest: int) -> tuple[int, ...]:
         """Return the degrees of new elements that come from those of a solution."""
