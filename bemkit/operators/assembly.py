@@ -17,11 +17,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray, consecutive_runs
+from bemkit.arrays import ComplexArray, FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.reflection import antisymmetric_dofs, element_images
@@ -32,6 +32,8 @@ from bemkit.operators.integrals.sweep import FEW
 from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
+
+AnyNumbers = TypeVar("AnyNumbers", FloatArray, ComplexArray)
 
 _Kind: TypeAlias = tuple[IntArray, tuple[BoundarySpace, ...]]
 """Elements of one degree, and the spaces as they see them."""
@@ -45,9 +47,10 @@ class TrialTerm:
     ----------
     coefficients : (n_local, n_polynomials) array
         Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
-    tensor : (4, 4) array
-        Its xx, xy, yx and yy entries by the integrals of the logarithm, of the real and of the imaginary part of the
-        quotient, and of the double layer.
+    tensor : (2, 3) complex array
+        By the components of the test function, and by the integrals of the logarithm, of the quotient and of the double
+        layer. As everywhere in plane elasticity, what acts on the components of the trial function is one complex
+        number, its real part on x and its imaginary part on y.
     of_slopes : (bool, bool)
         Whether it acts on tangential derivatives of the test and of the trial functions.
     shift : float
@@ -55,7 +58,7 @@ class TrialTerm:
     """
 
     coefficients: FloatArray
-    tensor: FloatArray
+    tensor: ComplexArray
     of_slopes: tuple[bool, bool] = (False, False)
     shift: float = 0.0
 
@@ -72,30 +75,42 @@ class Block:
         """Return those of some trial elements, not copied."""
         return Block(self.integrals.take(chosen), self.test_half[:, 0], self.trial_half[0, chosen])
 
-    def tensor(self, term: TrialTerm, n_test: int) -> list[FloatArray | None]:
-        """Return the xx, xy, yx and yy entries, (n_test, n_trial_polynomials, n_rows, n_trial) each; None is zero."""
-        own, quotient = (slice(n_test), slice(term.coefficients.shape[1])), self.integrals.quotient
-        integrals = self.integrals.log, quotient.real, quotient.imag, self.integrals.double
-        of_test, of_trial = term.of_slopes
-        scale = 1.0 / ((self.test_half if of_test else 1.0) * (self.trial_half if of_trial else 1.0))
-        products: dict[tuple[int, float], FloatArray] = {}
-        for k, factor in {(k, abs(factor)) for row in term.tensor for k, factor in enumerate(row.tolist()) if factor}:
-            products[k, factor] = (factor * scale) * integrals[k][own]
-            if k == 0 and term.shift:
-                measure = 4.0 * self.test_half * self.trial_half
-                products[k, factor][0, 0] += (factor * term.shift) * scale * measure
-        entries: list[FloatArray | None] = []
-        for row in term.tensor.tolist():
-            entry: FloatArray | None = None
-            for k, factor in enumerate(row):
-                if factor:
-                    product = products[k, abs(factor)]
-                    if entry is None:
-                        entry = product if factor > 0.0 else -product
+    def entries(self, terms: Sequence[TrialTerm], n_test: int) -> ComplexArray:
+        """Return the sums of some terms, (2, n_test, n_local, n_rows, n_trial), as complex as their tensors."""
+        result: ComplexArray | None = None
+        for term in terms:
+            for factors, integrals in zip(term.tensor.T, self._of_densities(term, n_test), strict=True):
+                if factors.any():
+                    values = _combined(term.coefficients, integrals)
+                    if result is None:
+                        result = np.multiply.outer(factors, values)
                     else:
-                        entry = entry + product if factor > 0.0 else entry - product
-            entries.append(entry)
-        return entries
+                        _add_products(result, factors.tolist(), values)
+        assert result is not None
+        return result
+
+    def _of_densities(self, term: TrialTerm, n_test: int) -> list[FloatArray | ComplexArray]:
+        """Return the three kinds of integrals of what the kernel of a term acts on, at both ends."""
+        own, (of_test, of_trial) = (slice(n_test), slice(term.coefficients.shape[1])), term.of_slopes
+        found = [values[own] for values in (self.integrals.quotient, self.integrals.log, self.integrals.double)]
+        if term.shift:
+            found[1] = found[1].copy()
+            found[1][0, 0] += 4.0 * term.shift * self.test_half * self.trial_half
+        if of_test or of_trial:
+            scale = 1.0 / ((self.test_half if of_test else 1.0) * (self.trial_half if of_trial else 1.0))
+            found = [values * scale for values in found]
+        return found
+
+
+def _add_products(sums: ComplexArray, factors: Sequence[complex], values: FloatArray | ComplexArray) -> None:
+    """Add the products of values with some factors to sums."""
+    for own, factor in zip(sums, factors, strict=True):
+        if np.iscomplexobj(values):
+            own += factor * values
+        else:  # what is zero takes no time
+            for part, real in ((own.real, factor.real), (own.imag, factor.imag)):
+                if real:
+                    part += real * values
 
 
 class Tag(enum.Enum):
@@ -219,16 +234,15 @@ def _fill(targets: Sequence[_Target], test_elements: IntArray, trial_elements: I
 def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequence[_Kind]) -> int:
     """Sweep over the pairs of elements of some degrees; return their number."""
     mesh = targets[0].form.test.mesh
+    columns = [_Columns(target, trials, 2 * k + 1) for k, target in enumerate(targets)]
     blocks = [
-        [
-            _Rows(target, elements, seen[2 * k], [(own, other[2 * k + 1]) for own, other in trials])
-            for k, target in enumerate(targets)
-        ]
+        [_Rows(target, elements, seen[2 * k], columns[k]) for k, target in enumerate(targets)]
         for elements, seen in tests
     ]
     degrees = Degrees()
-    for form in (form for kind in blocks for rows in kind for form in rows.forms):
-        degrees |= form.degrees
+    for target, k in zip(targets, range(0, 2 * len(targets), 2), strict=True):
+        test, trial = _highest(tests, k), _highest(trials, k + 1)
+        degrees |= replace(target.form, test=test, trial=trial).degrees
     images = range(0, mesh.whole.n_elements, mesh.n_elements)
     test = np.concatenate([elements for elements, _ in tests])
     trial = np.concatenate([image + elements for elements, _ in trials for image in images])
@@ -241,7 +255,7 @@ def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequ
         pairs = Block(sweep.chunk(rows), half[test[rows]], half[trial])
         kind = bisect.bisect_right(edges, rows.start) - 1
         for block in blocks[kind]:
-            gathered = block.gather(pairs)
+            gathered = block.gathered(pairs)
             with lock:  # two chunks share the rows of the node between them
                 block.add(slice(rows.start - edges[kind], rows.stop - edges[kind]), gathered)
         return pairs.test_half.size * trial.size
@@ -259,70 +273,86 @@ class _Target:
     form : PairForm
     test_nodes, trial_nodes : (n,) int arrays
         The scalar dofs that have a place in it, in increasing order.
-    matrix : (n_test, 2, n_trial, 2) array
-        By test node, component, trial node and component.
+    matrix : (n_test, 2, n_trial) complex array
+        By test node, component and trial node; real parts act on the component x there, imaginary parts on y.
     """
 
     form: PairForm
     test_nodes: IntArray
     trial_nodes: IntArray
-    matrix: FloatArray
+    matrix: ComplexArray
 
     @classmethod
     def zeros(cls, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> _Target:
         """Return one for the pairs of some elements."""
         test = np.unique(form.test.element_dofs[test_elements])
         trial = np.unique(form.trial.element_dofs[trial_elements])
-        return cls(form, test, trial, np.zeros((test.size, 2, trial.size, 2)))
+        return cls(form, test, trial, np.zeros((test.size, 2, trial.size), complex))
 
     def dofs_matrix(self) -> FloatArray:
         """Return the matrix by vector dofs; rows and columns of dofs that are zero by symmetry are set to zero."""
+        matrix = self.matrix.view(float).reshape(2 * self.test_nodes.size, -1)
         if self.form.test.mesh.symmetry is not None:
-            self.matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes]] = 0.0
-            self.matrix[:, :, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes]] = 0.0
-        return self.matrix.reshape(2 * self.test_nodes.size, -1)
+            matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes].ravel()] = 0.0
+            matrix[:, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes].ravel()] = 0.0
+        return matrix
+
+
+def _highest(kinds: Sequence[_Kind], space: int) -> BoundarySpace:
+    """Return one of their spaces as the elements of the highest degree see it."""
+    return max((seen[space] for _, seen in kinds), key=lambda each: each.degree)
+
+
+class _Columns:
+    """What trial elements of some degrees add to the columns of a matrix.
+
+    Parameters
+    ----------
+    target : _Target
+    trials : list of _Kind
+        In the order of the columns, each with all images of its elements.
+    space : int
+        The place of the trial space in them.
+    """
+
+    def __init__(self, target: _Target, trials: Sequence[_Kind], space: int) -> None:
+        self.n_nodes = target.trial_nodes.size
+        self._parts, first = [], 0
+        for own, seen in trials:
+            images = []
+            for _, signs, dofs in element_images(seen[space]):
+                elements = slice(first, first + own.size)
+                images.append((elements, signs.tolist(), _Scatter(target.trial_nodes, dofs[own])))
+                first = elements.stop
+            self._parts.append((replace(target.form, trial=seen[space]).trial_terms(), images))
+
+    def gathered(self, block: Block, n_test: int) -> ComplexArray:
+        """Return the sums (n_test, n_rows, 2, n_nodes) for rows of test polynomials."""
+        result = np.zeros((n_test, block.test_half.size, 2, self.n_nodes), complex)
+        for terms, images in self._parts:
+            for elements, (sign, sign_of_y), scatter in images:
+                values = block.columns(elements).entries(terms, n_test)
+                if sign != sign_of_y:
+                    np.conjugate(values, out=values)
+                scatter.add(result.transpose(2, 0, 1, 3), values if sign > 0.0 else -values)
+        return result
 
 
 class _Rows:
     """What test elements of one degree add to a matrix."""
 
-    def __init__(
-        self, target: _Target, elements: IntArray, test: BoundarySpace, trials: Sequence[tuple[IntArray, BoundarySpace]]
-    ) -> None:
-        self.forms = [replace(target.form, test=test, trial=trial) for _, trial in trials]
-        self._matrix = target.matrix
-        self._test_dofs = np.searchsorted(target.test_nodes, test.element_dofs[elements])
-        self._test_coefficients = self.forms[0].test_coefficients
-        self._parts, first = [], 0
-        for form, (own, trial) in zip(self.forms, trials, strict=True):
-            images = [
-                (slice(k * own.size, (k + 1) * own.size), signs.tolist(), _Scatter(target.trial_nodes, dofs[own]))
-                for k, (_, signs, dofs) in enumerate(element_images(trial))
-            ]
-            last = first + own.size * len(images)
-            self._parts.append((slice(first, last), form.trial_terms(), images))
-            first = last
+    def __init__(self, target: _Target, elements: IntArray, test: BoundarySpace, columns: _Columns) -> None:
+        self._matrix, self._columns = target.matrix, columns
+        self._dofs = np.searchsorted(target.test_nodes, test.element_dofs[elements])
+        self._coefficients = replace(target.form, test=test).test_coefficients
 
-    def gather(self, block: Block) -> FloatArray:
-        """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes, 2), by their own dofs."""
-        n_rows, test = block.test_half.shape[0], self._test_coefficients
-        gathered = np.zeros((test.shape[1], n_rows, 2, self._matrix.shape[2], 2))
-        for columns, terms, images in self._parts:
-            part = block.columns(columns)
-            for term in terms:
-                for index, values in enumerate(part.tensor(term, test.shape[1])):
-                    if values is None:
-                        continue
-                    component = index % 2
-                    local = _combined(term.coefficients, values)
-                    for elements, signs, scatter in images:
-                        own = local[..., elements]
-                        scatter.add(gathered[:, :, index // 2, :, component], own if signs[component] == 1.0 else -own)
-        return _combined(test, gathered.reshape(1, test.shape[1], -1)).reshape(-1, *gathered.shape[1:])
+    def gathered(self, block: Block) -> ComplexArray:
+        """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes), by their own dofs."""
+        return _combined(self._coefficients, self._columns.gathered(block, self._coefficients.shape[1])[None])[0]
 
-    def add(self, rows: slice, gathered: FloatArray) -> None:
+    def add(self, rows: slice, gathered: ComplexArray) -> None:
         """Add the gathered rows to the matrix."""
-        for values, dofs in zip(gathered, self._test_dofs[rows].T, strict=True):
+        for values, dofs in zip(gathered, self._dofs[rows].T, strict=True):
             for positions, nodes in consecutive_runs(dofs):
                 self._matrix[nodes] += values[positions]
 
@@ -338,21 +368,22 @@ class _Scatter:
         self._first = int(dofs[0, self._inner[0]]) if self._inner else 0
         self._others = [(k, consecutive_runs(dofs[:, k])) for k in range(n_local) if k not in self._inner]
 
-    def add(self, target: FloatArray, values: FloatArray) -> None:
-        """Add (m, n_local, n_rows, n_elements) values to the columns of (m, n_rows, n_dofs)."""
+    def add(self, target: ComplexArray, values: ComplexArray) -> None:
+        """Add (2, m, n_local, n_rows, n_elements) values to the columns of (2, m, n_rows, n_dofs)."""
         if self._inner:
-            n_inner, n_elements = len(self._inner), values.shape[3]
+            n_inner, n_elements = len(self._inner), values.shape[-1]
             inner = target[..., self._first : self._first + n_elements * n_inner]
-            inner = inner.reshape(*target.shape[:2], n_elements, n_inner)
-            inner += values[:, self._inner.start : self._inner.stop].transpose(0, 2, 3, 1)
+            inner = inner.reshape(*target.shape[:3], n_elements, n_inner)
+            inner += values[:, :, self._inner.start : self._inner.stop].transpose(0, 1, 3, 4, 2)
         for k, runs in self._others:
             for positions, dofs in runs:
-                target[..., dofs] += values[:, k, :, positions]
+                target[..., dofs] += values[:, :, k, :, positions]
 
 
-def _combined(coefficients: FloatArray, values: FloatArray) -> FloatArray:
+def _combined(coefficients: FloatArray, values: AnyNumbers) -> AnyNumbers:
     """Return sums (m, n_local, ...) of (m, n_polynomials, ...) values by coefficients (n_local, n_polynomials)."""
     if coefficients.shape == (1, 1) and coefficients[0, 0] == 1.0:  # of constants
         return values
     m, n_polynomials, *shape = values.shape
-    return np.asarray(np.matmul(coefficients, values.reshape(m, n_polynomials, -1)).reshape(m, -1, *shape))
+    real = np.ascontiguousarray(values).view(float).reshape(m, n_polynomials, -1)
+    return np.matmul(coefficients, real).view(values.dtype).reshape(m, -1, *shape)

@@ -57,7 +57,7 @@ class SingleLayerForm(PairForm):
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (8.0 * np.pi * self.material.shear_modulus * (1.0 - nu))
         log, half = -factor * (3.0 - 4.0 * nu), 0.5 * factor
-        tensor = np.array([[log, half, 0.0, 0.0], [0.0, 0.0, half, 0.0], [0.0, 0.0, half, 0.0], [log, -half, 0.0, 0.0]])
+        tensor = np.array([[half, log, 0.0], [-1j * half, 1j * log, 0.0]])
         shift = -float(np.log(self.test.mesh.diameter)) - 0.5 / (3.0 - 4.0 * nu)
         return [TrialTerm(local_coefficients(self.trial), tensor, shift=shift)]
 
@@ -87,13 +87,11 @@ class DoubleLayerForm(PairForm):
         nu = self.material.effective_poisson_ratio
         factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
         log, half = factor * (1.0 - 2.0 * nu), 0.5 * factor
-        slope = np.array(
-            [[0.0, 0.0, half, 0.0], [log, -half, 0.0, 0.0], [-log, -half, 0.0, 0.0], [0.0, 0.0, -half, 0.0]]
-        )
-        scalar = np.outer([1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0])
+        slope = np.array([[-1j * half, 1j * log, 0.0], [-half, -log, 0.0]])
+        scalar = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1j]])
         return [
-            TrialTerm(coefficients, scalar),
             TrialTerm(_derivative(coefficients), slope, of_slopes=(False, True)),
+            TrialTerm(coefficients, scalar),
         ]
 
 
@@ -128,9 +126,7 @@ class HypersingularForm(PairForm):
         """Return the one term of W, on du/ds and dv/ds."""
         factor = self.material.shear_modulus / (2.0 * np.pi * (1.0 - self.material.effective_poisson_ratio))
         half = 0.5 * factor
-        tensor = np.array(
-            [[-factor, half, 0.0, 0.0], [0.0, 0.0, half, 0.0], [0.0, 0.0, half, 0.0], [-factor, -half, 0.0, 0.0]]
-        )
+        tensor = np.array([[half, -factor, 0.0], [-1j * half, -1j * factor, 0.0]])
         return [TrialTerm(_derivative(local_coefficients(self.trial)), tensor, of_slopes=(True, True))]
 
 
