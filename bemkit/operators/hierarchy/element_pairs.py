@@ -207,7 +207,7 @@ def _near_pairs(centre: ComplexArray, half: FloatArray, reach: FloatArray, n_row
 def _integrated(panels: Panels, degree: int, rows: IntArray, columns: IntArray) -> FloatArray:
     """Return the integrals (n, n_channels) of listed pairs at any distance."""
     degrees = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree))
-    both = integrate_listed(panels, degrees, np.concatenate([rows, columns]), np.concatenate([columns, rows]))
-    to, fro = both.take(slice(0, rows.size)), both.take(slice(rows.size, None))
+    listed, places = integrate_listed(panels, degrees, np.concatenate([rows, columns]), np.concatenate([columns, rows]))
+    to, fro = (listed.at(each) for each in np.split(places, 2))
     kinds = (to.log, to.quotient.real, to.quotient.imag, to.double, fro.double.swapaxes(0, 1))
     return np.ascontiguousarray(np.concatenate([each.reshape(-1, rows.size) for each in kinds]).T)

@@ -55,7 +55,9 @@ def gauss_levels(panels: Panels, outer: IntArray, inner: IntArray) -> LevelArray
     return level
 
 
-def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray) -> PairIntegrals:
+def integrate_listed(
+    panels: Panels, degrees: Degrees, test: IntArray, trial: IntArray
+) -> tuple[PairIntegrals, IntArray]:
     """Integrate pairs of elements, each with the rule that its distance asks for.
 
     Parameters
@@ -64,38 +66,49 @@ def integrate_listed(panels: Panels, degrees: Degrees, test: IntArray, trial: In
     degrees : Degrees
     test, trial : (n,) arrays
         Element numbers of the pairs.
+
+    Returns
+    -------
+    integrals : PairIntegrals
+        One after the other, each kind of pairs in one piece.
+    places : (n,) int array
+        Where those of each pair are.
     """
     half, n_elements = panels.half, panels.half.size
-    result = PairIntegrals.zeros(degrees, (test.size,))
-    is_same, is_straight = test == trial, panels.is_straight[trial]
-    for same in (np.flatnonzero(is_same & is_straight), np.flatnonzero(is_same & ~is_straight)):
-        result.assign(same, _integrate_same(panels, degrees, test[same]))
+    is_same = test == trial
     is_turned = (half[test] > half[trial]) | ((half[test] == half[trial]) & (test > trial))
     is_turned &= panels.is_straight[test] & panels.is_straight[trial]
     # both orders of two elements share their integrals; those of elements with themselves come last and are left out
     numbers = np.where(is_turned, trial * n_elements + test, test * n_elements + trial)
     numbers[is_same] = n_elements**2
-    different, item = np.unique(numbers, return_inverse=True)
+    different, places = np.unique(numbers, return_inverse=True)
     different = different[: np.searchsorted(different, n_elements**2)]
-    outer, inner = np.divmod(different, n_elements)
-    either_way = degrees.either_way
-    sums = Inner.from_rows(either_way, _outer_sums(panels, either_way, outer, inner))
+    direct, turned = _integrate_different(panels, degrees.either_way, *np.divmod(different, n_elements))
+    parts = [direct]
+    if is_turned.any():
+        parts.append(turned)
+        places[is_turned] += direct.size
+    is_straight = panels.is_straight[trial]
+    for same in (np.flatnonzero(is_same & is_straight), np.flatnonzero(is_same & ~is_straight)):
+        places[same] = sum(part.size for part in parts) + np.arange(same.size)
+        parts.append(_integrate_same(panels, degrees, test[same]))
+    return PairIntegrals.joined(degrees, parts), places
+
+
+def _integrate_different(
+    panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray
+) -> tuple[PairIntegrals, PairIntegrals]:
+    """Integrate pairs of two elements as tests and trials (outer, inner) and, if straight, the other way round."""
+    half, tangent = panels.half, panels.tangent
+    sums = Inner.from_rows(degrees, _outer_sums(panels, degrees, outer, inner))
     sums.log[:1, :1] += 4.0 * np.log(half[inner])
     measure = half[outer] * half[inner]
-    log, quotient = measure * sums.log, (measure * panels.tangent[inner] ** 2) * sums.quotient
+    log, quotient = measure * sums.log, (measure * tangent[inner] ** 2) * sums.quotient
     cauchy = (half[outer] / (2.0 * np.pi)) * sums.cauchy
     # with the normal n = -i tangent at y, k = Re(n / (x - y)) / (2 pi)
-    turned = -((panels.tangent[outer] * panels.tangent[inner].conj()) * cauchy).imag
-
-    for chosen, double, axes in (
-        (np.flatnonzero(~is_turned & ~is_same), cauchy.imag, (1, 0, 2)),
-        (np.flatnonzero(is_turned), turned, (0, 1, 2)),
-    ):
-        own = item[chosen]
-        for target, values in ((result.log, log), (result.quotient, quotient), (result.double, double)):
-            n_test, n_trial = target.shape[:2]
-            target[..., chosen] = values.transpose(axes)[:n_test, :n_trial, own]
-    return result
+    turned = -((tangent[outer] * tangent[inner].conj()) * cauchy).imag
+    # the sums are by the polynomials of the inner element first
+    return PairIntegrals(log, quotient, cauchy.imag).swapped, PairIntegrals(log, quotient, turned)
 
 
 def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray) -> FloatArray:

@@ -152,21 +152,34 @@ class PairIntegrals:
 
     def put(self, rows: IntArray | slice, columns: IntArray | slice, other: PairIntegrals) -> None:
         """Overwrite the pairs (rows, columns) with those of `other`."""
-        self.log[:, :, rows, columns] = other.log
-        self.quotient[:, :, rows, columns] = other.quotient
-        self.double[:, :, rows, columns] = other.double
+        for own, values in zip(self._kinds, other._kinds, strict=True):
+            own[:, :, rows, columns] = values
 
-    def assign(self, chosen: IntArray | BoolArray, other: PairIntegrals) -> None:
-        """Overwrite some of the listed pairs with those of `other`."""
-        self.log[..., chosen] = other.log
-        self.quotient[..., chosen] = other.quotient
-        self.double[..., chosen] = other.double
+    @classmethod
+    def joined(cls, degrees: Degrees, parts: Sequence[PairIntegrals]) -> PairIntegrals:
+        """Join lists of pairs one after the other, cut to what is wanted."""
+        wanted = [each.shape[:2] for each in cls.zeros(degrees, (0,))._kinds]
+        kinds = zip(wanted, zip(*(part._kinds for part in parts), strict=True), strict=True)
+        return cls(*(np.concatenate([each[:n_test, :n_trial] for each in kind], -1) for (n_test, n_trial), kind in kinds))
 
-    def reshaped(self, shape: tuple[int, ...]) -> PairIntegrals:
-        """Return the listed pairs as an array of pairs."""
-        log, double = (values.reshape(*values.shape[:2], *shape) for values in (self.log, self.double))
-        return PairIntegrals(log, self.quotient.reshape(*self.quotient.shape[:2], *shape), double)
+    @property
+    def _kinds(self) -> tuple[FloatArray, ComplexArray, FloatArray]:
+        return self.log, self.quotient, self.double
 
-    def take(self, chosen: IntArray | slice) -> PairIntegrals:
-        """Return some of the listed pairs, or of the columns."""
-        return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])
+    @property
+    def swapped(self) -> PairIntegrals:
+        """The same by the degrees (trial, test), not copied."""
+        return PairIntegrals(*(each.swapaxes(0, 1) for each in self._kinds))
+
+    @property
+    def size(self) -> int:
+        """How many pairs are listed."""
+        return self.log.shape[-1]
+
+    def at(self, places: IntArray) -> PairIntegrals:
+        """Return the listed pairs at some places, in the shape of `places`."""
+        return PairIntegrals(*(each[..., places] for each in self._kinds))
+
+    def take(self, chosen: slice) -> PairIntegrals:
+        """Return some of the listed pairs, or of the columns, not copied."""
+        return PairIntegrals(*(each[..., chosen] for each in self._kinds))

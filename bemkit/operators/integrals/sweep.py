@@ -90,7 +90,8 @@ class PairSweep:
         n_points = 1 if is_listed.all() else self._n_points(self.base)
         self._n_rows = rows_per_chunk(degrees, self.trial.size, n_points)
         self._rows, self._columns = np.nonzero(is_listed)
-        self._listed = integrate_listed(self.panels, degrees, self.test[self._rows], self.trial[self._columns])
+        pairs = self.test[self._rows], self.trial[self._columns]
+        self._listed, self._places = integrate_listed(self.panels, degrees, *pairs)
 
     def _n_points(self, level: int) -> int:
         """Return the number of points of a Gauss level."""
@@ -128,7 +129,7 @@ class PairSweep:
         listed = slice(*np.searchsorted(self._rows, [rows.start, rows.stop]))
         shape = self.test[rows].size, self.trial.size
         if listed.stop - listed.start == shape[0] * shape[1]:  # on small meshes
-            return self._listed.take(listed).reshaped(shape)
+            return self._listed.at(self._places[listed].reshape(shape))
         straight, curved = self._columns_by_kind
         with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced below
             if not curved.size:
@@ -137,7 +138,7 @@ class PairSweep:
                 result = PairIntegrals.zeros(self.degrees, shape)
                 result.put(slice(None), straight, self._sweep_straight(rows, self.trial[straight]))
                 result.put(slice(None), curved, self._sweep_curved(rows, self.trial[curved]))
-        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(listed))
+        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.at(self._places[listed]))
         return result
 
     def _sweep_straight(self, rows: slice, trial: IntArray) -> PairIntegrals:
