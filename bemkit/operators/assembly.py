@@ -17,9 +17,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from bemkit.arrays import ComplexArray, FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.errors import GeometryError
@@ -33,7 +34,8 @@ from bemkit.operators.linear.threads import for_each_chunk
 from bemkit.operators.material import Material
 from bemkit.operators.stopwatch import assembling
 
-AnyNumbers = TypeVar("AnyNumbers", FloatArray, ComplexArray)
+_Numbers: TypeAlias = npt.NDArray[np.inexact]
+"""Real or complex ones."""
 
 _Kind: TypeAlias = tuple[IntArray, tuple[BoundarySpace, ...]]
 """Elements of one degree, and the spaces as they see them."""
@@ -48,9 +50,9 @@ class TrialTerm:
     coefficients : (n_local, n_polynomials) array
         Legendre coefficients of what the kernel acts on: the trial functions or their derivatives.
     tensor : (2, 3) complex array
-        By the components of the test function, and by the integrals of the logarithm, of the quotient and of the double
-        layer. As everywhere in plane elasticity, what acts on the components of the trial function is one complex
-        number, its real part on x and its imaginary part on y.
+        By the components of the test function, and by the integrals of the quotient, the logarithm and the double
+        layer. What acts on the components of the trial function is one complex number, its real part on x and its
+        imaginary part on y.
     of_slopes : (bool, bool)
         Whether it acts on tangential derivatives of the test and of the trial functions.
     shift : float
@@ -79,9 +81,9 @@ class Block:
         """Return the sums of some terms, (2, n_test, n_local, n_rows, n_trial), as complex as their tensors."""
         result: ComplexArray | None = None
         for term in terms:
-            for factors, integrals in zip(term.tensor.T, self._of_densities(term, n_test), strict=True):
+            for factors, integrals, shift in zip(term.tensor.T, self._kinds, (0.0, term.shift, 0.0), strict=True):
                 if factors.any():
-                    values = _combined(term.coefficients, integrals)
+                    values = self._local(term, integrals[:n_test, : term.coefficients.shape[1]], shift)
                     if result is None:
                         result = np.multiply.outer(factors, values)
                     else:
@@ -89,20 +91,22 @@ class Block:
         assert result is not None
         return result
 
-    def _of_densities(self, term: TrialTerm, n_test: int) -> list[FloatArray | ComplexArray]:
-        """Return the three kinds of integrals of what the kernel of a term acts on, at both ends."""
-        own, (of_test, of_trial) = (slice(n_test), slice(term.coefficients.shape[1])), term.of_slopes
-        found = [values[own] for values in (self.integrals.quotient, self.integrals.log, self.integrals.double)]
-        if term.shift:
-            found[1] = found[1].copy()
-            found[1][0, 0] += 4.0 * term.shift * self.test_half * self.trial_half
+    @property
+    def _kinds(self) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        return self.integrals.quotient, self.integrals.log, self.integrals.double
+
+    def _local(self, term: TrialTerm, values: _Numbers, shift: float) -> _Numbers:
+        """Return integrals of what the kernel of a term acts on, at both ends, for the local trial functions."""
+        of_test, of_trial = term.of_slopes
+        if shift:
+            values = values.copy()
+            values[0, 0] += 4.0 * shift * self.test_half * self.trial_half
         if of_test or of_trial:
-            scale = 1.0 / ((self.test_half if of_test else 1.0) * (self.trial_half if of_trial else 1.0))
-            found = [values * scale for values in found]
-        return found
+            values = values * (1.0 / ((self.test_half if of_test else 1.0) * (self.trial_half if of_trial else 1.0)))
+        return _combined(term.coefficients, values)
 
 
-def _add_products(sums: ComplexArray, factors: Sequence[complex], values: FloatArray | ComplexArray) -> None:
+def _add_products(sums: ComplexArray, factors: Sequence[complex], values: _Numbers) -> None:
     """Add the products of values with some factors to sums."""
     for own, factor in zip(sums, factors, strict=True):
         if np.iscomplexobj(values):
@@ -241,8 +245,7 @@ def _fill_kinds(targets: Sequence[_Target], tests: Sequence[_Kind], trials: Sequ
     ]
     degrees = Degrees()
     for target, k in zip(targets, range(0, 2 * len(targets), 2), strict=True):
-        test, trial = _highest(tests, k), _highest(trials, k + 1)
-        degrees |= replace(target.form, test=test, trial=trial).degrees
+        degrees |= replace(target.form, test=_highest(tests, k), trial=_highest(trials, k + 1)).degrees
     images = range(0, mesh.whole.n_elements, mesh.n_elements)
     test = np.concatenate([elements for elements, _ in tests])
     trial = np.concatenate([image + elements for elements, _ in trials for image in images])
@@ -348,7 +351,8 @@ class _Rows:
 
     def gathered(self, block: Block) -> ComplexArray:
         """Return the rows of the elements, (n_local, n_rows, 2, n_trial_nodes), by their own dofs."""
-        return _combined(self._coefficients, self._columns.gathered(block, self._coefficients.shape[1])[None])[0]
+        gathered = self._columns.gathered(block, self._coefficients.shape[1])
+        return np.asarray(_combined(self._coefficients, gathered[None])[0], complex)
 
     def add(self, rows: slice, gathered: ComplexArray) -> None:
         """Add the gathered rows to the matrix."""
@@ -380,10 +384,10 @@ class _Scatter:
                 target[..., dofs] += values[:, :, k, :, positions]
 
 
-def _combined(coefficients: FloatArray, values: AnyNumbers) -> AnyNumbers:
+def _combined(coefficients: FloatArray, values: _Numbers) -> _Numbers:
     """Return sums (m, n_local, ...) of (m, n_polynomials, ...) values by coefficients (n_local, n_polynomials)."""
     if coefficients.shape == (1, 1) and coefficients[0, 0] == 1.0:  # of constants
         return values
     m, n_polynomials, *shape = values.shape
     real = np.ascontiguousarray(values).view(float).reshape(m, n_polynomials, -1)
-    return np.matmul(coefficients, real).view(values.dtype).reshape(m, -1, *shape)
+    return np.asarray(np.matmul(coefficients, real).view(values.dtype).reshape(m, -1, *shape))

@@ -18,7 +18,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.hierarchy import compiled
-from bemkit.operators.integrals.near import GAUSS_LEVELS, integrate_listed
+from bemkit.operators.integrals.near import integrate_listed
+from bemkit.operators.integrals.outer_rules import GAUSS_LEVELS
 from bemkit.operators.integrals.pairs import Degrees
 from bemkit.operators.integrals.panels import Panels
 from bemkit.operators.linear.threads import for_each_chunk
@@ -208,6 +209,6 @@ def _integrated(panels: Panels, degree: int, rows: IntArray, columns: IntArray) 
     """Return the integrals (n, n_channels) of listed pairs at any distance."""
     degrees = Degrees(log=(degree - 1, degree - 1), double=(degree - 1, degree))
     listed, places = integrate_listed(panels, degrees, np.concatenate([rows, columns]), np.concatenate([columns, rows]))
-    to, fro = (listed.at(each) for each in np.split(places, 2))
+    to, fro = (listed.take(each) for each in np.split(places, 2))
     kinds = (to.log, to.quotient.real, to.quotient.imag, to.double, fro.double.swapaxes(0, 1))
     return np.ascontiguousarray(np.concatenate([each.reshape(-1, rows.size) for each in kinds]).T)

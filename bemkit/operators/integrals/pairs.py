@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from bemkit.arrays import ComplexArray, FloatArray, IntArray
 from bemkit.operators import kernels
+
+_Numbers = TypeVar("_Numbers", FloatArray, ComplexArray)
 
 
 @dataclass(frozen=True)
@@ -152,34 +155,35 @@ class PairIntegrals:
 
     def put(self, rows: IntArray | slice, columns: IntArray | slice, other: PairIntegrals) -> None:
         """Overwrite the pairs (rows, columns) with those of `other`."""
-        for own, values in zip(self._kinds, other._kinds, strict=True):
-            own[:, :, rows, columns] = values
+        self.log[:, :, rows, columns] = other.log
+        self.quotient[:, :, rows, columns] = other.quotient
+        self.double[:, :, rows, columns] = other.double
 
     @classmethod
     def joined(cls, degrees: Degrees, parts: Sequence[PairIntegrals]) -> PairIntegrals:
         """Join lists of pairs one after the other, cut to what is wanted."""
-        wanted = [each.shape[:2] for each in cls.zeros(degrees, (0,))._kinds]
-        kinds = zip(wanted, zip(*(part._kinds for part in parts), strict=True), strict=True)
-        return cls(*(np.concatenate([each[:n_test, :n_trial] for each in kind], -1) for (n_test, n_trial), kind in kinds))
+        wanted = cls.zeros(degrees, (0,))
 
-    @property
-    def _kinds(self) -> tuple[FloatArray, ComplexArray, FloatArray]:
-        return self.log, self.quotient, self.double
+        def together(own: _Numbers, lists: Sequence[_Numbers]) -> _Numbers:
+            n_test, n_trial = own.shape[:2]
+            return np.concatenate([values[:n_test, :n_trial] for values in lists], axis=-1)
+
+        return cls(
+            together(wanted.log, [part.log for part in parts]),
+            together(wanted.quotient, [part.quotient for part in parts]),
+            together(wanted.double, [part.double for part in parts]),
+        )
 
     @property
     def swapped(self) -> PairIntegrals:
         """The same by the degrees (trial, test), not copied."""
-        return PairIntegrals(*(each.swapaxes(0, 1) for each in self._kinds))
+        return PairIntegrals(self.log.swapaxes(0, 1), self.quotient.swapaxes(0, 1), self.double.swapaxes(0, 1))
 
     @property
     def size(self) -> int:
         """How many pairs are listed."""
-        return self.log.shape[-1]
+        return int(self.log.shape[-1])
 
-    def at(self, places: IntArray) -> PairIntegrals:
-        """Return the listed pairs at some places, in the shape of `places`."""
-        return PairIntegrals(*(each[..., places] for each in self._kinds))
-
-    def take(self, chosen: slice) -> PairIntegrals:
-        """Return some of the listed pairs, or of the columns, not copied."""
-        return PairIntegrals(*(each[..., chosen] for each in self._kinds))
+    def take(self, chosen: IntArray | slice) -> PairIntegrals:
+        """Return some of the listed pairs, in the shape of `chosen`, or some of the columns."""
+        return PairIntegrals(self.log[..., chosen], self.quotient[..., chosen], self.double[..., chosen])

@@ -27,12 +27,8 @@ from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.integrals.inner import far_inner
-from bemkit.operators.integrals.near import (
-    GAUSS_LEVELS,
-    LevelArray,
-    gauss_levels,
-    integrate_listed,
-)
+from bemkit.operators.integrals.near import integrate_listed
+from bemkit.operators.integrals.outer_rules import GAUSS_LEVELS, LevelArray, gauss_levels
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels, squared_distance
 
@@ -129,7 +125,7 @@ class PairSweep:
         listed = slice(*np.searchsorted(self._rows, [rows.start, rows.stop]))
         shape = self.test[rows].size, self.trial.size
         if listed.stop - listed.start == shape[0] * shape[1]:  # on small meshes
-            return self._listed.at(self._places[listed].reshape(shape))
+            return self._listed.take(self._places[listed].reshape(shape))
         straight, curved = self._columns_by_kind
         with np.errstate(all="ignore"):  # listed pairs may overflow here; they are replaced below
             if not curved.size:
@@ -138,7 +134,7 @@ class PairSweep:
                 result = PairIntegrals.zeros(self.degrees, shape)
                 result.put(slice(None), straight, self._sweep_straight(rows, self.trial[straight]))
                 result.put(slice(None), curved, self._sweep_curved(rows, self.trial[curved]))
-        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.at(self._places[listed]))
+        result.put(self._rows[listed] - rows.start, self._columns[listed], self._listed.take(self._places[listed]))
         return result
 
     def _sweep_straight(self, rows: slice, trial: IntArray) -> PairIntegrals:
