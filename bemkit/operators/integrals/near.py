@@ -11,11 +11,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, consecutive_runs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.operators import kernels
 from bemkit.operators.integrals.inner import N_SMOOTH, bending, far_inner, inner_integrals, local_coordinates
-from bemkit.operators.integrals.outer_rules import GAUSS_LEVELS, OuterRule, batches, gauss_levels, split_rules
+from bemkit.operators.integrals.outer_rules import (
+    GAUSS_LEVELS,
+    LevelArray,
+    OuterRule,
+    batches,
+    gauss_levels,
+    split_rules,
+)
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels
 
@@ -50,8 +57,11 @@ def integrate_listed(
     numbers = np.where(is_turned, trial * n_elements + test, test * n_elements + trial)
     numbers[is_same] = n_elements**2
     different, places = np.unique(numbers, return_inverse=True)
-    different = different[: np.searchsorted(different, n_elements**2)]
-    direct, turned = _integrate_different(panels, degrees.either_way, *np.divmod(different, n_elements))
+    outer, inner = np.divmod(different[: np.searchsorted(different, n_elements**2)], n_elements)
+    levels = gauss_levels(panels, outer, inner)
+    order = np.argsort(levels, kind="stable")  # those of one rule in one piece
+    places = np.append(np.argsort(order), 0)[places]
+    direct, turned = _integrate_different(panels, degrees.either_way, outer[order], inner[order], levels[order])
     parts = [direct]
     if is_turned.any():
         parts.append(turned)
@@ -64,11 +74,11 @@ def integrate_listed(
 
 
 def _integrate_different(
-    panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray
+    panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray, level: LevelArray
 ) -> tuple[PairIntegrals, PairIntegrals]:
     """Integrate pairs of two elements as tests and trials (outer, inner) and, if straight, the other way round."""
     half, tangent = panels.half, panels.tangent
-    sums = Inner.from_rows(degrees, _outer_sums(panels, degrees, outer, inner))
+    sums = Inner.from_rows(degrees, _outer_sums(panels, degrees, outer, inner, level))
     sums.log[:1, :1] += 4.0 * np.log(half[inner])
     measure = half[outer] * half[inner]
     log, quotient = measure * sums.log, (measure * tangent[inner] ** 2) * sums.quotient
@@ -79,19 +89,20 @@ def _integrate_different(
     return PairIntegrals(log, quotient, cauchy.imag).swapped, PairIntegrals(log, quotient, turned)
 
 
-def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray) -> FloatArray:
+def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArray, level: LevelArray) -> FloatArray:
     """Return the (n_rows, n_outer_polynomials, n) sums of the rows of `Inner` over the rules of the outer elements."""
     (n_log, n_double), extra_points = degrees.n_trial, degrees.extra_points
-    sums = np.zeros((outer.size, 3 * n_log + 2 * n_double, max(n_log, n_double)))
-    level, is_straight = gauss_levels(panels, outer, inner), panels.is_straight[inner]
+    sums = np.zeros((3 * n_log + 2 * n_double, max(n_log, n_double), outer.size))
+    is_straight = panels.is_straight[inner]
 
     def add(rules: Sequence[OuterRule], n_inner_points: int | None) -> None:
         for batch in batches(rules, BATCH_POINTS):
             values = _inner_rows(panels, degrees, outer, inner, batch, n_inner_points)
             ends = np.cumsum([rule.n_points for rule in batch])[:-1]
             for rule, own in zip(batch, np.split(values, ends, axis=1), strict=True):
-                item, moments = rule.moments(own, sums.shape[2])
-                sums[item] += moments
+                item, moments = rule.moments(own, sums.shape[1])
+                for positions, items in consecutive_runs(item):
+                    sums[..., items] += moments[..., positions]
 
     wholes = [
         OuterRule.whole(np.flatnonzero(is_straight & (level == number)), n_points + extra_points)
@@ -104,7 +115,7 @@ def _outer_sums(panels: Panels, degrees: Degrees, outer: IntArray, inner: IntArr
             n_points += extra_points
             add([OuterRule.whole(np.flatnonzero(~is_straight & (level == number)), n_points)], n_points)
         add(split_rules(panels, outer, inner, np.flatnonzero(~is_straight & is_close), extra_points), None)
-    return np.ascontiguousarray(sums.transpose(1, 2, 0))
+    return sums
 
 
 def _inner_rows(

@@ -98,15 +98,18 @@ class OuterRule:
         -------
         items : (m,) int array
             Without repetition.
-        moments : (m, n_rows, n_polynomials) array
+        moments : (n_rows, n_polynomials, m) array
         """
         xi = np.where(self.at_start, 2.0 * self.fraction - 1.0, 1.0 - 2.0 * self.fraction)
         factors = self.weight * kernels.legendre_values(n_polynomials - 1, xi)
-        moments = values.reshape(len(values), self.item.size, -1).transpose(1, 0, 2) @ factors.transpose(1, 2, 0)
+        values = values.reshape(len(values), self.item.size, -1)
+        if len(xi) == 1:  # one rule for all pairs
+            return self.item, factors[:, 0] @ values.transpose(0, 2, 1)
+        moments = values.transpose(1, 0, 2) @ factors.transpose(1, 2, 0)
         begins = np.flatnonzero(np.diff(self.item, prepend=-1))
-        if begins.size == self.item.size:
-            return self.item, moments
-        return self.item[begins], np.add.reduceat(moments, begins, axis=0)
+        if begins.size < self.item.size:
+            moments = np.add.reduceat(moments, begins, axis=0)
+        return self.item[begins], moments.transpose(1, 2, 0)
 
 
 def batches(rules: Iterable[OuterRule], n_points: int) -> Iterator[list[OuterRule]]:
