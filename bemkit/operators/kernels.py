@@ -29,6 +29,7 @@ from functools import lru_cache
 import numpy as np
 
 from bemkit.arrays import ComplexArray, FloatArray, read_only
+from bemkit.geometry.quadrature import gauss_legendre
 
 LOST = 30.0
 """Factor of round-off that the upward recurrence may lose before the downward one takes over."""
@@ -262,6 +263,13 @@ def legendre_of_monomials(highest: int) -> FloatArray:
         matrix[m, : m + 1] = np.polynomial.legendre.poly2leg(unit[: m + 1])
     read_only(matrix)
     return matrix
+
+
+@lru_cache(maxsize=64)
+def legendre_weights(n_polynomials: int, n_points: int) -> FloatArray:
+    """Return the (n_polynomials, n_points) products, read-only, of P_0, P_1, ... at Gauss points and their weights."""
+    points, weights = gauss_legendre(n_points)
+    return read_only(weights * legendre_values(max(n_polynomials - 1, 0), points)[:n_polynomials])
 
 
 def legendre_values(highest: int, t: FloatArray | float) -> FloatArray:

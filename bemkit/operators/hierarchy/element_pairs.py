@@ -72,9 +72,8 @@ class Rule:
         """Return rules with some numbers of points."""
         everywhere, found, tangents, polynomials = np.arange(panels.half.size), [], [], []
         for n in counts:
-            points, weights = gauss_legendre(n)
-            polynomials.append(weights * kernels.legendre_values(degree, points))
-            for xi in points.tolist():
+            polynomials.append(kernels.legendre_weights(degree + 1, n))
+            for xi in gauss_legendre(n)[0].tolist():
                 found.append(panels.point(everywhere, xi))
                 tangents.append(_direction(panels, xi))
         begins = np.cumsum([0, *counts])

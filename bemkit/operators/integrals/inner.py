@@ -126,16 +126,17 @@ def bending(
     g = _product(powers, divided)
     size = np.square(g.real) + np.square(g.imag)
     ratio = g * g / size
-    log = _weights(n_log, n_points) @ (0.5 * np.log(size))
-    quotient = _product(_weights(n_log, n_points), ratio)
+    weights_of_log = kernels.legendre_weights(n_log, n_points)
+    log = weights_of_log @ (0.5 * np.log(size))
+    quotient = _product(weights_of_log, ratio)
     if n_log and eta is not None and integrals is not None:
         at_mirror = curved_panels.evaluate(divided, root.conj()) / curved_panels.evaluate(divided, root).conj()
         gap = root.conj() - t[:, None]
         gap[gap == 0.0] = 1.0  # then eta is zero, and with it the whole term
-        change = _product(_weights(n_log, n_points), (ratio - at_mirror) / gap)
+        change = _product(weights_of_log, (ratio - at_mirror) / gap)
         quotient += (2j * eta) * (at_mirror * integrals[:n_log].conj() + change)
     slope = _product(powers[:, :-1], curved_panels.derivative(divided))
-    double = _weights(n_double, n_points) @ (-(slope * g.conj()).imag / size)
+    double = kernels.legendre_weights(n_double, n_points) @ (-(slope * g.conj()).imag / size)
     return Inner(log, quotient, 1j * double)
 
 
@@ -155,9 +156,8 @@ def far_inner(degrees: Degrees, coefficients: ComplexArray, zeta: ComplexArray, 
     n_log, n_double = degrees.n_trial
     result = Inner.zeros(degrees, zeta.shape)
     slopes = curved_panels.derivative(coefficients)
-    points, weights = gauss_legendre(n_points)
-    factors = weights * kernels.legendre_values(max(n_log, n_double, 1) - 1, points)
-    for t, factor in zip(points, factors.T, strict=True):
+    factors = kernels.legendre_weights(max(n_log, n_double), n_points)
+    for t, factor in zip(gauss_legendre(n_points)[0], factors.T, strict=True):
         place = np.full(coefficients.shape[1], t + 0j)
         rho = zeta - curved_panels.evaluate(coefficients, place)
         size = np.square(rho.real) + np.square(rho.imag)
@@ -174,10 +174,3 @@ def _product(matrix: FloatArray, values: ComplexArray) -> ComplexArray:
     """Return matrix @ values for a real matrix and complex values by one real product."""
     values = np.ascontiguousarray(values)
     return np.asarray(matrix @ values.view(float)).view(complex)
-
-
-def _weights(n_polynomials: int, n_points: int) -> FloatArray:
-    """Return the weights of the rule for smooth remainders, times P_b: (n_polynomials, n_points)."""
-    t, weights = gauss_legendre(n_points)
-    result: FloatArray = weights * kernels.legendre_values(max(n_polynomials - 1, 0), t)[:n_polynomials]
-    return result

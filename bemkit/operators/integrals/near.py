@@ -148,9 +148,9 @@ def _integrate_same(panels: Panels, degrees: Degrees, elements: IntArray) -> Pai
         result.quotient[:1, :1] = 4.0
     else:
         coefficients = panels.curved.about_centre[:, elements]
-        points, weights = gauss_legendre(N_SMOOTH + degrees.extra_points)
+        points, _ = gauss_legendre(N_SMOOTH + degrees.extra_points)
         inner = [bending(degrees, coefficients, np.full(elements.size, xi + 0j)) for xi in points]
-        result = PairIntegrals.summed(degrees, points, weights, inner)
+        result = PairIntegrals.summed(degrees, inner)
     for a, b in np.ndindex(*result.log.shape[:2]):
         result.log[a, b] += kernels.log_on_itself(a, b)
     result.scale(panels.half[elements], panels.half[elements], panels.tangent[elements])

@@ -57,21 +57,23 @@ class OuterRule:
     ----------
     item : (n,) int array
         The pairs, ascending.
-    at_start : (n, n_points) or (1, n_points) bool array
-        Whether the start is the end node that points are measured from; a single row serves all pairs.
-    fraction, weight : arrays of the same shape
+    at_start : (n, n_points) bool array
+        Whether the start is the end node that points are measured from.
+    fraction : (n, n_points) array
+    weight : (n, n_points) array, optional
+        Left out, points and weights are those of Gauss on whole elements; then a single row of points serves all pairs.
     """
 
     item: IntArray
     at_start: BoolArray
     fraction: FloatArray
-    weight: FloatArray
+    weight: FloatArray | None = None
 
     @classmethod
     def whole(cls, item: IntArray, n_points: int) -> OuterRule:
         """Return one Gauss rule for all, each half of it measured from its own end."""
-        points, weights = gauss_legendre(n_points)
-        return cls(item, (points < 0.0)[None], 0.5 * (1.0 - np.abs(points))[None], weights[None])
+        points, _ = gauss_legendre(n_points)
+        return cls(item, (points < 0.0)[None], 0.5 * (1.0 - np.abs(points))[None])
 
     @property
     def n_points(self) -> int:
@@ -87,8 +89,8 @@ class OuterRule:
 
     def part(self, chosen: slice) -> OuterRule:
         """Return the rule for some of the pairs."""
-        if len(self.fraction) == 1:
-            return OuterRule(self.item[chosen], self.at_start, self.fraction, self.weight)
+        if self.weight is None:
+            return OuterRule(self.item[chosen], self.at_start, self.fraction)
         return OuterRule(self.item[chosen], self.at_start[chosen], self.fraction[chosen], self.weight[chosen])
 
     def moments(self, values: FloatArray, n_polynomials: int) -> tuple[IntArray, FloatArray]:
@@ -100,11 +102,12 @@ class OuterRule:
             Without repetition.
         moments : (n_rows, n_polynomials, m) array
         """
+        n_points = self.fraction.shape[1]
+        values = values.reshape(len(values), -1, n_points)
+        if self.weight is None:
+            return self.item, kernels.legendre_weights(n_polynomials, n_points) @ values.transpose(0, 2, 1)
         xi = np.where(self.at_start, 2.0 * self.fraction - 1.0, 1.0 - 2.0 * self.fraction)
         factors = self.weight * kernels.legendre_values(n_polynomials - 1, xi)
-        values = values.reshape(len(values), self.item.size, -1)
-        if len(xi) == 1:  # one rule for all pairs
-            return self.item, factors[:, 0] @ values.transpose(0, 2, 1)
         moments = values.transpose(1, 0, 2) @ factors.transpose(1, 2, 0)
         begins = np.flatnonzero(np.diff(self.item, prepend=-1))
         if begins.size < self.item.size:

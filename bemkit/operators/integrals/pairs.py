@@ -125,10 +125,10 @@ class PairIntegrals:
         return cls(np.zeros(log + shape), np.zeros(log + shape, complex), np.zeros(double + shape))
 
     @classmethod
-    def summed(cls, degrees: Degrees, points: FloatArray, weights: FloatArray, inner: Sequence[Inner]) -> PairIntegrals:
-        """Sum inner integrals over the points of one rule on the test elements."""
+    def summed(cls, degrees: Degrees, inner: Sequence[Inner]) -> PairIntegrals:
+        """Sum inner integrals seen from all Gauss points of one rule on the test elements."""
         n_polynomials = max((family[0] + 1 for family in (degrees.log, degrees.double) if family), default=1)
-        weighted = weights * kernels.legendre_values(n_polynomials - 1, points)
+        weighted = kernels.legendre_weights(n_polynomials, len(inner))
 
         def total(family: tuple[int, int] | None, values: Sequence[FloatArray]) -> FloatArray:
             # by trial degree, point and pair; the sums are contiguous by trial degree, test degree and pair

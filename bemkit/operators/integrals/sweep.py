@@ -140,7 +140,7 @@ class PairSweep:
     def _sweep_straight(self, rows: slice, trial: IntArray) -> PairIntegrals:
         """Integrate with the base rule on the test elements and the far series of the closed forms on the others."""
         p, test = self.panels, self.test[rows]
-        points, weights = gauss_legendre(self._n_points(self.base))
+        points, _ = gauss_legendre(self._n_points(self.base))
         n_terms = kernels.terms_needed(DENSE_DISTANCE)
         to_local, offset = p.to_local[trial], p.to_local[trial] * p.centre[trial]
         inner = []
@@ -150,17 +150,17 @@ class PairSweep:
             integrals = kernels.far_integrals(zeta, self.degrees.highest_integral, n_terms)
             log_product = kernels.far_log_product(zeta) if self.degrees.log else zeta.real
             inner.append(Inner.straight(self.degrees, integrals, log_product, zeta.imag))
-        return self._scaled(PairIntegrals.summed(self.degrees, points, weights, inner), test, trial)
+        return self._scaled(PairIntegrals.summed(self.degrees, inner), test, trial)
 
     def _sweep_curved(self, rows: slice, trial: IntArray) -> PairIntegrals:
         """Integrate with the base rule on both elements."""
         p, test = self.panels, self.test[rows]
         n_points = self._n_points(self.base)
-        points, weights = gauss_legendre(n_points)
+        points, _ = gauss_legendre(n_points)
         polynomials = p.polynomials(trial)
         zeta = [(p.point(test, xi)[:, None] - p.centre[trial]) * p.to_local[trial] for xi in points.tolist()]
         inner = [far_inner(self.degrees, polynomials, one, n_points) for one in zeta]
-        return self._scaled(PairIntegrals.summed(self.degrees, points, weights, inner), test, trial)
+        return self._scaled(PairIntegrals.summed(self.degrees, inner), test, trial)
 
     def _scaled(self, sums: PairIntegrals, test: IntArray, trial: IntArray) -> PairIntegrals:
         sums.scale(self.panels.half[test, None], self.panels.half[trial], self.panels.tangent[trial])

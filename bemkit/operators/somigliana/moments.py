@@ -248,9 +248,9 @@ class ArcQuadrature:
         self, x: ComplexArray, elements: IntArray, highest: int, integrands: Integrands
     ) -> list[ComplexArray]:
         """Integrate over elements that are well away from their points; all points share the places on an element."""
-        reference, weights = gauss_legendre(N_POINTS + highest // 2)
-        polynomials = weights * kernels.legendre_values(highest, reference)
-        y, slope = (values[elements] for values in self._rule(reference.size))
+        n_points = N_POINTS + highest // 2
+        polynomials = kernels.legendre_weights(highest + 1, n_points)
+        y, slope = (values[elements] for values in self._rule(n_points))
         speed = np.abs(slope)
         return [(value * speed @ polynomials.T).T for value in integrands(x[:, None] - y, slope / speed)]
 
