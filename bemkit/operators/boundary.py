@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.assembly import PairForm, Tag, assemble_block, assemble_together
+from bemkit.operators.assembly import assemble_block, assemble_together
 from bemkit.operators.forms import (
     DoubleLayerForm,
     HypersingularForm,
@@ -26,6 +26,7 @@ from bemkit.operators.forms import (
     mass_entries,
 )
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import PairForm, Tag
 
 Matrix: TypeAlias = "FloatArray | csr_array[np.float64]"
 

@@ -23,8 +23,8 @@ from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.reflection import antisymmetric_dofs
 from bemkit.geometry.spaces import BoundarySpace, local_coefficients
-from bemkit.operators.assembly import PairForm, Tag, TrialTerm, require_one_mesh
 from bemkit.operators.integrals.pairs import Degrees
+from bemkit.operators.pair_form import PairForm, Tag, TrialTerm, require_one_mesh
 
 
 def _derivative(coefficients: FloatArray) -> FloatArray:

@@ -16,7 +16,6 @@ from bemkit.geometry import BoundaryMesh, ExteriorOf, PlateWithHole, Polygon, Re
 from bemkit.geometry.neighbours import corner_nodes
 from bemkit.geometry.spaces import BoundarySpace, ConstantSpace, LinearSpace, QuadraticSpace
 from bemkit.operators import boundary
-from bemkit.operators.assembly import Tag
 from bemkit.operators.boundary import (
     BoundaryOperator,
     DoubleLayer,
@@ -29,6 +28,7 @@ from bemkit.operators.boundary import (
 )
 from bemkit.operators.forms import SingleLayerForm
 from bemkit.operators.material import Material, Plane
+from bemkit.operators.pair_form import Tag
 from bemkit.testing import CheckFailed, check_double_layer, check_operator
 from tests.slow import slow_only
 from tests.testing.test_spaces import public_classes

@@ -15,9 +15,9 @@ from scipy.sparse.linalg import LinearOperator
 from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace
-from bemkit.operators.assembly import Tag
 from bemkit.operators.linear.solvers import DenseCholesky, LinearSolverChoice
 from bemkit.operators.material import Material
+from bemkit.operators.pair_form import Tag
 from bemkit.operators.steklov_poincare.collocation import CollocationElasticity, MixedSystem
 from bemkit.operators.steklov_poincare.galerkin import GalerkinElasticity
 from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, TractionField, integrate_traction
