@@ -163,7 +163,7 @@ class Prepared:
     @cached_property
     def linear_solver(self) -> ChosenLinearSolver:
         """The linear solver that the map follows, and why it is taken."""
-        case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed)
+        case = BodyCase(self.space.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed)
         requested, discretisation = self.scene.linear_solver, self.scene.discretisation
         return linear_solver_of(requested, discretisation, case, self.space)
 
@@ -187,7 +187,7 @@ class Prepared:
             return False
         if not discretisation.keeps_rotations and turning(free_modes(self.space, self.conditions)).any():
             return True
-        return discretisation.may_be_negative(self.mesh)
+        return discretisation.may_be_negative(self.space.mesh)
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.
@@ -247,7 +247,8 @@ def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared,
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
     first = prepare(steps[0], mesh, units)
     later = tuple(first.under(step) for step in steps[1:])
-    first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
+    if later:
+        first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
     return (first, *later)
 
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.vectors import norms, turned_right
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
 SMOOTH_SIDE_RATIO = 0.07
@@ -171,9 +173,11 @@ def integrate_traction(space: BoundarySpace, elements: IntArray, field: Traction
     """
     points, weights = gauss_legendre(space.degree + 5)  # exact for tractions up to the ninth power of the coordinates
     places = space.mesh.points(elements, points)
-    normals = space.mesh.normals_at(elements, points)
+    outward = turned_right(space.mesh.derivatives(elements, points))
+    sizes = norms(outward)
+    normals = outward / sizes[..., None]
     values = field(places.reshape(-1, 2), normals.reshape(-1, 2)).reshape(places.shape)
-    measure = space.mesh.jacobian(elements, points) * weights
+    measure = sizes * weights
     local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
     return summed_at_dofs(space, local, elements)
 
@@ -294,6 +298,7 @@ def _check_agreement(
         )
 
 
+@lru_cache(maxsize=4)  # the plan of a body and its condensation ask for them
 def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
 
@@ -304,7 +309,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
 
     Returns
     -------
-    (n_motions, n_nodes, 2) array
+    (n_motions, n_nodes, 2) array, read-only
         Linearly independent, of sizes about one; combinations of the `admissible_modes` and of those driven.
     """
     points = dof_points(space)
@@ -316,7 +321,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
         n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
-    return motions.transpose(2, 0, 1)
+    return read_only(motions.transpose(2, 0, 1))
 
 
 def turning(motions: FloatArray) -> BoolArray:
