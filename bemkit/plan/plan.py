@@ -104,7 +104,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_contact=n_contact,
         n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
         n_motions=len(admissible_modes(mesh)),
-        n_free_motions=len(prepared.free_motions),
+        n_free_motions=len(prepared.free_modes),
     )
 
 

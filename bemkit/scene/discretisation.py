@@ -275,11 +275,10 @@ def _galerkin_displacements(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundaryS
 
 @lru_cache(maxsize=4)
 def _galerkin_tractions(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace:
-    degree, degrees = galerkin.largest_degree, galerkin.degrees_on(mesh)
-    if degree == 1:
+    if galerkin.largest_degree == 1:
         return ConstantSpace(mesh)
-    lower = None if degrees is None else np.maximum(degrees - 1, 1)
-    return LagrangeSpace(mesh, break_nodes(mesh), degree=degree - 1, element_degrees=lower)
+    lower = None if (degrees := galerkin.degrees_on(mesh)) is None else np.maximum(degrees - 1, 1)
+    return LagrangeSpace(mesh, break_nodes(mesh), degree=galerkin.largest_degree - 1, element_degrees=lower)
 
 
 @dataclass(frozen=True)

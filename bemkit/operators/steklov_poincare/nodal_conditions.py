@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only
+from bemkit.arrays import BoolArray, FloatArray, IntArray
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
@@ -298,7 +297,6 @@ def _check_agreement(
         )
 
 
-@lru_cache(maxsize=4)  # the plan of a body and its condensation ask for them
 def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
     """Return the rigid motions (n_motions, n_nodes, 2) of the nodes of a space that no support resists.
 
@@ -309,7 +307,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
 
     Returns
     -------
-    (n_motions, n_nodes, 2) array, read-only
+    (n_motions, n_nodes, 2) array
         Linearly independent, of sizes about one; combinations of the `admissible_modes` and of those driven.
     """
     points = dof_points(space)
@@ -321,7 +319,7 @@ def free_modes(space: BoundarySpace, conditions: NodalConditions) -> FloatArray:
         _, sizes, directions = np.linalg.svd(np.linalg.qr(fixed, mode="r"), full_matrices=True)
         n_held = int(np.count_nonzero(sizes >= FREE_MOTION_TOLERANCE * np.sqrt(len(fixed))))
         motions = motions @ directions[n_held:].T
-    return read_only(motions.transpose(2, 0, 1))
+    return motions.transpose(2, 0, 1)
 
 
 def turning(motions: FloatArray) -> BoolArray:
