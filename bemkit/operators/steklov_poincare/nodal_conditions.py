@@ -275,8 +275,7 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
     """Return the projector (n_nodes, 2, 2) on the directions that one support fixes at each node."""
     outer = np.einsum("...ki,...kj->...ij", support.directions, support.directions)
     matrix = np.zeros((space.n_dofs // 2, 2, 2))
-    for local, dofs in enumerate(space.element_dofs[support.elements].T):
-        np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
+    np.add.at(matrix, space.element_dofs[support.elements], outer if outer.ndim == 4 else outer[:, None])
     size, vectors = np.linalg.eigh(matrix)
     keep = np.where(size > SMOOTH_SIDE_RATIO * size[:, 1:], 1.0, 0.0)
     projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
