@@ -353,4 +353,4 @@ def augmented(
 
 
 def _unit_blocks(n_contact: int) -> FloatArray:
-    return np.broadcast_to(np.eye(2), (n_contact, 2, 2))
+    return np.full((n_contact, 2, 2), np.eye(2))

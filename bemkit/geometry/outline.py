@@ -220,7 +220,7 @@ def evaluate_predicate(where: Predicate, points: FloatArray) -> BoolArray:
             f"Selection: where returned an array of {answer.dtype} of shape {answer.shape} for {len(points)} points: "
             f"return booleans of shape ({len(points)},), as in `x < 0.5`"
         )
-    return np.broadcast_to(answer, (len(points),))
+    return np.full(len(points), answer)
 
 
 def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
