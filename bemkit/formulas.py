@@ -125,7 +125,7 @@ class Expression:
         """
         x_all, y_all = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
         with np.errstate(all="ignore"):  # values that are not finite are reported below, with the point
-            values = np.array(np.broadcast_to(self._compiled.value(x_all, y_all), x_all.shape))
+            values = np.full(x_all.shape, self._compiled.value(x_all, y_all))
         if not np.isfinite(values).all():
             remedy = "guard it with where(condition, a, b) or change the formula"
             raise _not_finite(values, x_all, y_all, f"expression {shorten(self.text)}", remedy)
@@ -157,7 +157,7 @@ def evaluate_field(value: ScalarField, points: FloatArray) -> FloatArray:
     values = np.asarray(value(x, y) if callable(value) else value, dtype=float)
     if values.shape not in ((), x.shape):
         raise ExpressionError(f"{value!r} returns the shape {values.shape} for {x.size} points: return one value each")
-    result = np.array(np.broadcast_to(values, x.shape))
+    result = np.full(x.shape, values)
     if not np.isfinite(result).all():
         raise _not_finite(result, x, y, repr(value), "it must be finite on the part")
     return result

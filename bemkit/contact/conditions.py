@@ -53,6 +53,11 @@ def largest_components(motions: RigidMotions) -> FloatArray:
     return np.asarray(abs(rows).max(axis=1).toarray(), dtype=float).ravel()
 
 
+def orthonormal(motions: FloatArray) -> FloatArray:
+    """Return orthonormal motions (n_motions, n_contact, 2) that span the same as independent ones."""
+    return np.asarray(np.linalg.qr(motions.reshape(len(motions), 2 * motions.shape[1]).T)[0]).T.reshape(motions.shape)
+
+
 def null_space(matrix: csr_array) -> csr_array:
     """Return an orthonormal basis of the vectors that a sparse matrix takes to zero.
 
@@ -214,12 +219,20 @@ class LinearConditions:
             return motions
         if not isinstance(motions, np.ndarray):
             return self._sparse_free_motions(motions)
-        basis = np.linalg.qr(motions.reshape(len(motions), -1).T)[0].T.reshape(-1, self.n_contact, 2)
+        basis = orthonormal(motions)
+        return np.tensordot(self._unfelt(basis), basis, axes=1)
+
+    def hold(self, basis: FloatArray) -> bool:
+        """Whether every combination of orthonormal motions (n_motions, n_contact, 2) changes some condition."""
+        return not len(basis) or not len(self._unfelt(basis))
+
+    def _unfelt(self, basis: FloatArray) -> FloatArray:
+        """Return the combinations (n_free, n_motions) of orthonormal motions that change no condition."""
         size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
         rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
         felt = np.einsum("nrc,mnc->nrm", rows, basis).reshape(-1, len(basis))
         _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
-        return np.tensordot(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :], basis, axes=1)
+        return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
 
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse
@@ -340,4 +353,4 @@ def augmented(
 
 
 def _unit_blocks(n_contact: int) -> FloatArray:
-    return np.broadcast_to(np.eye(2), (n_contact, 2, 2))
+    return np.full((n_contact, 2, 2), np.eye(2))

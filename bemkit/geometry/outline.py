@@ -220,7 +220,7 @@ def evaluate_predicate(where: Predicate, points: FloatArray) -> BoolArray:
             f"Selection: where returned an array of {answer.dtype} of shape {answer.shape} for {len(points)} points: "
             f"return booleans of shape ({len(points)},), as in `x < 0.5`"
         )
-    return np.broadcast_to(answer, (len(points),))
+    return np.full(len(points), answer)
 
 
 def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
@@ -254,6 +254,8 @@ def breakpoints(curve: Curve, where: Predicate) -> FloatArray:
 
 def merge_breakpoints(s: FloatArray) -> FloatArray:
     """Sort parameters, drop those at the ends, and let those that differ by round-off be one."""
+    if not s.size:
+        return s
     # to 15 decimals, so that x <= 1/2 and x < 1/2 both break at 1/2
     s = np.sort(np.round(s, 15))
     s = s[(s > _END_TOLERANCE) & (s < 1.0 - _END_TOLERANCE)]

@@ -28,6 +28,8 @@ _MOST_SPLITS = 24  # the tip of a thin ellipse turns on as little of its length 
 RESOLUTION = 8 * float(np.finfo(float).eps)
 """Points closer than this times the size of their coordinates are the same point: they differ by round-off only."""
 _BATCH = 4096
+_FEW_BOXES = 64
+"""So many boxes are compared each with each."""
 _MOST_HALVED = 1_000_000  # more pairs than this mean two curves that all but coincide
 
 
@@ -321,7 +323,7 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntA
         Indices of the pairs, first < second.
     """
     levels = [(low, high)]
-    while len(low) > 1:
+    while len(low) > _FEW_BOXES:
         if len(low) % 2:  # pad with an empty box, which overlaps nothing
             low = np.vstack([low, np.full((1, 2), np.inf)])
             high = np.vstack([high, np.full((1, 2), -np.inf)])
@@ -329,11 +331,14 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntA
         low = low.reshape(-1, 2, 2).min(axis=1)
         high = high.reshape(-1, 2, 2).max(axis=1)
         levels.append((low, high))
-    first = second = np.zeros(1, dtype=np.intp)
-    for low, high in reversed(levels[:-1]):
-        first = (2 * first + np.array([[0], [0], [1], [1]])).ravel()
-        second = (2 * second + np.array([[0], [1], [0], [1]])).ravel()
+    first, second = np.triu_indices(len(low))
+    while True:
+        low, high = levels.pop()
         meets = (first <= second) & (low[first] <= high[second]).all(axis=1) & (low[second] <= high[first]).all(axis=1)
         first, second = first[meets], second[meets]
+        if not levels:
+            break
+        first = (2 * first + np.array([[0], [0], [1], [1]])).ravel()
+        second = (2 * second + np.array([[0], [1], [0], [1]])).ravel()
     is_pair = first < second
     return first[is_pair], second[is_pair]

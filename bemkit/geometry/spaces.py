@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -56,15 +57,26 @@ def local_coefficients(space: BoundarySpace) -> FloatArray:
 
     Returns
     -------
-    (n_local, degree + 1) array
+    (n_local, degree + 1) array, read-only
         Row p holds the coefficients of P_0 ... P_degree of the local basis function p.
     """
-    n = space.degree + 1
+    if isinstance(space, LagrangeSpace | _OneDegree):
+        return _lagrange_coefficients(space.degree)
+    return _coefficients(space.basis, space.degree)
+
+
+def _coefficients(basis: Callable[[FloatArray], FloatArray], degree: int) -> FloatArray:
+    n = degree + 1
     xi, weights = gauss_legendre(n)
-    polynomials = np.polynomial.legendre.legvander(xi, space.degree)
-    coefficients: FloatArray = (space.basis(xi) * weights) @ polynomials * (np.arange(n) + 0.5)
+    polynomials = np.polynomial.legendre.legvander(xi, degree)
+    coefficients: FloatArray = (basis(xi) * weights) @ polynomials * (np.arange(n) + 0.5)
     coefficients[np.abs(coefficients) < 1e-14] = 0.0  # round-off; keeps sums free of empty terms
     return coefficients
+
+
+@lru_cache(maxsize=16)
+def _lagrange_coefficients(degree: int) -> FloatArray:
+    return read_only(_coefficients(partial(lagrange_polynomials, gauss_lobatto(degree)), degree))
 
 
 def dof_points(space: BoundarySpace, mesh: BoundaryMesh | None = None) -> FloatArray:

@@ -290,7 +290,7 @@ def contact_body(elastic: SteklovPoincare, prepared: Prepared) -> ContactBody:
             weightless = elastic.weightless if isinstance(elastic, HeavyElasticity) else elastic
             assert isinstance(weightless, HierarchicalMap)
             return hierarchical_body(weightless, *given, prepared.inside)
-        return condensed_body(elastic, *given)
+        return condensed_body(elastic, *given, prepared.free_modes)
     from bemkit.model.free_motion import check_held
     from bemkit.model.untouched_body import UntouchedBody
 

@@ -12,7 +12,6 @@ from bemkit.geometry.spaces import dof_points
 from bemkit.model.prepared import Prepared
 from bemkit.model.units import Units
 from bemkit.operators.rigid_modes import rigid_motions
-from bemkit.operators.steklov_poincare.nodal_conditions import free_modes
 from bemkit.scene.unit_names import amount
 
 _DIRECTIONS = (
@@ -43,7 +42,7 @@ def check_held(prepared: Prepared) -> None:
     FreeBodyError
         Naming the modes.
     """
-    modes = free_modes(prepared.space, prepared.conditions)
+    modes = prepared.free_modes
     if not len(modes):
         return
     points = dof_points(prepared.space)

@@ -14,7 +14,7 @@ from itertools import zip_longest
 import numpy as np
 
 from bemkit.arrays import FloatArray
-from bemkit.contact.condensation.nodes import contact_conditions, free_motions
+from bemkit.contact.condensation.nodes import contact_conditions
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import BoundarySpace, element_nodes
@@ -156,14 +156,16 @@ class Prepared:
         return given_data(self.conditions, self.force, self.inside)
 
     @cached_property
-    def free_motions(self) -> FloatArray:
-        """(n_motions, n_contact, 2) array: rigid body modes that no support resists, in (n, t) components."""
-        return free_motions(self.conditions, self.contact.nodes, self.space)
+    def free_modes(self) -> FloatArray:
+        """(n_motions, n_nodes, 2) array: rigid body modes that no support resists."""
+        return free_modes(self.space, self.conditions)
 
     @cached_property
     def linear_solver(self) -> ChosenLinearSolver:
         """The linear solver that the map follows, and why it is taken."""
-        case = BodyCase(self.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed)
+        case = BodyCase(
+            self.space.mesh, self.material, self.conditions, (self.map_data,), is_condensed=self.is_condensed
+        )
         requested, discretisation = self.scene.linear_solver, self.scene.discretisation
         return linear_solver_of(requested, discretisation, case, self.space)
 
@@ -185,9 +187,9 @@ class Prepared:
         discretisation = self.scene.discretisation
         if discretisation.is_symmetric:
             return False
-        if not discretisation.keeps_rotations and turning(free_modes(self.space, self.conditions)).any():
+        if not discretisation.keeps_rotations and turning(self.free_modes).any():
             return True
-        return discretisation.may_be_negative(self.mesh)
+        return discretisation.may_be_negative(self.space.mesh)
 
     def under(self, scene: Scene) -> Prepared:
         """Return the same body under the loads, obstacles and law of another scene, in the same units.
@@ -247,7 +249,8 @@ def prepare_steps(steps: Sequence[Scene], mesh: BoundaryMesh) -> tuple[Prepared,
     units = max((find_units(step, mesh) for step in steps), key=lambda units: units.stress)
     first = prepare(steps[0], mesh, units)
     later = tuple(first.under(step) for step in steps[1:])
-    first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
+    if later:
+        first = replace(first, conditions=replace(first.conditions, later=tuple(each.map_data for each in later)))
     return (first, *later)
 
 

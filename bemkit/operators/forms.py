@@ -14,6 +14,7 @@ so that all of them are combinations of the scalar integrals of `integrals`. The
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -145,8 +146,22 @@ def _require_continuous(space: BoundarySpace, operator: str, role: str) -> None:
         raise GeometryError(msg)
 
 
-def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the entries of the identity <u, q> with their rows and columns, (n,) each; entries at one place add up."""
+class MassEntries(NamedTuple):
+    """The entries of the identity <u, q> with their rows and columns, (n,) each; entries at one place add up."""
+
+    values: FloatArray
+    rows: IntArray
+    columns: IntArray
+
+    def times(self, functions: FloatArray, n_test: int) -> FloatArray:
+        """Return <u, q> for all test functions q: (n_test, m), u in the columns of (n_trial, m)."""
+        result = np.zeros((n_test, functions.shape[1]))
+        np.add.at(result, self.rows, self.values[:, None] * functions[self.columns])
+        return result
+
+
+def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> MassEntries:
+    """Return the entries of the identity <u, q>."""
     require_one_mesh(trial, test)
     found = []
     for elements, (own_test, own_trial) in of_one_degree([test, trial], np.arange(test.mesh.n_elements)):
@@ -158,13 +173,9 @@ def mass_entries(trial: BoundarySpace, test: BoundarySpace) -> tuple[FloatArray,
         columns = 2 * own_trial.element_dofs[elements][:, None, :, None] + component + np.zeros_like(values, np.intp)
         values[antisymmetric_dofs(test)[rows] | antisymmetric_dofs(trial)[columns]] = 0.0
         found.append((values.ravel(), rows.ravel(), columns.ravel()))
-    values, rows, columns = (np.concatenate(each) for each in zip(*found, strict=True))
-    return values, rows, columns
+    return MassEntries(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
 def mass_product(trial: BoundarySpace, test: BoundarySpace, functions: FloatArray) -> FloatArray:
     """Return <u, q> for all test functions q: (test.n_dofs, m), u in the columns of (trial.n_dofs, m)."""
-    values, rows, columns = mass_entries(trial, test)
-    result = np.zeros((test.n_dofs, functions.shape[1]))
-    np.add.at(result, rows, values[:, None] * functions[columns])
-    return result
+    return mass_entries(trial, test).times(functions, test.n_dofs)

@@ -88,7 +88,7 @@ class Sizes:
 def find_sizes(prepared: Prepared) -> Sizes:
     """Count the elements and unknowns of a prepared scene."""
     mesh, conditions, nodes = prepared.mesh, prepared.conditions, prepared.contact.nodes
-    n_contact, tractions = nodes.nodes.size, prepared.scene.discretisation.traction_space(mesh)
+    n_contact, tractions = nodes.nodes.size, prepared.scene.discretisation.traction_space(prepared.space.mesh)
     return Sizes(
         n_elements=mesh.n_elements,
         n_curved=int(np.count_nonzero(~mesh.is_straight)),
@@ -104,7 +104,7 @@ def find_sizes(prepared: Prepared) -> Sizes:
         n_contact=n_contact,
         n_contact_unknowns=2 * n_contact - int(np.count_nonzero(find_tangents(conditions, nodes))),
         n_motions=len(admissible_modes(mesh)),
-        n_free_motions=len(prepared.free_motions),
+        n_free_motions=len(prepared.free_modes),
     )
 
 
@@ -280,7 +280,7 @@ def plan_steps(steps: Sequence[Prepared], proposal: Symmetry | None = None) -> P
     first = steps[0]
     sizes = find_sizes(first)
     loads = tuple(step.map_data for step in steps)
-    case = BodyCase(first.mesh, first.material, first.conditions, loads, first.linear_solver, first.is_condensed)
+    case = BodyCase(first.space.mesh, first.material, first.conditions, loads, first.linear_solver, first.is_condensed)
     needs = first.scene.discretisation.needs(case)
     return Plan(
         linear_solver=first.linear_solver.solver,

@@ -17,6 +17,7 @@ from numpy.polynomial import legendre
 from bemkit.arrays import FloatArray, IntArray
 from bemkit.geometry.local_values import element_degrees, values_on_elements
 from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points, local_coefficients
 from bemkit.operators.rigid_modes import without_motion
 
@@ -115,7 +116,7 @@ def coefficient_errors(
 def _slope_coefficients(space: BoundarySpace, displacement: FloatArray) -> FloatArray:
     """Return the Legendre coefficients (n_elements, p, 2) of du/ds."""
     mesh: BoundaryMesh = space.mesh
-    xi, weights = legendre.leggauss(space.degree + _MORE_POINTS)
+    xi, weights = gauss_legendre(space.degree + _MORE_POINTS)
     polynomials = legendre.legvander(xi, space.degree - 1)
     derivatives = polynomials @ legendre.legder(local_coefficients(space).T)  # (n_points, n_local)
     slopes = np.einsum("ql,elc->eqc", derivatives, displacement)

@@ -119,13 +119,13 @@ class SolvedBody:
     def coefficient_errors(self) -> CoefficientErrors | None:
         """Estimated errors of each element of degree 3 and more; None of other elements."""
         discretisation, mesh = self.scene.discretisation, self.mesh
-        space, tractions = discretisation.displacement_space(mesh), discretisation.traction_space(mesh)
+        space = discretisation.displacement_space(mesh)
         if not discretisation.estimates_error or space.degree <= 2:
             return None
         from bemkit.results.coefficient_decay import coefficient_errors
 
         at_nodes = self.map_boundary.traction_dofs.reshape(mesh.n_elements, -1, 2)
-        modulus = self.scene.material.plane_modulus
+        modulus, tractions = self.scene.material.plane_modulus, discretisation.traction_space(mesh)
         return coefficient_errors(space, tractions, self.map_boundary.displacement, at_nodes, modulus)
 
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,6 +21,7 @@ from bemkit.results.between_nodes import BetweenNodes
 from bemkit.results.contact_table import ContactTable, Transition
 from bemkit.results.load_history import LoadHistory, step_rows
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.when_asked import WhenAsked
 from bemkit.scene.unit_names import UnitNames
 from bemkit.solvers.base import Status, StepRecord
 
@@ -70,7 +71,7 @@ class SolvedProblem(ShownInNotebooks):
     work: OperationCounts
     message: str = ""
     memory: Mapping[str, int] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: WhenAsked[tuple[str, ...]] = WhenAsked(())  # noqa: RUF009 - a descriptor, shared by all on purpose
     loading: LoadHistory | None = None
 
     if TYPE_CHECKING:  # a field of the one kind, a property of the other
@@ -198,8 +199,11 @@ class SolvedProblem(ShownInNotebooks):
         """The same of each contact, by the name in the contact table."""
         return self._measured_between(None if self.loading is None else self.loading.motion)
 
-    def with_warnings(self, warnings: tuple[str, ...]) -> Self:
-        """Return the same solution with other warnings, and with all that has been estimated of it."""
+    def with_warnings(self, warnings: tuple[str, ...] | Callable[[Any], tuple[str, ...]]) -> Self:
+        """Return the same solution with other warnings, and with all that has been estimated of it.
+
+        If a function of the solution is given, it is called when somebody asks for the warnings.
+        """
         result = copy(self)
         object.__setattr__(result, "warnings", warnings)
         return result

@@ -170,7 +170,7 @@ def assembly_solution(
         message=result.message,
         rigid=rigid,
     )
-    return solution.with_warnings(find_warnings(solution))
+    return solution.with_warnings(find_warnings)
 
 
 def _at_rest(model: AssembledModel, result: ContactSolution, furthest: float) -> IntArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -108,7 +109,7 @@ def solution_of(
     displacement, traction_dofs, energy = model.boundary_fields(state)
     table = _contact_table(model, state, node_status, displacement)
     transitions = find_transitions(table, table.u_t - model.problem.slip_origin * model.units.displacement)
-    warnings = contact_warnings(model, displacement, node_status) if result.is_converged else ()
+    of_contact = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
     means = mean_tractions(model.elastic.traction_space, traction_dofs)
     fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2))
@@ -137,7 +138,12 @@ def solution_of(
         work=model.work,
         message=result.message,
     )
-    return solution.with_warnings((*find_warnings(solution), *warnings))
+    return solution.with_warnings(partial(_doubts, of_contact))
+
+
+def _doubts(of_contact: tuple[str, ...], solution: Solution) -> tuple[str, ...]:
+    """Return what is doubtful about a solution, last what is about its contact."""
+    return (*find_warnings(solution), *of_contact)
 
 
 def _contact_table(

@@ -127,9 +127,14 @@ def refined(
 def _best_last(
     solutions: Sequence[AnySolution], obstacle: str, accuracy: float, refinement: Refinement[AnyLevel, AnySolution]
 ) -> tuple[AnySolution, ...]:
-    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for."""
-    converged = (solution for solution in solutions if solution.is_converged)
-    best = min(converged, key=refinement.error, default=solutions[-1])
+    """Put the best solution last, with the totals of all and the reason why its accuracy is not what was asked for.
+
+    The last one is the best if it is accurate enough.
+    """
+    best = solutions[-1]
+    if obstacle:
+        converged = (solution for solution in solutions if solution.is_converged)
+        best = min(converged, key=refinement.error, default=best)
     message = f"{len(solutions)} meshes, the last with {best.n_elements} elements. {best.message}"
     status = best.status
     if obstacle:

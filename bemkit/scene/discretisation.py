@@ -234,11 +234,11 @@ class Galerkin(SymmetricGalerkin):
 
         On the surface of a half-plane tractions alone are unknown functions, and displacements their means on elements.
         """
-        return _galerkin_spaces(self, mesh)[0] if mesh.surface is None else ConstantSpace(mesh)
+        return _galerkin_displacements(self, mesh) if mesh.surface is None else ConstantSpace(mesh)
 
     def traction_space(self, mesh: BoundaryMesh) -> BoundarySpace:
         """Return the functions of a degree less that may jump at corners and at ends of parts, or the constants."""
-        return _galerkin_spaces(self, mesh)[1]
+        return _galerkin_tractions(self, mesh)
 
     def why_dense(self, mesh: BoundaryMesh) -> str:
         """Say what stands in the way: a half-plane, or another degree than 1 or 2 on all elements."""
@@ -268,15 +268,17 @@ class Galerkin(SymmetricGalerkin):
         return None if (degrees == degrees[0]).all() else degrees
 
 
+@lru_cache(maxsize=4)  # few spaces, so that what they know is found out once
+def _galerkin_displacements(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace:
+    return LagrangeSpace(mesh, degree=galerkin.largest_degree, element_degrees=galerkin.degrees_on(mesh))
+
+
 @lru_cache(maxsize=4)
-def _galerkin_spaces(galerkin: Galerkin, mesh: BoundaryMesh) -> tuple[BoundarySpace, BoundarySpace]:
-    """Return the spaces of displacements and tractions: few, so that what they know is found out once."""
-    degree, degrees = galerkin.largest_degree, galerkin.degrees_on(mesh)
-    displacements = LagrangeSpace(mesh, degree=degree, element_degrees=degrees)
-    if degree == 1:
-        return displacements, ConstantSpace(mesh)
-    lower = None if degrees is None else np.maximum(degrees - 1, 1)
-    return displacements, LagrangeSpace(mesh, break_nodes(mesh), degree=degree - 1, element_degrees=lower)
+def _galerkin_tractions(galerkin: Galerkin, mesh: BoundaryMesh) -> BoundarySpace:
+    if galerkin.largest_degree == 1:
+        return ConstantSpace(mesh)
+    lower = None if (degrees := galerkin.degrees_on(mesh)) is None else np.maximum(degrees - 1, 1)
+    return LagrangeSpace(mesh, break_nodes(mesh), degree=galerkin.largest_degree - 1, element_degrees=lower)
 
 
 @dataclass(frozen=True)

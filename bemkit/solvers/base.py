@@ -12,7 +12,7 @@ from bemkit.arrays import IntArray
 from bemkit.contact.problem import Certificate, ContactProblem, ContactState, SingularResponse, certify
 from bemkit.contact.solvability import find_long_travel, find_unsolvable_load, needs_contact
 from bemkit.errors import InputError, NoResultError
-from bemkit.solvers.active_sets import ActiveSets, NodeStatus, ProjectionEquations, contact_sets
+from bemkit.solvers.active_sets import ActiveSets, NodeStatus, contact_sets
 from bemkit.solvers.newton import FloatingResponse, consistent_state, untouched_response, with_least_slip
 
 
@@ -297,8 +297,7 @@ class _Run:
 
     def _with_least_slip(self, iterate: Iterate, sets: ActiveSets) -> Iterate:
         """Choose among the positions that contact leaves open, unless another contact forbids it."""
-        rho = self.problem.body.stiffness_scale
-        state = with_least_slip(ProjectionEquations(self.problem, rho, rho), iterate.state, sets)
+        state = with_least_slip(self.problem, iterate.state, sets)
         if state is iterate.state or not certify(self.problem, state).is_below(self.tolerance):
             return iterate
         return replace(iterate, state=state)

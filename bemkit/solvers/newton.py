@@ -5,7 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray
-from bemkit.contact.conditions import LinearConditions, RigidMotions, as_dense, as_rows, separated, stick
+from bemkit.contact.conditions import (
+    LinearConditions,
+    RigidMotions,
+    as_dense,
+    as_rows,
+    of_statuses,
+    separated,
+    stick,
+)
 from bemkit.contact.problem import (
     DEFORMED,
     ContactProblem,
@@ -232,24 +240,25 @@ def floating_response(body: LinearBody, conditions: LinearConditions) -> Floatin
     return FloatingResponse(state, free) if body.imbalance(state).is_below(negligible(body)) else None
 
 
-def with_least_slip(equations: ProjectionEquations, state: ContactState, sets: ActiveSets) -> ContactState:
+def with_least_slip(problem: ContactProblem, state: ContactState, sets: ActiveSets) -> ContactState:
     """Return a state moved along the rigid motions that its sets leave free, so that contact nodes slip least.
 
     Nothing says how far a disc turns in a hole without friction; responses leave it where round-off has put it.
 
     Parameters
     ----------
-    equations : ProjectionEquations
+    problem : ContactProblem
     state : ContactState
-        That obeys them.
+        That obeys it.
     sets : ActiveSets
-        Its own.
+        Its own; see `contact_sets`.
     """
-    problem = equations.problem
     motions = problem.body.rigid_motions()
     if not motions.shape[0]:
         return state
-    free = as_rows(equations.linearised(equations.evaluate(state), sets).free_motions(motions))
+    held, given = stick(problem.gap, problem.slip_origin), separated(problem.n_contact)
+    conditions = of_statuses(sets.is_closed, sets.direction != 0, held, given)
+    free = as_rows(conditions.free_motions(motions))
     if not free.shape[0]:
         return state
     along, weights = free[:, 1::2], problem.body.weights

@@ -17,6 +17,7 @@ from bemkit.runs.adaptive import _SceneRefinement, run_adaptive
 from bemkit.runs.density import DensityMeshes
 from bemkit.runs.earlier_steps import EarlierSteps
 from bemkit.runs.mesh_sequence import Level
+from bemkit.runs.refinement import _best_last
 from tests.scenes import contact_error, disc, paper, reference_values, square, wavy
 from tests.slow import slow_except
 
@@ -103,6 +104,19 @@ def test_a_stick_zone_of_one_node_is_resolved() -> None:
     expected = [*places, *(1.0 - place for place in reversed(places))]
     # an element at the transition has up to 3 % of the contact side
     np.testing.assert_allclose([found.x for found in last.transitions], expected, rtol=0.0, atol=1e-3)
+
+
+def test_a_mesh_that_is_accurate_enough_is_the_best_one() -> None:
+    """Whatever the first look, whose zones end inside of elements, says of its own error."""
+    coarse, fine = adapted(1, "quadratic", 1e-2)
+
+    class Refinement(_SceneRefinement):
+        def error(self, solution: bk.Solution) -> float:
+            return 1e-3 if solution is coarse else 5e-3
+
+    refinement = Refinement(DensityMeshes(accuracy=1e-2), None, EarlierSteps())
+    assert _best_last((coarse, fine), "", 1e-2, refinement)[-1].n_elements == fine.n_elements
+    assert _best_last((coarse, fine), "an obstacle", 1e-2, refinement)[-1].n_elements == coarse.n_elements
 
 
 def test_run_takes_the_accuracy_of_the_scene() -> None:

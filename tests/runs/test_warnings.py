@@ -27,6 +27,7 @@ from bemkit.results.solution import Solution
 from bemkit.results.solved_problem import unlike
 from bemkit.results.tables import to_json
 from bemkit.results.warnings import FEWEST_NODES, find_warnings
+from bemkit.runs.adaptive import run_adaptive
 from bemkit.runs.history import run_history
 from bemkit.runs.run import run
 from bemkit.scene.conditions import Clamped, Contact, Part, PrescribedDisplacement, Traction
@@ -36,6 +37,7 @@ from bemkit.scene.scene import Scene
 from bemkit.scene.toml import load_scene, with_overrides
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import Status
+from tests.scenes import paper
 
 WORDS = ("The first doubt: do this.", "The second, with \N{GREEK SMALL LETTER NU} = 0.5.")
 
@@ -45,6 +47,20 @@ def solution() -> Solution:
     found = run(with_overrides(load_scene("paper-1"), elements=40, discretisation="linear"))
     plan = dataclasses.replace(found.plan, warnings=WORDS[:1])
     return dataclasses.replace(found, plan=plan, warnings=WORDS)
+
+
+def test_doubts_about_meshes_on_the_way_are_found_when_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def counted(solution: Solution) -> tuple[str, ...]:
+        asked.append(solution.n_elements)
+        return find_warnings(solution)
+
+    monkeypatch.setattr("bemkit.runs.history.find_warnings", counted)
+    first, last = run_adaptive(paper(1, bk.HpGalerkin(), MeshOptions(accuracy=2e-3)))
+    assert asked == [last.n_elements]
+    assert first.warnings == find_warnings(first)
+    assert asked == [last.n_elements, first.n_elements]
 
 
 LARGE = "far outside small displacements, where results are proportional to loads but not true: check the units"

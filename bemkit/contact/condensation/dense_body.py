@@ -8,7 +8,7 @@ import numpy as np
 
 from bemkit.arrays import BoolArray, FloatArray, IntArray, read_only, spread_fractions
 from bemkit.contact.body import ContactState, LinearBody, SingularResponse
-from bemkit.contact.conditions import LinearConditions
+from bemkit.contact.conditions import LinearConditions, orthonormal
 from bemkit.errors import InputError
 from bemkit.operators.equilibrium import Imbalance, Unbalanced
 
@@ -213,6 +213,11 @@ class DenseBody(LinearBody):
         return self.rigid_motions().reshape(-1, 2 * self.n_contact)[:, self.unknown_dofs]
 
     @cached_property
+    def _rigid_basis(self) -> FloatArray:
+        """(n_motions, n_contact, 2) array: orthonormal rigid motions."""
+        return orthonormal(self.rigid_motions())
+
+    @cached_property
     def _orthonormal_motions(self) -> FloatArray:
         """(n_unknowns, n_motions) array."""
         return np.asarray(np.linalg.qr(self.motions_of_unknowns.T)[0])
@@ -247,7 +252,7 @@ class DenseBody(LinearBody):
         is_given : (n_unknowns,) bool array
         """
         # before any matrix, whose rows may hold nothing but what round-off leaves of rigid motions
-        if len(conditions.free_motions(self.rigid_motions())):
+        if not conditions.hold(self._rigid_basis):
             raise SingularResponse("the contact conditions leave a rigid motion free")
         wanted = np.flatnonzero(~is_given)
         node, component = np.divmod(self.unknown_dofs[wanted], 2)

@@ -324,7 +324,11 @@ class CondensedBody(DenseBody):
 
 
 def condensed_body(
-    elastic: SteklovPoincare, conditions: NodalConditions, contact: ContactNodes, force: FloatArray
+    elastic: SteklovPoincare,
+    conditions: NodalConditions,
+    contact: ContactNodes,
+    force: FloatArray,
+    modes: FloatArray | None = None,
 ) -> CondensedBody:
     """Reduce a body to its contact boundary.
 
@@ -336,6 +340,8 @@ def condensed_body(
         Both as `contact_conditions` has found them.
     force : (n_nodes, 2) array [N/m]
         Given nodal forces.
+    modes : (n_motions, n_nodes, 2) array, optional
+        The `free_modes` of the conditions, where they are known.
 
     Raises
     ------
@@ -349,7 +355,8 @@ def condensed_body(
         raise NoContactNodesError(
             "supports fix every node of the contact boundary: use more elements, or restrict the supports"
         )
-    unknowns, modes = Unknowns.of(conditions, contact), free_modes(space, conditions)
+    unknowns = Unknowns.of(conditions, contact)
+    modes = free_modes(space, conditions) if modes is None else modes
     body = CondensedBody(
         stiffness=unknowns.stiffness(condensed),
         load=unknowns.load(condensed),

@@ -224,8 +224,8 @@ def _balanced(base: Division, division: Division, fractions: Sequence[FloatArray
             if after < 0:
                 continue
             end, start = parameters[k], parameters[after]
-            length = norms(np.diff(curves[k].point(end[-2:]), axis=0))[0]
-            other = norms(np.diff(curves[after].point(start[:2]), axis=0))[0]
+            length = norms(np.subtract(*curves[k].point(end[-2:])))
+            other = norms(np.subtract(*curves[after].point(start[:2])))
             if length > STEEPEST * other:
                 parameters[k], is_done = np.insert(end, -1, end[-1] + FACTOR * (end[-2] - end[-1])), False
             elif other > STEEPEST * length:

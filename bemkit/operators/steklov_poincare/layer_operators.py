@@ -82,14 +82,14 @@ def assemble_layers(
         hypersingular=Entries.full(u.n_dofs, u.n_dofs),
     )
     is_compressible = not (material.is_incompressible or mesh.is_exterior)
-    annihilated = mass_product(t, t, pressures[:, : 0 if is_compressible else None])
+    annihilated = np.zeros((t.n_dofs, 0)) if is_compressible else mass_product(t, t, pressures)
     kernel = np.column_stack([annihilated, _unit_vectors(antisymmetric_dofs(t))])
     factor = Cholesky(_without_kernel(v, kernel), "the single layer operator", overwrite=True)
     del v  # matrices are dropped as soon as they are used: there is room for few of them at once
     motions = traction_free_modes(mesh, dof_points(u))
-    resultants = mass_product(u, t, motions)
-    values, rows, columns = mass_entries(u, t)
-    np.add.at(k, (rows, columns), 0.5 * values)
+    mass = mass_entries(u, t)
+    resultants = mass.times(motions, t.n_dofs)
+    np.add.at(k, (mass.rows, mass.columns), 0.5 * mass.values)
     # polynomials do not hold a rotation of curved elements exactly: its interpolant is made a rigid motion
     at_rest, _ = np.linalg.qr(motions[:, : 0 if mesh.is_straight.all() else 3])
     trace = _without(k, at_rest)

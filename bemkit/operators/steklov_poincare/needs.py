@@ -56,6 +56,7 @@ class BodyCase:
     Parameters
     ----------
     mesh : BoundaryMesh
+        In any units; that on which the body is solved shares its spaces.
     material : Material
     conditions : NodalConditions
         Those of contact are retained.

@@ -12,6 +12,7 @@ from bemkit.errors import InputError
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace, dof_points
+from bemkit.geometry.vectors import norms, turned_right
 from bemkit.operators.rigid_modes import admissible_modes, rigid_motions
 
 SMOOTH_SIDE_RATIO = 0.07
@@ -171,9 +172,11 @@ def integrate_traction(space: BoundarySpace, elements: IntArray, field: Traction
     """
     points, weights = gauss_legendre(space.degree + 5)  # exact for tractions up to the ninth power of the coordinates
     places = space.mesh.points(elements, points)
-    normals = space.mesh.normals_at(elements, points)
+    outward = turned_right(space.mesh.derivatives(elements, points))
+    sizes = norms(outward)
+    normals = outward / sizes[..., None]
     values = field(places.reshape(-1, 2), normals.reshape(-1, 2)).reshape(places.shape)
-    measure = space.mesh.jacobian(elements, points) * weights
+    measure = sizes * weights
     local = np.einsum("eq,pq,eqc->epc", measure, space.basis(points), values)
     return summed_at_dofs(space, local, elements)
 
@@ -272,8 +275,7 @@ def _directions_of(space: BoundarySpace, support: Support) -> FloatArray:
     """Return the projector (n_nodes, 2, 2) on the directions that one support fixes at each node."""
     outer = np.einsum("...ki,...kj->...ij", support.directions, support.directions)
     matrix = np.zeros((space.n_dofs // 2, 2, 2))
-    for local, dofs in enumerate(space.element_dofs[support.elements].T):
-        np.add.at(matrix, dofs, outer if outer.ndim == 3 else outer[:, local])
+    np.add.at(matrix, space.element_dofs[support.elements], outer if outer.ndim == 4 else outer[:, None])
     size, vectors = np.linalg.eigh(matrix)
     keep = np.where(size > SMOOTH_SIDE_RATIO * size[:, 1:], 1.0, 0.0)
     projector: FloatArray = np.einsum("nij,nj,nkj->nik", vectors, keep, vectors)
