@@ -146,7 +146,7 @@ class LayeredMeshes:
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
         goal = SAFETY * self.accuracy
         if moves_on:
-            goal /= NEXT_ERROR
+            goal = self.accuracy / NEXT_ERROR
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off
