@@ -42,6 +42,16 @@ def consecutive_runs(indices: IntArray) -> list[Run]:
     return [(slice(i, j), slice(int(indices[i]), int(indices[i]) + j - i)) for i, j in itertools.pairwise(edges)]
 
 
+def block_of(matrix: FloatArray, rows: IntArray, columns: IntArray) -> FloatArray:
+    """Return ``matrix[np.ix_(rows, columns)]``, several times as fast where indices follow each other."""
+    block = np.empty((rows.size, columns.size))
+    column_runs = consecutive_runs(columns)
+    for in_rows, own_rows in consecutive_runs(rows):
+        for in_columns, own_columns in column_runs:
+            block[in_rows, in_columns] = matrix[own_rows][:, own_columns]
+    return block
+
+
 def spread_fractions(n: int) -> FloatArray:
     """Return n fractions without any pattern, as far from each other as can be: multiples of the golden ratio."""
     fractions: FloatArray = np.modf(np.arange(1, n + 1) * 0.6180339887498949)[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from bemkit.contact.conditions import null_space
+from bemkit.contact.conditions import null_space, orthonormal, separated, slip, stick
 from bemkit.contact.joined.member import diagonal_blocks
 from tests.slow import slow_except
 
@@ -39,3 +39,16 @@ def test_many_motions_may_be_free_at_once(n_free):
     free = null_space(matrix)
     assert free.shape == (n_free, n)
     assert np.abs(matrix @ free.T).max() <= 1e-7
+
+
+def test_conditions_hold_what_they_leave_no_motion_of():
+    """Nodes of a straight side: stuck, sliding along it, and open; both motions at once, and the one that lifts it."""
+    along, lifting = np.zeros((2, 5, 2))
+    along[:, 1] = lifting[:, 0] = 1.0
+    none = np.zeros(5)
+    for conditions, n_free in ((stick(none, none), 0), (slip(none, none + 1.0, none, none), 1), (separated(5), 2)):
+        motions = np.stack([3.0 * along, along + lifting])
+        assert len(conditions.free_motions(motions)) == n_free
+        assert conditions.hold(orthonormal(motions)) == (n_free == 0)
+        assert conditions.hold(orthonormal(lifting[None])) == (n_free < 2)
+        assert conditions.hold(orthonormal(np.zeros((0, 5, 2))))

@@ -14,7 +14,7 @@ from bemkit.geometry.pieces import (
     segment_distances,
 )
 
-points = arrays(float, (40, 2), elements=st.integers(-20, 20).map(float))
+points = arrays(float, (150, 2), elements=st.integers(-20, 20).map(float))
 
 
 @given(points, points)
@@ -27,7 +27,7 @@ def test_overlapping_boxes_finds_what_comparing_all_pairs_finds(a, b) -> None:
     }
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 7])
+@pytest.mark.parametrize("n", [1, 2, 3, 64, 65, 131])
 def test_overlapping_boxes_of_any_number(n: int) -> None:
     low = np.zeros((n, 2))
     first, _ = overlapping_boxes(low, low)

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, block_of
 from bemkit.operators.counts import OperationCounts
 from bemkit.operators.linear.dense import multiply
 from bemkit.operators.linear.solvers import Factor, LinearSolver
@@ -50,13 +50,13 @@ class SchurCondensation:
         self._free, self._retained, self._fixed = (
             np.flatnonzero(x) for x in (conditions.is_free, conditions.is_retained, conditions.is_fixed)
         )
-        self.factor = self.solver.factor(matrix[np.ix_(self._free, self._free)], self.name)
-        self._coupling = matrix[np.ix_(self._free, self._retained)]
+        self.factor = self.solver.factor(block_of(matrix, self._free, self._free), self.name)
+        self._coupling = block_of(matrix, self._free, self._retained)
         self._of_fixed = matrix[:, self._fixed]
         self._volume = volume = self.volume.in_frames(conditions.frame).change
         self._held = VolumeConstraint(self.factor, without_round_off(volume)[self._free], self.volume.yields)
         self._response, self._pressures = self._held.solve(-self._coupling, -volume[self._retained].T)
-        stiffness = matrix[np.ix_(self._retained, self._retained)] + multiply(self._coupling.T, self._response)
+        stiffness = block_of(matrix, self._retained, self._retained) + multiply(self._coupling.T, self._response)
         stiffness += volume[self._retained] @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
         self._sensitivity = np.abs(self.matrix).sum(axis=0).reshape(-1, 2)
