@@ -35,6 +35,16 @@ def test_small_work_has_one_thread_and_large_work_all() -> None:
     assert n_blas_threads() == ALL
 
 
+def test_where_there_is_one_thread_anyhow_no_other_one_holds_it() -> None:
+    before = threading.active_count()
+    with threadpool_limits(limits=1, user_api="blas"):
+        with blas_threads_for(SMALL):
+            assert threading.active_count() == before
+    with blas_threads_for(SMALL):
+        assert threading.active_count() == before + 1
+    assert n_blas_threads() == ALL
+
+
 def test_overlapping_small_work_restores_what_was_before() -> None:
     """The first comes first and leaves first: a limit that each restores for itself would stay at one for ever."""
     first_is_in, second_is_in, first_is_out = (threading.Event() for _ in range(3))

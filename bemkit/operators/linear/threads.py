@@ -47,7 +47,7 @@ class _Turns:
             if not self._users[me]:
                 self._take_turn(is_wanted)
             if not self._users.total() and is_wanted:
-                self._setting.enter_context(_held_by_a_thread(setting))
+                self._setting.enter_context(setting())
             self._users[me] += 1
         try:
             yield
@@ -122,8 +122,13 @@ def blas_threads_for(order: int) -> Iterator[None]:
     had before. Libraries that know a limit for each thread get it besides.
     """
     is_small = order <= LARGE
-    with _TURNS.shared(is_small, _one_blas_thread), _one_blas_thread() if is_small else nullcontext():
+    with _TURNS.shared(is_small, _one_blas_thread_for_all), _one_blas_thread() if is_small else nullcontext():
         yield
+
+
+def _one_blas_thread_for_all() -> AbstractContextManager[Any]:
+    has_one = all(library.num_threads == 1 for library in _blas_libraries().lib_controllers)
+    return nullcontext() if has_one else _held_by_a_thread(_one_blas_thread)
 
 
 def _one_blas_thread() -> AbstractContextManager[Any]:
