@@ -123,12 +123,8 @@ class LayeredMeshes:
         has_copies = any(len(member.bodies) > 1 for member in members)
         if level.number == 0 and len(solutions) < MOST_LOOKS and is_coarse and not has_copies:
             return DensityMeshes(self.accuracy).following(level, solutions)
-        cuts = [_settled_cuts(member) for member in members]
         more = int(level.number == 0 and self._may_stop_at_once(solution))
-        fresh = [
-            layered_partition(each.partition.base, own, n_at_jumps=1 + more)
-            for each, own in zip(members, cuts, strict=True)
-        ]
+        fresh = [layered_partition(each.partition.base, _settled_cuts(each), n_at_jumps=1 + more) for each in members]
         if level.number == 0:
             return replace(level, partitions=tuple(fresh), number=FIRST_NUMBER + more)
         if errors is None:
@@ -154,7 +150,7 @@ class LayeredMeshes:
         excesses = errors.split(errors.excess(np.concatenate(higher), goal))
         refined = tuple(
             refined_partition(member.partition, excess, own, resolution)
-            for member, excess, own in zip(members, excesses, cuts, strict=True)
+            for member, excess, own in zip(members, excesses, fresh, strict=True)
         )
         degrees: tuple[int, ...] = ()
         if has_moved and level.asked.discretisation.needs_accuracy and isinstance(solution, Solution):

@@ -96,7 +96,7 @@ def bemkit_told(example: int, degree: int, n_layers: int, clock: Clock) -> Outco
     is_beside = np.isclose(partition.spans[:, :, None], places, atol=0.0).any(axis=(1, 2))
     on_bottom = partition.sides == outline.side_names.index("bottom")
     excess = np.where(is_beside & on_bottom, FACTOR ** (0.5 - n_layers), 0.0)
-    solution = bk.run(scene, mesh=refined_partition(partition, excess, cuts, 1.0).mesh)
+    solution = bk.run(scene, mesh=refined_partition(partition, excess, partition, 1.0).mesh)
     seconds = clock() - begin
     return Outcome(measured_errors(solution, example) | NOT_FOUND, seconds)
 

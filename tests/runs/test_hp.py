@@ -250,7 +250,7 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
     old = layered_partition(base, {})
     excess = np.zeros(len(old.sides))
     excess[0], excess[1] = FACTOR**-1.5, 1.5  # two layers more, and a half
-    fine = refined_partition(old, excess, {}, 1.0)
+    fine = refined_partition(old, excess, old, 1.0)
     start, first = old.parameters[0][:2]
     expected = [start, *(first * FACTOR ** np.array([2.0, 1.0])), first, 0.5 * (first + 0.5)]
     np.testing.assert_allclose(fine.parameters[0][:5], expected, rtol=1e-12)
@@ -262,18 +262,19 @@ def test_refinement_adds_layers_at_ends_and_halves_elsewhere() -> None:
 def test_pieces_move_with_the_places_of_the_changes() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     old = layered_partition(base, {0: [0.3]})
-    moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.35]}, 1.0)
+    moved = refined_partition(old, np.zeros(len(old.sides)), layered_partition(base, {0: [0.35]}), 1.0)
     np.testing.assert_allclose(moved.parameters[0], old.parameters[0] * 0.35 / 0.3, rtol=1e-12)
-    anew = refined_partition(moved, np.zeros(len(moved.sides)), {0: [0.35, 0.6]}, 1.0)
-    np.testing.assert_allclose(anew.parameters[1], layered_partition(base, {0: [0.35, 0.6]}).parameters[1])
+    fresh = layered_partition(base, {0: [0.35, 0.6]})
+    anew = refined_partition(moved, np.zeros(len(moved.sides)), fresh, 1.0)
+    np.testing.assert_allclose(anew.parameters[1], fresh.parameters[1])
 
 
 def test_layers_follow_places_that_move() -> None:
     """Down to a tenth of the motion on both sides of the place, and no further than the resolution."""
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
-    old = layered_partition(base, {0: [0.3]})
+    old, fresh = layered_partition(base, {0: [0.3]}), layered_partition(base, {0: [0.301]})
     for resolution, longest in ((1e-6, 0.1 * 1e-3), (0.01, 0.01 * 0.7)):
-        moved = refined_partition(old, np.zeros(len(old.sides)), {0: [0.301]}, resolution)
+        moved = refined_partition(old, np.zeros(len(old.sides)), fresh, resolution)
         beside = [moved.parameters[0][-1] - moved.parameters[0][-2], moved.parameters[1][1] - moved.parameters[1][0]]
         assert max(beside) <= longest
         assert min(beside) >= FACTOR**2 * longest
@@ -374,7 +375,7 @@ def test_layers_end_where_coordinates_do() -> None:
     base = divide(bk.Rectangle(1.0, 1.0).outline(), {})
     partition = layered_partition(base, {})
     for _ in range(12):  # 36 layers would be 1e-26 long
-        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), {}, 1.0)
+        partition = refined_partition(partition, np.full(len(partition.sides), 1e9), partition, 1.0)
         if len(partition.sides) > 2000:
             break
     assert 0.9 <= partition.mesh.lengths.min() / shortest_length(partition.mesh) <= 1.1 / FACTOR

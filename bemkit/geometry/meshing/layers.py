@@ -74,9 +74,7 @@ def layered_partition(base: Division, cuts: Mapping[int, Sequence[float]], *, n_
     return _balanced(base, division, [_first_layers(*ends) for ends in n_layers.T.tolist()])
 
 
-def refined_partition(
-    old: Partition, excess: FloatArray, cuts: Mapping[int, Sequence[float]], resolution: float
-) -> Partition:
+def refined_partition(old: Partition, excess: FloatArray, fresh: Partition, resolution: float) -> Partition:
     """Divide elements whose errors are too large, and move the pieces to where the contact status now changes.
 
     Parameters
@@ -84,9 +82,10 @@ def refined_partition(
     old : Partition
     excess : (n_elements,) array
         By which factor the error of each element is above its share; what is below 1 stays.
-    cuts : mapping of int to sequence of float
-        As for `layered_partition`. Where their number on a piece of the base has changed, that piece begins anew.
-        Layers go down to what places that move are expected to move again, by which their fields stay within them.
+    fresh : Partition
+        A `layered_partition` of the same base. Where a piece of the base has other numbers of pieces there, it begins
+        anew. Layers go down to what places that move are expected to move again, by which their fields stay within
+        them.
     resolution : float
         Length, relative to a piece, below which that makes no difference.
 
@@ -95,7 +94,6 @@ def refined_partition(
     Partition
         An element at an end of its piece has become layers, others halves.
     """
-    fresh = layered_partition(old.base, cuts)
     is_end = _singular_ends(old.division).T.tolist()
     excesses = np.split(excess, np.cumsum([len(s) - 1 for s in old.parameters])[:-1])
     # coordinates along a piece are fractions of its length
