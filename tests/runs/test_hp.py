@@ -359,10 +359,11 @@ def test_a_pressure_without_bound_takes_short_elements() -> None:
 
 @pytest.mark.slow
 def test_statuses_that_flicker_where_clearances_are_round_off_do_not_cost_elements() -> None:
-    reached = risen("wavy-obstacle", 1e-9)[-1]
+    reached = risen("wavy-obstacle", 2e-9)[-1]
     assert reached.is_converged
     assert traction_error(reached) <= 1e-9
-    # the estimate ends at 6e-10, on meshes whose places of change are all within 3e-9 of each other
+    # the estimate ends at 6e-10 to 1e-9, which is round-off on elements of this length: places of change are all within
+    # 3e-9 of each other
     flickering = [each for each in risen("wavy-obstacle", 5e-10) if len(each.transitions) > 1]
     assert flickering
     for solution in flickering:
