@@ -224,15 +224,20 @@ class LinearConditions:
 
     def hold(self, basis: FloatArray) -> bool:
         """Whether every combination of orthonormal motions (n_motions, n_contact, 2) changes some condition."""
-        return not len(basis) or not len(self._unfelt(basis))
+        return not len(basis) or bool(
+            (np.linalg.svd(self._felt(basis), compute_uv=False) > FREE_MOTION_TOLERANCE).all()
+        )
 
     def _unfelt(self, basis: FloatArray) -> FloatArray:
         """Return the combinations (n_free, n_motions) of orthonormal motions that change no condition."""
+        _, singular, directions = np.linalg.svd(np.linalg.qr(self._felt(basis), mode="r"))
+        return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
+
+    def _felt(self, basis: FloatArray) -> FloatArray:
+        """Return the changes (2 n_contact, n_motions) of the conditions, each scaled to one, by orthonormal motions."""
         size = np.abs(self.on_displacement).max(axis=2, keepdims=True)
         rows = self.on_displacement / np.where(size > 0.0, size, 1.0)
-        felt = np.einsum("nrc,mnc->nrm", rows, basis).reshape(-1, len(basis))
-        _, singular, directions = np.linalg.svd(np.linalg.qr(felt, mode="r"))
-        return np.asarray(directions[np.count_nonzero(singular > FREE_MOTION_TOLERANCE) :])
+        return np.asarray(rows @ basis.transpose(1, 2, 0)).reshape(-1, len(basis))
 
     def _sparse_free_motions(self, motions: csr_array) -> csr_array:
         from scipy import sparse

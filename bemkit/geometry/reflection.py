@@ -91,7 +91,7 @@ def antisymmetric_dofs(space: BoundarySpace) -> BoolArray:
     """
     vanishes = np.zeros((space.n_dofs // 2, 2), bool)
     broken = getattr(space, "broken", None)
-    if broken is None and not space.is_continuous:
+    if space.mesh.symmetry is None or (broken is None and not space.is_continuous):
         return vanishes.ravel()
     mesh = space.mesh
     joins = mesh.on_symmetry_lines if broken is None else mesh.on_symmetry_lines & ~broken[:, None]

@@ -14,11 +14,12 @@ so that all of them are combinations of the scalar integrals of `integrals`. The
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from bemkit.arrays import FloatArray, IntArray
+from bemkit.arrays import FloatArray, IntArray, read_only
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.local_values import of_one_degree
 from bemkit.geometry.quadrature import gauss_legendre
@@ -30,7 +31,13 @@ from bemkit.operators.pair_form import PairForm, Tag, TrialTerm, require_one_mes
 
 def _derivative(coefficients: FloatArray) -> FloatArray:
     """Return the Legendre coefficients of d/dxi of each row; a constant keeps one zero coefficient."""
-    return np.asarray(np.polynomial.legendre.legder(coefficients, axis=1), np.float64)
+    return np.asarray(coefficients @ _derivatives_of_polynomials(coefficients.shape[1]))
+
+
+@lru_cache(maxsize=16)
+def _derivatives_of_polynomials(n: int) -> FloatArray:
+    """Return the Legendre coefficients, read-only, of dP_k/dxi in row k < n; one column at least."""
+    return read_only(np.asarray(np.polynomial.legendre.legder(np.eye(n), axis=1), np.float64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,8 +103,7 @@ class Target:
     @classmethod
     def zeros(cls, form: PairForm, test_elements: IntArray, trial_elements: IntArray) -> Target:
         """Return one for the pairs of some elements."""
-        test = np.unique(form.test.element_dofs[test_elements])
-        trial = np.unique(form.trial.element_dofs[trial_elements])
+        test, trial = _dofs_on(form.test, test_elements), _dofs_on(form.trial, trial_elements)
         return cls(form, test, trial, np.zeros((test.size, 2, trial.size), complex))
 
     def dofs_matrix(self) -> FloatArray:
@@ -114,6 +113,13 @@ class Target:
             matrix[antisymmetric_dofs(self.form.test).reshape(-1, 2)[self.test_nodes].ravel()] = 0.0
             matrix[:, antisymmetric_dofs(self.form.trial).reshape(-1, 2)[self.trial_nodes].ravel()] = 0.0
         return matrix
+
+
+def _dofs_on(space: BoundarySpace, elements: IntArray) -> IntArray:
+    """Return the scalar dofs of some elements, in increasing order."""
+    if elements.size == space.mesh.n_elements:
+        return np.arange(space.n_dofs // 2)
+    return np.unique(space.element_dofs[elements])
 
 
 class Columns:
