@@ -97,12 +97,12 @@ class Cholesky:
             return np.zeros(right.shape)
         return np.asarray(dpotrs(self._factor, right, lower=1)[0])
 
-    def solve_lower(self, right: FloatArray) -> FloatArray:
-        """Solve L x = right with A = L L^T."""
+    def solve_lower(self, right: FloatArray, *, overwrite: bool = False) -> FloatArray:
+        """Solve L x = right with A = L L^T; a row-major right-hand side may be overwritten by the solution."""
         from scipy.linalg.blas import dtrsm
 
         # the transpose of a row-major matrix is column-major: x^T L^T = right^T is solved in its place, at once
-        x = np.array(right.reshape(len(right), -1), order="C")
+        x = np.array(right.reshape(len(right), -1), order="C", copy=None if overwrite else True)
         dtrsm(1.0, self._factor, x.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         return x.reshape(right.shape)
 

@@ -116,11 +116,8 @@ class GalerkinElasticity:
     def factors(self) -> GalerkinFactors:
         """What the map is made of, computed on first use."""
         layers = assemble_layers(self.displacement_space, self.traction_space, self.material, self._pressures)
-        whitened_trace = layers.whitened_trace()
-        work = layers.work + OperationCounts(right_hand_sides=whitened_trace.shape[1])
-        return GalerkinFactors(
-            _symmetric_sum(layers.hypersingular, whitened_trace), layers.single_layer, whitened_trace, work
-        )
+        matrix = _symmetric_sum(layers.hypersingular, layers.whitened_trace)
+        return GalerkinFactors(matrix, layers.single_layer, layers.whitened_trace, layers.work)
 
     @cached_property
     def _pressures(self) -> FloatArray:

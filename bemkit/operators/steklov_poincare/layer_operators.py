@@ -31,10 +31,8 @@ class Layers:
     ----------
     single_layer : Cholesky
         V = L L^T.
-    resultant : (n_traction_dofs, n_idle) array
-        Orthonormal; L^-T times its complement are the tractions that exert no resultant.
-    trace_operator : (n_traction_dofs, n_dofs) array
-        B = 1/2 M + K.
+    whitened_trace : (n_traction_dofs, n_dofs) array
+        L^-1 B with B = 1/2 M + K, less what belongs to tractions that exert a resultant.
     hypersingular : (n_dofs, n_dofs) array
         W.
     work : OperationCounts
@@ -42,23 +40,15 @@ class Layers:
     """
 
     single_layer: Cholesky
-    resultant: FloatArray
-    trace_operator: FloatArray
+    whitened_trace: FloatArray
     hypersingular: FloatArray
     work: OperationCounts
-
-    def whitened_trace(self) -> FloatArray:
-        """Return L^-1 B less its projection on `resultant`."""
-        whitened = self.single_layer.solve_lower(self.trace_operator)
-        if self.resultant.shape[1]:
-            subtract_product(whitened.T, multiply(whitened.T, self.resultant), self.resultant)
-        return whitened
 
 
 def assemble_layers(
     displacements: BoundarySpace, tractions: BoundarySpace, material: Material, pressures: FloatArray
 ) -> Layers:
-    """Assemble V, K and W of a map and factor V.
+    """Assemble V, K and W of a map, factor V and solve with it.
 
     Parameters
     ----------
@@ -97,9 +87,14 @@ def assemble_layers(
     hyper = _without(_without(w, at_rest).T, at_rest).T
     dilatation = dilatation_of(u)[:, None][:, : int(is_compressible)]
     idle = np.column_stack([resultants, annihilated, trace @ dilatation])
+    # L^-T times the complement of this are the tractions that exert no resultant
     resultant, _ = np.linalg.qr(factor.solve_lower(idle))
-    work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=idle.shape[1])
-    return Layers(factor, resultant, trace, hyper, work)
+    whitened = factor.solve_lower(trace, overwrite=True)
+    if resultant.shape[1]:
+        subtract_product(whitened.T, multiply(whitened.T, resultant), resultant)
+    n_solved = idle.shape[1] + whitened.shape[1]
+    work += OperationCounts(factorisations=(factor.factorisation,), right_hand_sides=n_solved)
+    return Layers(factor, whitened, hyper, work)
 
 
 def dilatation_of(space: BoundarySpace) -> FloatArray:

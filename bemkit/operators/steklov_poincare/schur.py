@@ -15,6 +15,9 @@ from bemkit.operators.steklov_poincare.nodal_conditions import NodalConditions, 
 from bemkit.operators.steklov_poincare.protocol import CondensedMap
 from bemkit.operators.steklov_poincare.volume_constraint import Volume, VolumeConstraint, without_round_off
 
+_ROWS = 128
+"""Rows of a matrix that are copied at a time."""
+
 
 @dataclass(eq=False)
 class SchurCondensation:
@@ -59,7 +62,8 @@ class SchurCondensation:
         stiffness = block_of(matrix, self._retained, self._retained) + multiply(self._coupling.T, self._response)
         stiffness += volume[self._retained] @ self._pressures
         self._stiffness = 0.5 * (stiffness + stiffness.T)
-        self._sensitivity = np.abs(self.matrix).sum(axis=0).reshape(-1, 2)
+        rows = (self.matrix[first : first + _ROWS] for first in range(0, len(self.matrix), _ROWS))
+        self._sensitivity = sum(np.abs(each).sum(axis=0) for each in rows).reshape(-1, 2)
 
     @property
     def work(self) -> OperationCounts:
