@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
 
 import bemkit as bk
+from bemkit.contact.body import ContactState
 from bemkit.geometry.errors import GeometryError
 from bemkit.geometry.vectors import check_magnitude
 from bemkit.model.contact_model import Model
 from bemkit.model.units import OutOfRangeError
+from bemkit.runs import history
 
 ELEMENTS = [bk.LinearGalerkin(), bk.ConstantCollocation()]
 
@@ -100,3 +103,17 @@ def test_results_that_are_not_finite_are_never_converged(is_contact: bool, monke
 
     monkeypatch.setattr(Model, "boundary_fields", overflowing)
     assert bk.run(block(is_contact=is_contact)).status is bk.Status.NOT_FINITE
+
+
+def test_states_that_are_not_finite_end_as_a_status_without_warnings_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As random scene 117 of seed 3002, a plate that nothing holds sideways, on its way to infinity."""
+    actual = history.with_held_friction
+
+    def infinite(*arguments: Any) -> Any:
+        state, node_status = actual(*arguments)
+        return ContactState(np.full_like(state.displacement, np.inf), state.traction), node_status
+
+    monkeypatch.setattr(history, "with_held_friction", infinite)
+    solution = bk.run(block())
+    assert solution.status is bk.Status.NOT_FINITE
+    assert np.isnan(solution.energy)
