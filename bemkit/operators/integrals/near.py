@@ -26,7 +26,7 @@ from bemkit.operators.integrals.outer_rules import (
 from bemkit.operators.integrals.pairs import Degrees, Inner, PairIntegrals
 from bemkit.operators.integrals.panels import Panels
 
-BATCH_POINTS = 4096
+BATCH_POINTS = 8192
 """Outer points treated at once: their integrals stay in the cache."""
 
 

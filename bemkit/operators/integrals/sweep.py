@@ -48,7 +48,7 @@ FEW = 2 * LISTED_PAIRS
 dense sweep they do not."""
 LISTED_SHARE_OF_CURVED = 1.0 / 3.0
 """Share of all pairs that is listed on small curved meshes, which have no `DENSE_DISTANCE` (counted)."""
-BATCH_MEMORY = 0.6e6
+BATCH_MEMORY = 1.2e6
 """Bytes of the temporary arrays of one batch of outer points (measured)."""
 CURVED_BATCH_MEMORY = 0.1e6, 8e6
 """The same of curved elements: for each element, and at most."""
