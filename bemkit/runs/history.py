@@ -101,7 +101,6 @@ def _explained(model: Model, load: UnsolvableLoad) -> str:
     return describe(model.prepared, load)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # the status says what is not finite
 def solution_of(
     model: Model, result: ContactSolution, plan: Plan, clock: StageClock, motion: SlipHistory | None = None
 ) -> Solution:

@@ -140,9 +140,7 @@ class LayeredMeshes:
             rise = min(rise, max(needed - LAST_RISE, 1))
         number = level.number + rise
         higher = [_degrees_of(each, each.bodies[0].scene.discretisation.at_level(number)) for each in members]
-        goal = SAFETY * self.accuracy
-        if moves_on:
-            goal = self.accuracy / NEXT_ERROR
+        goal = self.accuracy / NEXT_ERROR if moves_on else SAFETY * self.accuracy
         if not is_last:
             goal = max(goal, self.error(solution) / GAIN**LARGEST_RISE)
         # layers shorter than what flickers would hold nothing but round-off

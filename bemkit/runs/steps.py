@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numpy as np
+
 from bemkit.contact.body import ContactState, SlipHistory
 from bemkit.contact.problem import ContactProblem
 from bemkit.contact.solvability import UnsolvableLoad, find_unsolvable_load
@@ -223,7 +225,8 @@ def solve_steps(
                 words = f"{result.status.value} {kind.why_not(model, result)}."
             solutions.append(_not_reached(solutions[-1] if solutions else whole, replace(result, message=words), clock))
             break
-        solution = kind.solution(model, result, plan, clock, reached.end.motion)
+        with np.errstate(over="ignore", invalid="ignore"):  # the status says what is not finite
+            solution = kind.solution(model, result, plan, clock, reached.end.motion)
         if history.is_recorded and solution.is_converged:
             solution = replace(solution, loading=_loading(history, solutions, model, reached, solution))
         solutions.append(solution)
