@@ -199,6 +199,11 @@ class SolvedProblem(ShownInNotebooks):
         """The same of each contact, by the name in the contact table."""
         return self._measured_between(None if self.loading is None else self.loading.motion)
 
+    @property
+    def unasked_warnings(self) -> tuple[str, ...] | Callable[[Any], tuple[str, ...]]:
+        """The warnings, or the function that will find them: what a solution that replaces this one takes over."""
+        return WhenAsked.held(self, "warnings")
+
     def with_warnings(self, warnings: tuple[str, ...] | Callable[[Any], tuple[str, ...]]) -> Self:
         """Return the same solution with other warnings, and with all that has been estimated of it.
 
@@ -277,6 +282,7 @@ def with_totals(result: AnySolution, solutions: Sequence[AnySolution], names: Se
             records.append(replace(record, step=first + record.step, linear_solves=total, message=message))
     return replace(
         with_times(result, solutions),
+        warnings=result.unasked_warnings,
         history=tuple(records),
         linear_solves=sum(solution.linear_solves for solution in solutions),
         outer_steps=sum(solution.outer_steps for solution in solutions),
@@ -287,6 +293,7 @@ def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolu
     """Return a solution with the times and the memory of all that led to it."""
     return replace(
         result,
+        warnings=result.unasked_warnings,
         timings={name: sum(solution.timings[name] for solution in solutions) for name in result.timings},
         memory={name: max(each.memory.get(name, 0) for each in solutions) for name in result.memory},
     )

@@ -23,8 +23,16 @@ class WhenAsked(Generic[Value]):
         self._default = default
         self._key = ""
 
+    @staticmethod
+    def held(instance: Any, name: str) -> Any:
+        """Return what a field holds, its value or the function that nobody has asked yet.
+
+        `dataclasses.replace` asks for every field that it is not given.
+        """
+        return instance.__dict__[_key_of(name)]
+
     def __set_name__(self, owner: type, name: str) -> None:
-        self._key = f"_{name}_when_asked"
+        self._key = _key_of(name)
 
     def __get__(self, instance: Any, owner: type | None = None) -> Value:
         if instance is None:
@@ -36,3 +44,7 @@ class WhenAsked(Generic[Value]):
 
     def __set__(self, instance: Any, value: Value) -> None:
         instance.__dict__[self._key] = value
+
+
+def _key_of(name: str) -> str:
+    return f"_{name}_when_asked"

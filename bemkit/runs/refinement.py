@@ -145,4 +145,5 @@ def _best_last(
         status = Status.ACCURACY_NOT_REACHED if best.is_converged else best.status
     names = [f"mesh {number} of {len(solutions)}" for number in range(1, len(solutions) + 1)]
     others = [solution for solution in solutions if solution is not best]
-    return (*others, replace(with_totals(best, solutions, names), status=status, message=message))
+    total = with_totals(best, solutions, names)
+    return (*others, replace(total, warnings=total.unasked_warnings, status=status, message=message))

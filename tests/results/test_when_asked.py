@@ -42,3 +42,11 @@ def test_a_function_is_called_when_asked_and_once() -> None:
 def test_copies_hold_the_same() -> None:
     for copied in (dataclasses.replace(with_area(3), side=4), pickle.loads(pickle.dumps(with_area(3)))):
         assert copied.area == 9
+
+
+def test_a_function_goes_to_a_copy_without_being_called() -> None:
+    ASKED.clear()
+    square = with_area(3)
+    larger = dataclasses.replace(square, side=4, area=WhenAsked.held(square, "area"))
+    assert ASKED == []
+    assert (larger.area, ASKED) == (16, [4])
