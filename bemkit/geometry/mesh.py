@@ -1,7 +1,7 @@
 """Boundary meshes: elements in closed loops, with named parts."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -58,6 +58,8 @@ class BoundaryMesh:
         Lines on which the loops end; the rest of the body are images, see `whole`. A part may then be empty.
     surface : Surface, optional
         Given if the body is a half-plane, an exterior: its elements are a straight strip.
+    follows_outline : bool
+        Whether elements lie along the sides of an `Outline`, whose loops have been checked and are not checked again.
 
     Raises
     ------
@@ -80,8 +82,9 @@ class BoundaryMesh:
     is_exterior: bool = False
     symmetry: Symmetry | None = None
     surface: Surface | None = None
+    follows_outline: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, follows_outline: bool) -> None:
         nodes = np.array(self.nodes, dtype=float)
         elements = as_index(self.elements, "elements")
         check_chains(nodes, elements, self.symmetry, is_strip=self.surface is not None)
@@ -100,11 +103,11 @@ class BoundaryMesh:
         object.__setattr__(self, "parts", MappingProxyType(parts))
         if self.surface is not None:
             self.surface.check(nodes, elements, self.is_exterior and self.symmetry is None)
-        elif self.symmetry is None:
-            check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
-        else:
+        elif self.symmetry is not None:
             check_half(self.symmetry, nodes, elements, self.is_exterior)
             _ = self.whole  # checks its loops
+        elif not follows_outline:
+            check_mesh_loops(nodes, elements, self._pieces, self.loops, self.is_exterior)
 
     def __repr__(self) -> str:
         parts = [f"{name} ({elements.size})" for name, elements in self.parts.items()]
@@ -267,6 +270,8 @@ class BoundaryMesh:
         """Differentiate elements: dx/dxi [m], (m, q, 2), for (m,) elements at (q,) or (m, q) local coordinates."""
         half_chord = 0.5 * (self.end[elements] - self.start[elements])
         straight = np.repeat(half_chord[:, None], xi.shape[-1], axis=1)
+        if not self.curves:
+            return straight
         derivative = self._on_curves(elements, xi, derivative_on, straight)
         # the chain rule: half the span of the parameter for xi from -1 to 1
         is_curved = ~self.is_straight[elements]
@@ -377,6 +382,8 @@ class BoundaryMesh:
         straight: FloatArray,
     ) -> FloatArray:
         """Replace the values (m, q, 2) of straight elements by those on curves where elements are curved."""
+        if not self.curves:
+            return straight
         curve = self._curve_index[elements]
         if (curve >= 0).any():
             span = self._span[elements]

@@ -139,6 +139,7 @@ class Division:
             outline.is_exterior,
             self.symmetry,
             outline.surface,
+            follows_outline=True,
         )
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bemkit.arrays import BoolArray, FloatArray, IntArray
+from bemkit.arrays import BoolArray, FloatArray, IntArray, consecutive_runs
 from bemkit.errors import InputError
 from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.quadrature import gauss_legendre
@@ -204,11 +204,12 @@ def rotated(matrix: FloatArray, frame: FloatArray) -> FloatArray:
     if not turned.size:
         return matrix
     result = matrix.copy()
-    first, second = 2 * turned, 2 * turned + 1
-    along_x, along_y = (frame[turned, :, c, None] for c in range(2))
-    for own in (result, result.T):  # the rows, then the columns
-        x, y = own[first], own[second]
-        own[first], own[second] = along_x[:, 0] * x + along_y[:, 0] * y, along_x[:, 1] * x + along_y[:, 1] * y
+    rows, columns = result.reshape(len(frame), 2, -1), result.reshape(-1, len(frame), 2)
+    for _, nodes in consecutive_runs(turned):
+        own = frame[nodes]
+        rows[nodes] = own @ rows[nodes]
+        x, y = (columns[:, nodes, component] for component in (0, 1))
+        columns[:, nodes, 0], columns[:, nodes, 1] = [own[:, k, 0] * x + own[:, k, 1] * y for k in (0, 1)]
     return result
 
 
