@@ -214,6 +214,7 @@ def _of_discretisation(discretisation: Discretisation, *, is_adaptive: bool) -> 
     if is_adaptive and discretisation.takes_layers:
         yield Method("geometric layers and rising degrees", ("BabuskaGuo1986", "BanzStephan2015"))
         yield Method("error estimates from Legendre coefficients", ("Mavriplis1994",))
+        yield Method("corners where contact tractions have no bound", ("Williams1952",))
 
 
 def _of_contact(stated: Scene | Assembly) -> Iterator[Method]:

@@ -26,6 +26,7 @@ from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
     from bemkit.results.part_forces import ContactForce
+    from bemkit.results.singular_corners import SingularCorner
     from bemkit.results.zone_ends import ZoneEnd
 
 
@@ -66,8 +67,8 @@ class Solution(SolvedProblem, SolvedBody):
     def estimated_traction_error(self) -> float | None:
         """Estimated error of the contact tractions in L2, relative to them.
 
-        Of a half-plane that of all tractions but loads, in the mean. None without an estimate and without such
-        tractions.
+        From degree 3 on without those at `singular_corners`, which no element holds. Of a half-plane that of all
+        tractions but loads, in the mean. None without an estimate and without such tractions.
         """
         if self.surface_errors is not None:
             return self.surface_errors.in_the_mean
@@ -129,10 +130,22 @@ class Solution(SolvedProblem, SolvedBody):
         parts = {force.name: force for force in self.part_forces}
         return contact_forces(self.contact, [parts[name] for name in self.contact.parts], self.transitions)
 
+    @cached_property
+    def singular_corners(self) -> tuple[SingularCorner, ...]:
+        """Where contact tractions grow without bound; see `bemkit.results.singular_corners`."""
+        from bemkit.results.singular_corners import singular_corners
+
+        return singular_corners(self, self.contact, None if self.loading is None else self.loading.motion)
+
     @property
     def contact_elements(self) -> IntArray:
-        """The elements of all contact parts."""
-        return np.concatenate([np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)])
+        """The elements of all contact parts, from degree 3 on without those at `singular_corners`."""
+        elements = np.concatenate(
+            [np.zeros(0, np.intp), *(self.mesh.part(part.name) for part in self.scene.contact_parts)]
+        )
+        if self.coefficient_errors is None:
+            return elements
+        return np.setdiff1d(elements, [k for corner in self.singular_corners for k in corner.elements])
 
     @cached_property
     def zone_ends(self) -> tuple[ZoneEnd, ...]:
@@ -148,6 +161,7 @@ class Solution(SolvedProblem, SolvedBody):
     def _parts(self) -> dict[str, Any]:
         return {
             **{name: getattr(self, name) for name in ("estimated_traction_error", "estimated_local_traction_error")},
+            "singular_corners": [corner.as_dict() for corner in self.singular_corners],
             "parts": [force.as_dict() for force in self.part_forces],
             "contacts": [contact.as_dict() for contact in self.contacts],
         }

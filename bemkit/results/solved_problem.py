@@ -200,7 +200,7 @@ class SolvedProblem(ShownInNotebooks):
         return self._measured_between(None if self.loading is None else self.loading.motion)
 
     @property
-    def unasked_warnings(self) -> tuple[str, ...] | Callable[[Any], tuple[str, ...]]:
+    def unasked_warnings(self) -> Any:
         """The warnings, or the function that will find them: what a solution that replaces this one takes over."""
         return WhenAsked.held(self, "warnings")
 
@@ -223,7 +223,8 @@ class SolvedProblem(ShownInNotebooks):
             ``converged``, ``certified``, ``warnings``, ``n_bodies`` (of an assembly),
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
-            of one body ``estimated_traction_error`` and ``estimated_local_traction_error`` (the same), ``parts``
+            of one body ``estimated_traction_error`` and ``estimated_local_traction_error`` (the same),
+            ``singular_corners`` (``x``, ``y`` [m], ``exponent``), ``parts``
             (resultants of the tractions on each part) and ``contacts`` (what each contact part feels), of an assembly
             ``contacts``, ``bodies`` and ``rigid``,
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,

@@ -61,7 +61,8 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
     of_all: list[Iterator[str]]
     titled: dict[str, SolvedBody]
     if isinstance(solution, Solution):
-        laws, of_all, titled = solution.scene.laws, [_error(solution), _turned(solution)], {"": solution}
+        laws, titled = solution.scene.laws, {"": solution}
+        of_all = [_error(solution), _turned(solution), _unbounded_tractions(solution)]
     else:
         laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
         of_all = [_large(solution.estimated_error, remedy)]
@@ -91,6 +92,21 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
         if is_periodic or not body.scene.discretisation.estimates_error:
             return "use more elements"
     return "use more elements, or give an accuracy"
+
+
+def _unbounded_tractions(solution: Solution) -> Iterator[str]:
+    """Doubt the largest contact tractions where estimates of their error leave a corner out."""
+    if solution.coefficient_errors is None:
+        return
+    lengths = solution.mesh.lengths
+    yield from _first(
+        [
+            f"Contact tractions have no bound at ({corner.x:.4g}, {corner.y:.4g}), where they grow like "
+            f"r^{corner.exponent - 1.0:.2g}: judge by forces, or round the corner. Their estimated error leaves out "
+            f"{amount(float(lengths[list(corner.elements)].sum()), 'length', solution.units, 2)} there."
+            for corner in solution.singular_corners
+        ]
+    )
 
 
 def _large(error: float | None, remedy: str) -> Iterator[str]:

@@ -55,6 +55,9 @@ have moved away from their nodes (0.01 to 0.1 on the scenes with a reference).""
 LAST_TIPS = 10.0
 """Length of the elements beside places that have moved, relative to a piece and in units of the accuracy, from which
 the last mesh asks for no shorter ones. Shorter ones only tell the places of the next mesh."""
+SPREADING = 0.6
+"""Factor per degree from which an error of contact tractions beside a singular corner has spread from there. In layers
+that a power of the distance runs through it is 0.36."""
 MOST_CUTS = 8
 """Places of change at which the mesh of all copies of a body is cut: each cut costs all of them layers."""
 MOST_LOOKS = 3
@@ -227,6 +230,8 @@ class _Errors:
             return None
         of_members = [CoefficientErrors.at_worst([own for own in of_copies if own is not None]) for of_copies in known]
         is_contact = [np.isin(np.arange(len(each.partition.sides)), each.contact_elements) for each in members]
+        if isinstance(solution, Solution):
+            of_members[0] = _moved_to_corners(solution, of_members[0], is_contact[0])
         return cls(
             elements=CoefficientErrors.joined(of_members),
             is_contact=np.concatenate(is_contact),
@@ -255,6 +260,27 @@ class _Errors:
             of_tractions = _excess_of(errors.traction[self.is_contact], (self.size * goal) ** 2)
             excess[self.is_contact] = np.maximum(excess[self.is_contact], of_tractions)
         return excess
+
+
+def _moved_to_corners(solution: Solution, errors: CoefficientErrors, is_contact: BoolArray) -> CoefficientErrors:
+    """Return errors in which an element at a singular corner has that of the contact tractions on the next one.
+
+    If the latter hardly falls with the degree, it comes from the corner: layers there help, and nothing else does. The
+    element at the corner then counts as one in contact.
+    """
+    moves = [
+        (tip, following)
+        for corner in solution.singular_corners
+        for tip, following in corner.beside(solution.mesh)
+        if is_contact[following] and errors.traction_decay[following] > SPREADING
+    ]
+    if not moves:
+        return errors
+    tips, others = np.array(moves).T
+    traction, decay = errors.traction.copy(), errors.traction_decay.copy()
+    traction[tips], traction[others], decay[tips] = traction[others], 0.0, 1.0
+    is_contact[tips] = True
+    return replace(errors, traction=traction, traction_decay=decay)
 
 
 def _degrees_of(member: Member, discretisation: Discretisation) -> IntArray:

@@ -1,0 +1,192 @@
+"""Corners at which contact tractions grow without bound, so that no element there has a small error of them.
+
+A block that slides on its whole side is the simplest case: towards its corners the pressure grows like a power of the
+distance that depends on the friction. The exponents are those of `bemkit.operators.wedge`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from bemkit.arrays import BoolArray, FloatArray
+from bemkit.contact.body import SlipHistory
+from bemkit.geometry.mesh import BoundaryMesh
+from bemkit.geometry.neighbours import break_nodes
+from bemkit.geometry.vectors import angles_between, norms
+from bemkit.operators.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
+from bemkit.results.contact_table import ContactTable
+from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
+from bemkit.solvers.active_sets import NodeStatus
+
+NEIGHBOURHOOD = 1e-3
+"""Share of the length of a part within which its elements belong to a corner."""
+_PARALLEL = 1e-6
+"""Component along the normal, or along the tangent, that is none."""
+_DIGITS = 6
+"""Of angles: round-off of short elements must not tell them apart."""
+_BEFORE, _AFTER = 0, 1
+"""The element that ends at a node, and the one that starts there."""
+
+
+@dataclass(frozen=True)
+class SingularCorner:
+    """A place where contact tractions grow like a power of the distance.
+
+    Parameters
+    ----------
+    x, y : float [m]
+    exponent : float
+        Tractions behave like ``r**(exponent - 1)``; see `bemkit.operators.wedge.leading_exponent`.
+    before, after : tuple of int
+        The elements in contact within `NEIGHBOURHOOD`, at least one, from the corner on: back along the boundary and
+        on along it. None where that side is not in contact.
+    """
+
+    x: float
+    y: float
+    exponent: float
+    before: tuple[int, ...]
+    after: tuple[int, ...]
+
+    @property
+    def elements(self) -> tuple[int, ...]:
+        """The elements of both sides."""
+        return self.before + self.after
+
+    def beside(self, mesh: BoundaryMesh) -> list[tuple[int, int]]:
+        """Return of each side in contact the element at the corner, and the first one that lies further away."""
+        sides = ((self.before, _BEFORE), (self.after, _AFTER))
+        return [(side[0], _next(mesh, side[-1], way)) for side, way in sides if side]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return place and exponent as JSON can hold them."""
+        return {"x": self.x, "y": self.y, "exponent": self.exponent}
+
+
+def singular_corners(body: SolvedBody, contact: ContactTable, motion: SlipHistory | None) -> tuple[SingularCorner, ...]:
+    """Return the corners and ends of contact parts at which contact tractions grow without bound.
+
+    Contact reaches them, and what is given on their two sides lets tractions grow; contact nodes beside them tell
+    whether they stick, and which way they slip. None on symmetry lines, where nothing is singular, and on half-planes.
+
+    Parameters
+    ----------
+    body : SolvedBody
+        Alone, before rigid obstacles.
+    contact : ContactTable
+    motion : SlipHistory or None
+        In a load history, for laws that depend on it.
+    """
+    mesh = body.mesh
+    if mesh.surface is not None:
+        return ()
+    given, (ends, starts) = _GivenSides(body, contact, motion), mesh.node_elements.T
+    chosen = break_nodes(mesh) & (given.may_touch[ends] | given.may_touch[starts]) & (ends != starts)
+    corners = []
+    for node in np.flatnonzero(chosen).tolist():
+        before, after = int(ends[node]), int(starts[node])
+        incoming, outgoing = given.at_end(before), given.at_start(after)
+        if incoming is None or outgoing is None:
+            continue
+        touches = [given.may_touch[k] and side.holds_normal for k, side in ((before, incoming), (after, outgoing))]
+        if not any(touches):
+            continue
+        angle = round(_angle(mesh, before, after), _DIGITS)
+        exponent = leading_exponent(angle, outgoing, incoming, body.scene.material.kappa)
+        if exponent is not None:
+            x, y = mesh.nodes[node].tolist()
+            near = [given.near(k, way) if touches[way] else () for k, way in ((before, _BEFORE), (after, _AFTER))]
+            corners.append(SingularCorner(x, y, exponent, *near))
+    return tuple(corners)
+
+
+def _next(mesh: BoundaryMesh, element: int, way: int) -> int:
+    """Return the element before or after another one."""
+    return int(mesh.node_elements[mesh.elements[element, way], way])
+
+
+def _angle(mesh: BoundaryMesh, before: int, after: int) -> float:
+    """Return the angle [rad] of the body between the end of one element and the start of the next."""
+    return float(np.pi - angles_between(_normal(mesh, before, 1.0), _normal(mesh, after, -1.0)))
+
+
+def _normal(mesh: BoundaryMesh, element: int, xi: float) -> FloatArray:
+    return np.asarray(mesh.normals_at(np.array([element]), np.array([xi]))[0, 0])
+
+
+class _GivenSides:
+    """What is given on the elements of a solved body at either of their ends."""
+
+    def __init__(self, body: SolvedBody, contact: ContactTable, motion: SlipHistory | None) -> None:
+        self._scene, self._mesh, self._table, self._motion = body.scene, body.mesh, contact, motion
+        self._part = np.full(body.mesh.n_elements, "", dtype=object)
+        for part in body.scene.parts:
+            self._part[body.mesh.part(part.name)] = part.name
+        self._conditions = {part.name: part.condition for part in body.scene.parts}
+        self.may_touch: BoolArray = np.isin(self._part, [part.name for part in body.scene.contact_parts])
+
+    def at_start(self, element: int) -> WedgeSide | None:
+        """Return what is given where an element starts; None if that is a displacement at an angle to it."""
+        return self._at(element, -1.0)
+
+    def at_end(self, element: int) -> WedgeSide | None:
+        """Return the same where it ends."""
+        return self._at(element, 1.0)
+
+    def near(self, element: int, way: int) -> tuple[int, ...]:
+        """Return the elements of its part from an element on that lie within `NEIGHBOURHOOD`, itself in any case."""
+        lengths, members = self._mesh.lengths, self._part == self._part[element]
+        room, found = NEIGHBOURHOOD * float(lengths[members].sum()) - float(lengths[element]), [element]
+        while True:
+            element = _next(self._mesh, element, way)
+            room -= float(lengths[element])
+            if room < 0.0 or not members[element]:
+                return tuple(found)
+            found.append(element)
+
+    def _at(self, element: int, xi: float) -> WedgeSide | None:
+        condition = self._conditions.get(self._part[element])
+        if isinstance(condition, Contact):
+            return self._in_contact(element)
+        if isinstance(condition, PrescribedDisplacement):
+            return _displaced(_normal(self._mesh, element, xi), np.array(condition.is_prescribed))
+        if isinstance(condition, Clamped):
+            return HELD
+        return ROLLER if isinstance(condition, Roller) else FREE
+
+    def _in_contact(self, element: int) -> WedgeSide:
+        """Return what the contact node next to the middle of an element does."""
+        own = np.flatnonzero(self._table.rows(self._part[element]))
+        row = int(own[np.argmin(norms(self._points[own] - self._mesh.centres[element]))])
+        status = NodeStatus(int(self._table.status[row]))
+        if status in (NodeStatus.SEPARATED, NodeStatus.STICK):
+            return FREE if status is NodeStatus.SEPARATED else HELD
+        direction = 1.0 if status is NodeStatus.SLIP_FORWARD else -1.0
+        return WedgeSide(holds_normal=True, friction=direction * float(self._friction[row]))
+
+    @cached_property
+    def _points(self) -> FloatArray:
+        return np.stack([self._table.x, self._table.y], axis=1)
+
+    @cached_property
+    def _friction(self) -> FloatArray:
+        """(n_contact,) array: how fast the friction bound rises with the pressure at each contact node."""
+        law = self._scene.law_at(self._table.part, self._points)
+        if self._motion is not None:
+            law = law.at_slip(self._motion)
+        return np.asarray(-law.bound_derivative(np.minimum(self._table.sigma_n, 0.0)))
+
+
+def _displaced(normal: FloatArray, is_given: BoolArray) -> WedgeSide | None:
+    """Return a side with one or both displacements along the axes given; None if one lies at an angle."""
+    if is_given.all():
+        return HELD
+    along_normal = float(np.abs(normal[is_given]).max())
+    if along_normal > 1.0 - _PARALLEL:
+        return ROLLER
+    return WedgeSide(holds_tangent=True) if along_normal < _PARALLEL else None
