@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from bemkit.results.solved_problem import SolvedProblem
 from bemkit.results.zone_ends import Side, ZoneEnd
 from bemkit.scene.assembly import Assembly, ContactPair, body_and_part
 from bemkit.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from bemkit.results.singular_corners import SingularCorner
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +144,8 @@ class AssemblySolution(SolvedProblem):
     def contact_elements(self, body: str) -> IntArray:
         """Return the elements of a body that may touch other bodies or obstacles.
 
-        Without those at edges that press into another side: pressures there have no bound.
+        Without those at edges that press into another side, and from degree 3 on those at `singular_corners`:
+        tractions there have no bound.
         """
         own = self.bodies[body]
         parts = dict.fromkeys([*self.assembly.listed_parts(body), *(part.name for part in own.scene.contact_parts)])
@@ -149,7 +153,30 @@ class AssemblySolution(SolvedProblem):
             side.elements_at(point) for one, two, point, _ in self._edges for side in (one, two) if side.body == body
         ]
         elements = np.concatenate([np.zeros(0, np.intp), *(own.mesh.part(part) for part in parts)])
+        if own.coefficient_errors is not None:
+            at_edges += [np.array(corner.elements) for corner in self.singular_corners[body]]
         return np.setdiff1d(elements, np.concatenate([np.zeros(0, np.intp), *at_edges]))
+
+    @cached_property
+    def singular_corners(self) -> dict[str, tuple[SingularCorner, ...]]:
+        """Where tractions before rigid obstacles grow without bound, by the name of the body.
+
+        See `bemkit.results.singular_corners`; of laws that depend on slip or time none are known.
+        """
+        return {name: self._corners(name) for name in self.bodies}
+
+    def _corners(self, name: str) -> tuple[SingularCorner, ...]:
+        from bemkit.results.singular_corners import singular_corners
+
+        body = self.bodies[name]
+        if any(law.needs_history for law in body.scene.laws.values()):
+            return ()
+        table = self.contact.renamed({f"{name}.{part.name}": part.name for part in body.scene.contact_parts})
+        return singular_corners(body, table, unknown=self.assembly.listed_parts(name))
+
+    def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
+        """Return the singular corners of one of the bodies."""
+        return next(self.singular_corners[name] for name, own in self.bodies.items() if own is body)
 
     def _sides_of(self, contact: str) -> list[Side]:
         """Return the sides of a contact of the table, of an obstacle the one that there is."""
@@ -191,7 +218,7 @@ class AssemblySolution(SolvedProblem):
         """Estimated error of the contact tractions of all bodies in L2, relative to them.
 
         From degree 3 on; None of other elements, and without such tractions. Elements at edges that press into another
-        side are left out, see `contact_elements`.
+        side, and at singular corners, are left out; see `contact_elements`.
         """
         size, known = self.contact_traction_size, [body.coefficient_errors for body in self.solved_bodies]
         if size == 0.0 or any(each is None for each in known):
@@ -217,6 +244,9 @@ class AssemblySolution(SolvedProblem):
     def _parts(self) -> dict[str, Any]:
         return {
             "estimated_traction_error": self.estimated_traction_error,
+            "singular_corners": [
+                {"body": name, **corner.as_dict()} for name, own in self.singular_corners.items() for corner in own
+            ],
             "contacts": [contact.as_dict() for contact in self.contacts],
             "bodies": {name: body.summary() for name, body in self.bodies.items()},
             "rigid": {name: body.as_dict() for name, body in self.rigid.items()},

@@ -106,6 +106,12 @@ class ContactTable:
         own[list(nodes)] = True
         return own
 
+    def renamed(self, names: Mapping[str, str]) -> ContactTable:
+        """Return the rows of some parts, by their names, under other names."""
+        own = [row for row, part in enumerate(self.part) if part in names]
+        columns: dict[str, Any] = {key: column[own] for key, column in self.columns().items()}
+        return ContactTable(part=tuple(names[self.part[row]] for row in own), **columns)
+
     @cached_property
     def is_joined(self) -> BoolArray:
         """(n_contact - 1,) bool: whether a node and the next one follow each other on one piece of one part."""

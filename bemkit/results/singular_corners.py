@@ -6,6 +6,7 @@ distance that depends on the friction. The exponents are those of `bemkit.operat
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,11 +21,10 @@ from bemkit.geometry.vectors import angles_between, norms
 from bemkit.operators.wedge import FREE, HELD, ROLLER, WedgeSide, leading_exponent
 from bemkit.results.contact_table import ContactTable
 from bemkit.results.solved_body import SolvedBody
+from bemkit.results.zone_ends import NEIGHBOURHOOD
 from bemkit.scene.conditions import Clamped, Contact, PrescribedDisplacement, Roller
 from bemkit.solvers.active_sets import NodeStatus
 
-NEIGHBOURHOOD = 1e-3
-"""Share of the length of a part within which its elements belong to a corner."""
 _PARALLEL = 1e-6
 """Component along the normal, or along the tangent, that is none."""
 _DIGITS = 6
@@ -68,7 +68,9 @@ class SingularCorner:
         return {"x": self.x, "y": self.y, "exponent": self.exponent}
 
 
-def singular_corners(body: SolvedBody, contact: ContactTable, motion: SlipHistory | None) -> tuple[SingularCorner, ...]:
+def singular_corners(
+    body: SolvedBody, contact: ContactTable, *, motion: SlipHistory | None = None, unknown: Collection[str] = ()
+) -> tuple[SingularCorner, ...]:
     """Return the corners and ends of contact parts at which contact tractions grow without bound.
 
     Contact reaches them, and what is given on their two sides lets tractions grow; contact nodes beside them tell
@@ -77,15 +79,17 @@ def singular_corners(body: SolvedBody, contact: ContactTable, motion: SlipHistor
     Parameters
     ----------
     body : SolvedBody
-        Alone, before rigid obstacles.
     contact : ContactTable
-    motion : SlipHistory or None
+        Of its contact with rigid obstacles.
+    motion : SlipHistory, optional
         In a load history, for laws that depend on it.
+    unknown : collection of str
+        Parts that touch other elastic bodies: corners beside them are not judged.
     """
     mesh = body.mesh
     if mesh.surface is not None:
         return ()
-    given, (ends, starts) = _GivenSides(body, contact, motion), mesh.node_elements.T
+    given, (ends, starts) = _GivenSides(body, contact, motion, unknown), mesh.node_elements.T
     chosen = break_nodes(mesh) & (given.may_touch[ends] | given.may_touch[starts]) & (ends != starts)
     corners = []
     for node in np.flatnonzero(chosen).tolist():
@@ -122,8 +126,11 @@ def _normal(mesh: BoundaryMesh, element: int, xi: float) -> FloatArray:
 class _GivenSides:
     """What is given on the elements of a solved body at either of their ends."""
 
-    def __init__(self, body: SolvedBody, contact: ContactTable, motion: SlipHistory | None) -> None:
+    def __init__(
+        self, body: SolvedBody, contact: ContactTable, motion: SlipHistory | None, unknown: Collection[str]
+    ) -> None:
         self._scene, self._mesh, self._table, self._motion = body.scene, body.mesh, contact, motion
+        self._unknown = unknown
         self._part = np.full(body.mesh.n_elements, "", dtype=object)
         for part in body.scene.parts:
             self._part[body.mesh.part(part.name)] = part.name
@@ -131,7 +138,7 @@ class _GivenSides:
         self.may_touch: BoolArray = np.isin(self._part, [part.name for part in body.scene.contact_parts])
 
     def at_start(self, element: int) -> WedgeSide | None:
-        """Return what is given where an element starts; None if that is a displacement at an angle to it."""
+        """Return what is given where an element starts; None if that is unknown, or displacements at an angle to it."""
         return self._at(element, -1.0)
 
     def at_end(self, element: int) -> WedgeSide | None:
@@ -150,6 +157,8 @@ class _GivenSides:
             found.append(element)
 
     def _at(self, element: int, xi: float) -> WedgeSide | None:
+        if self._part[element] in self._unknown:
+            return None
         condition = self._conditions.get(self._part[element])
         if isinstance(condition, Contact):
             return self._in_contact(element)

@@ -135,7 +135,11 @@ class Solution(SolvedProblem, SolvedBody):
         """Where contact tractions grow without bound; see `bemkit.results.singular_corners`."""
         from bemkit.results.singular_corners import singular_corners
 
-        return singular_corners(self, self.contact, None if self.loading is None else self.loading.motion)
+        return singular_corners(self, self.contact, motion=None if self.loading is None else self.loading.motion)
+
+    def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
+        """Return the singular corners of the one body."""
+        return self.singular_corners
 
     @property
     def contact_elements(self) -> IntArray:

@@ -28,6 +28,7 @@ from bemkit.solvers.base import Status, StepRecord
 if TYPE_CHECKING:
     from typing import Self
 
+    from bemkit.results.singular_corners import SingularCorner
     from bemkit.scene.assembly import Assembly
     from bemkit.scene.scene import Scene
 
@@ -92,6 +93,10 @@ class SolvedProblem(ShownInNotebooks):
 
     def _measured_between(self, motion: SlipHistory | None) -> dict[str, BetweenNodes]:
         """Return what is measured between the nodes of each contact, with their slip for laws that depend on it."""
+        raise NotImplementedError
+
+    def corners_of(self, body: SolvedBody) -> tuple[SingularCorner, ...]:
+        """Return the corners of one of the bodies at which contact tractions grow without bound."""
         raise NotImplementedError
 
     def _n_sides(self, contact: str) -> int:

@@ -61,8 +61,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
     of_all: list[Iterator[str]]
     titled: dict[str, SolvedBody]
     if isinstance(solution, Solution):
-        laws, titled = solution.scene.laws, {"": solution}
-        of_all = [_error(solution), _turned(solution), _unbounded_tractions(solution)]
+        laws, of_all, titled = solution.scene.laws, [_error(solution), _turned(solution)], {"": solution}
     else:
         laws = {pair.name: solution.assembly.law_of(pair) for pair in solution.assembly.contacts}
         of_all = [_large(solution.estimated_error, remedy)]
@@ -72,6 +71,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
         *of_all,
         (title + doubt for title, body in titled.items() for doubt in _coarse_curves(body.mesh)),
         (title + doubt for title, body in titled.items() for doubt in _large_strains(body)),
+        (title + doubt for title, body in titled.items() for doubt in _unbounded_tractions(solution, body)),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
@@ -94,19 +94,19 @@ def _remedy(bodies: Iterable[SolvedBody]) -> str:
     return "use more elements, or give an accuracy"
 
 
-def _unbounded_tractions(solution: Solution) -> Iterator[str]:
+def _unbounded_tractions(solution: Solution | AssemblySolution, body: SolvedBody) -> list[str]:
     """Doubt the largest contact tractions where estimates of their error leave a corner out."""
-    if solution.coefficient_errors is None:
-        return
-    lengths = solution.mesh.lengths
-    yield from _first(
-        [
+    if body.coefficient_errors is None:
+        return []
+    doubts = []
+    for corner in solution.corners_of(body):
+        length = amount(float(body.mesh.lengths[list(corner.elements)].sum()), "length", solution.units, 2)
+        doubts.append(
             f"Contact tractions have no bound at ({corner.x:.4g}, {corner.y:.4g}), where they grow like "
             f"r^{corner.exponent - 1.0:.2g}: judge by forces, or round the corner. Their estimated error leaves out "
-            f"{amount(float(lengths[list(corner.elements)].sum()), 'length', solution.units, 2)} there."
-            for corner in solution.singular_corners
-        ]
-    )
+            f"{length} there."
+        )
+    return _first(doubts)
 
 
 def _large(error: float | None, remedy: str) -> Iterator[str]:

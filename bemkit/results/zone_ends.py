@@ -18,6 +18,8 @@ from bemkit.solvers.active_sets import NodeStatus
 
 LYING_ON = 1e-2
 """Distance, relative to the shorter of two sides, up to which one lies on the other."""
+NEIGHBOURHOOD = 1e-3
+"""Share of the length of a part within which its elements belong to a place where tractions have no bound."""
 LYING_AT = 1e-9
 """Distance, relative to a side, within which an element ends at a point."""
 _MOST_STEPS = 20
@@ -99,11 +101,12 @@ class Side:
                 yield point, place
 
     def elements_at(self, point: FloatArray) -> IntArray:
-        """Return the element nearest to a point, or those that end there."""
+        """Return the element nearest to a point, or those that end there, and all within `NEIGHBOURHOOD`."""
         elements = self.mesh.part(self.part)
-        ends = (self.mesh.start[elements], self.mesh.end[elements])
-        is_end = np.min([norms(end - point) for end in ends], axis=0) <= LYING_AT * self.length
-        return np.union1d(elements[is_end], [self.near(point).element])
+        distances = [norms(end[elements] - point) for end in (self.mesh.start, self.mesh.end)]
+        is_end = np.min(distances, axis=0) <= LYING_AT * self.length
+        is_close = np.max(distances, axis=0) <= NEIGHBOURHOOD * self.length
+        return np.union1d(elements[is_end | is_close], [self.near(point).element])
 
 
 def _nearest(mesh: BoundaryMesh, elements: IntArray, point: FloatArray) -> tuple[int, float]:

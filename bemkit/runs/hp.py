@@ -230,10 +230,9 @@ class _Errors:
             return None
         of_members = [CoefficientErrors.at_worst([own for own in of_copies if own is not None]) for of_copies in known]
         is_contact = [np.isin(np.arange(len(each.partition.sides)), each.contact_elements) for each in members]
-        if isinstance(solution, Solution):
-            of_members[0] = _moved_to_corners(solution, of_members[0], is_contact[0])
+        moved = [_moved_to_corners(solution, *each) for each in zip(members, of_members, is_contact, strict=True)]
         return cls(
-            elements=CoefficientErrors.joined(of_members),
+            elements=CoefficientErrors.joined(moved),
             is_contact=np.concatenate(is_contact),
             degrees=np.concatenate([_degrees_of(each, each.bodies[0].scene.discretisation) for each in members]),
             ends=np.cumsum([own.size for own in is_contact])[:-1],
@@ -262,7 +261,9 @@ class _Errors:
         return excess
 
 
-def _moved_to_corners(solution: Solution, errors: CoefficientErrors, is_contact: BoolArray) -> CoefficientErrors:
+def _moved_to_corners(
+    solution: AnySolution, member: Member, errors: CoefficientErrors, is_contact: BoolArray
+) -> CoefficientErrors:
     """Return errors in which an element at a singular corner has that of the contact tractions on the next one.
 
     If the latter hardly falls with the degree, it comes from the corner: layers there help, and nothing else does. The
@@ -270,8 +271,9 @@ def _moved_to_corners(solution: Solution, errors: CoefficientErrors, is_contact:
     """
     moves = [
         (tip, following)
-        for corner in solution.singular_corners
-        for tip, following in corner.beside(solution.mesh)
+        for body in member.bodies
+        for corner in solution.corners_of(body)
+        for tip, following in corner.beside(body.mesh)
         if is_contact[following] and errors.traction_decay[following] > SPREADING
     ]
     if not moves:

@@ -185,3 +185,62 @@ def test_short_elements_at_a_corner_belong_to_it_and_long_ones_do_not() -> None:
     coarse = bk.run(BLOCK)
     assert [len(corner.elements) for corner in coarse.singular_corners] == [1, 1]
     assert all(coarse.mesh.lengths[list(corner.elements)].sum() > 1e-2 for corner in coarse.singular_corners)
+
+
+def stack() -> bk.Assembly:
+    """A narrow block on a wide one, pressed and pushed: edges in the middle, corners on the floor."""
+    lower = bk.Body(
+        name="lower",
+        shape=bk.Rectangle(1.0, 0.5),
+        material=bk.Material(1.0, 0.3),
+        parts=(BLOCK.parts[0], bk.Part("table", bk.Free(), sides=("top",))),
+    )
+    load = bk.Part("load", bk.Traction(x=2e-3, y=-1e-2), sides=("top",))
+    foot = bk.Part("foot", bk.Free(), sides=("bottom",))
+    shape = bk.Rectangle(0.4, 0.4, corner=(0.3, 0.5))
+    upper = bk.Body(name="upper", shape=shape, material=bk.Material(1.0, 0.3), parts=(foot, load))
+    pair = bk.ContactPair(sides=("upper.foot", "lower.table"))
+    return bk.Assembly(title="stack", bodies=(lower, upper), contacts=(pair,), law=bk.Coulomb(0.3))
+
+
+@lru_cache
+def stacked(accuracy: float) -> bk.AssemblySolution:
+    mesh = bk.MeshOptions(accuracy=accuracy)
+    solution: bk.AssemblySolution = bk.run(replace(stack(), discretisation=bk.HpGalerkin(), mesh=mesh))
+    return solution
+
+
+def test_bodies_of_an_assembly_leave_out_corners_and_edges() -> None:
+    """Corners on the rigid floor are known by their exponents; of edges that press into another body none is asked."""
+    solution = stacked(1e-3)
+    assert solution.is_converged
+    assert solution.n_elements <= 150
+    corners = solution.singular_corners
+    assert [(corner.x, round(corner.exponent, 6)) for corner in corners["lower"]] == [(1.0, SLIDES)]  # the left lifts
+    assert corners["upper"] == ()
+    for name, body in solution.bodies.items():
+        near = {k for corner in corners[name] for k in corner.elements}
+        parts = np.concatenate(
+            [body.mesh.part(part) for part in {"lower": ("floor", "table"), "upper": ("foot",)}[name]]
+        )
+        left_out = set(parts.tolist()) - set(solution.contact_elements(name).tolist())
+        assert near < left_out
+        x = body.mesh.centres[sorted(left_out - near), 0]
+        assert np.abs(np.abs(x - 0.5) - 0.2).max() < 0.01
+    (told,) = [text for text in solution.warnings if "have no bound" in text]
+    assert told.startswith("Body 'lower': Contact tractions have no bound at (1, 0)")
+    assert [corner["body"] for corner in solution.summary()["singular_corners"]] == ["lower"]
+
+
+@pytest.mark.slow
+def test_bodies_of_an_assembly_reach_four_digits() -> None:
+    solution = stacked(1e-4)
+    assert solution.is_converged
+    assert solution.n_elements <= 200
+
+
+def test_corners_of_bodies_whose_law_depends_on_slip_are_not_known() -> None:
+    law, mesh = bk.SlipWeakening(0.3, 0.2, 1.0), bk.MeshOptions(elements=12)
+    solution = bk.run(replace(stack(), law=law, mesh=mesh, steps=(bk.Step(time=1.0),)))
+    assert solution.is_converged
+    assert solution.singular_corners == {"lower": (), "upper": ()}

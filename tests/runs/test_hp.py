@@ -514,3 +514,14 @@ def test_degrees_of_bodies_do_not_rise_in_histories() -> None:
     history = dataclasses.replace(two_blocks(1e-3, bk.Frictionless(), bk.HpGalerkin()), load_factors=(0.5, 1.0))
     with pytest.raises(InputError, match="discretisation is 'hp', and there are 2 load steps"):
         bk.run(history)
+
+
+def test_errors_that_spread_from_a_corner_lead_to_layers_there() -> None:
+    """Beside a corner where pressures have no bound, no degree and no halves make an error small."""
+    last = risen("wedged-leg", 1e-5)[-1]
+    assert last.is_converged
+    assert last.n_elements <= 120
+    (tip, following), *_ = next(corner for corner in last.singular_corners if corner.x == 0.0).beside(last.mesh)
+    assert last.mesh.lengths[tip] <= 2e-4 * last.part_length("foot")
+    assert last.coefficient_errors is not None
+    assert last.coefficient_errors.traction_decay[following] < 0.6
