@@ -74,6 +74,11 @@ _FREE_SHARE = 1e-16
 """Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
 
 
+_ROUND_OFF = 1e-13
+"""Differences of displacements, relative to the largest one, that may be round-off: up to 2e-14 is measured of bodies
+that only move as a whole."""
+
+
 class SolvedBody:
     """What one body alone and one of several have in common.
 
@@ -175,3 +180,9 @@ class SolvedBody:
         """What squared errors in the energy norm are measured by [J/m]: a(u, u), unless heat expands a free body."""
         held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
         return 2.0 * max(self.energy, held)
+
+    @property
+    def energy_of_round_off(self) -> float:
+        """Elastic energy [J/m] that round-off may leave of a body that only moves as a whole."""
+        moved = float(np.abs(self.boundary.displacement).max(initial=0.0))
+        return self.scene.material.plane_modulus * (_ROUND_OFF * moved) ** 2
