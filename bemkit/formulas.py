@@ -185,7 +185,8 @@ def check_field(value: object, name: str) -> None:
         if not math.isfinite(value):
             raise InputError(f"{name} = {value} is not finite; give a finite number")
     elif not callable(value):
-        raise InputError(f"{name} = {value!r} is not a number; give a number, a formula in x and y, or a function")
+        example = value if isinstance(value, str) else "2 * x"
+        raise InputError(f"{name} = {value!r} is not a number; give a number, Expression({example!r}) or a function")
 
 
 def closest(word: str, names: "tuple[str, ...] | list[str]") -> str:

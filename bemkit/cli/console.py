@@ -248,6 +248,9 @@ def _history_rows(solution: Solution | AssemblySolution) -> Iterator[tuple[str, 
         yield "load history", f"{len(loading.steps)} of {loading.n_steps} steps, up to t = {loading.times[-1]:.6g}"
         yield "external work", f"{_amount(work.external_work, 'energy', units)}  in all steps"
         yield "friction took", f"{_amount(work.dissipation, 'energy', units)}  in all steps"
+        if loading.has_coarse_increments:
+            left = _amount(work.increment_work, "energy", units)
+            yield "left over", f"{left}  by the size of increments: smaller ones leave less"
 
 
 def _status(solution: Solution | AssemblySolution) -> Text:

@@ -35,7 +35,7 @@ def outline(
     corner_angle: float | None,
     tolerance: float | None,
 ) -> None:
-    """Show the sides of the body in FILE: a mesh, a drawing (.dxf, .svg), or a scene (.toml).
+    """Show the sides of the body in FILE: a mesh, a drawing (.dxf, .svg), or a scene (.toml, or a shipped one).
 
     With -o write a scene to start from: the body pressed onto a rigid floor, ready for bemkit run.
     """
@@ -44,10 +44,10 @@ def outline(
         from bemkit.geometry.files.shape_file import DrawingFile, MeshFile
         from bemkit.pictures.outline import draw_outline
         from bemkit.scene.starting_scene import START, starting_scene
-        from bemkit.scene.toml import load_single_body
+        from bemkit.scene.toml import load_single_body, shipped_files
 
         shape: Shape
-        if Path(file).suffix.lower() == ".toml":
+        if Path(file).suffix.lower() == ".toml" or (file in shipped_files() and not Path(file).exists()):
             if output or scale or only or corner_angle is not None or tolerance:
                 raise click.UsageError("a scene file says how its shape is read: give no other option than --plot")
             scene = load_single_body(file)

@@ -90,11 +90,11 @@ def _outputs(
     shown: tuple[str, ...],
 ) -> Outputs[Sweep]:
     """Return where the table goes, with figures of some columns over the first key or another column."""
-    from bemkit.studies.sweep.records import RESULTS, UNITS
+    from bemkit.studies.sweep.records import QUANTITIES, RESULTS
     from bemkit.studies.sweep.report import draw_all, figure_name
     from bemkit.studies.sweep.table import Sweep
 
-    abscissa, names = over or keys[0], [*keys, *UNITS]
+    abscissa, names = over or keys[0], [*keys, *QUANTITIES]
     for name in (abscissa, *shown):
         if name not in names:
             raise click.UsageError(f"{name!r} is no column of numbers: give one of {', '.join(names)}")

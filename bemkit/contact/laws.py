@@ -36,6 +36,8 @@ def checked_coefficient(name: str, value: Coefficient, *, may_be_infinite: bool 
     if callable(value):
         check_field(value, name)
         return value
+    if isinstance(value, str):
+        check_field(value, name)
     array = np.array(value, dtype=float)
     if array.ndim > 1:
         raise InputError(f"{name} has the shape {array.shape}; give one number or one number per contact node")

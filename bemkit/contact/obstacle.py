@@ -80,12 +80,27 @@ def measure_contact(obstacle: Obstacle, points: FloatArray, normals: FloatArray)
     gap : (n,) array [m]
         Infinite where the body's normal does not point towards the obstacle.
     direction : (n, 2) array [-]
+
+    Raises
+    ------
+    InputError
+        If an obstacle of one's own returns arrays of other shapes; the message names the obstacle.
     """
-    gap = obstacle.gap(points, normals)
+    gap = _measured(obstacle, "gap", obstacle.gap(points, normals), points.shape[:1])
     if not isinstance(obstacle, DirectedObstacle):
         return gap, normals
-    direction = obstacle.approach(points, normals)
+    direction = _measured(obstacle, "approach", obstacle.approach(points, normals), points.shape)
     return np.where(np.sum(direction * normals, axis=1) > FACING_TOLERANCE, gap, np.inf), direction
+
+
+def _measured(obstacle: Obstacle, method: str, values: object, shape: tuple[int, ...]) -> FloatArray:
+    found = np.asarray(values, dtype=float)
+    if found.shape != shape:
+        raise InputError(
+            f"{type(obstacle).__name__}.{method} returned an array of the shape {found.shape}: "
+            f"return the shape {shape} for {shape[0]} points"
+        )
+    return found
 
 
 @dataclass(frozen=True)

@@ -155,6 +155,13 @@ class Model:
         units = self.units
         return acting * (units.stress * units.length), displacement.ravel() * units.displacement
 
+    def reactions(self, state: ContactState) -> FloatArray:
+        """Return the forces (n_nodes, 2) [N/m] of supports on all nodes, zero where nothing holds the body."""
+        _, force = self.body.recover(state)
+        total = force - self.nodes.forces(state.traction, len(force)) - self.prepared.force
+        held = supporting_forces(self.prepared.conditions, np.zeros_like(force), total)
+        return held.reshape(-1, 2) * (self.units.stress * self.units.length)
+
     @property
     def has_body_forces(self) -> bool:
         """Whether something acts inside the body."""

@@ -32,7 +32,7 @@ class Material:
     Raises
     ------
     ValueError
-        If a modulus is not positive and finite or Poisson's ratio lies outside (-1, 1/2].
+        If a modulus is not positive and finite, Poisson's ratio lies outside (-1, 1/2], or the plane state is a word.
 
     Notes
     -----
@@ -51,6 +51,8 @@ class Material:
         if not -1.0 < self.poisson_ratio <= 0.5:
             msg = f"poisson_ratio is {self.poisson_ratio}: it must lie in (-1, 0.5]"
             raise InputError(msg)
+        if not isinstance(self.plane, Plane):
+            raise InputError(f"plane is {self.plane!r}: give Plane.STRAIN or Plane.STRESS")
 
     @property
     def shear_modulus(self) -> float:

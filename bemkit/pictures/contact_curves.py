@@ -83,7 +83,10 @@ def draw_contact_traction(
 def draw_contact_clearance(
     solution: Result, part: str, axes: Axes | None = None, *, units: UnitNames | None = None
 ) -> Axes:
-    """Draw contact pressure and clearance along one contact part; see `draw_contact_displacement`."""
+    """Draw contact pressure and clearance along one contact part; see `draw_contact_displacement`.
+
+    Peaks of the pressure are cut as those of tractions in `draw_contact_traction`.
+    """
     axes, units = contact_axes(axes, solution, part, units, "Contact pressure and clearance")
     contact, chosen = solution.contact, solution.contact.rows(part)
     curve = traction_curve(solution, part)
@@ -96,6 +99,8 @@ def draw_contact_clearance(
     right.set_ylabel(with_unit("clearance", "length", units))
     for each, scale in ((axes, traction_scale(solution)), (right, displacement_scale(solution))):
         ignore_round_off(each, scale)
+    cut_peaks(axes, curve.s, (-curve.normal,), units)
+    for each in (axes, right):
         bottom, top = each.get_ylim()
         each.set_ylim(bottom, top + 0.15 * (top - bottom))  # room for the legend
     axes.legend(handles=[*pressure, *opening], frameon=False, loc="upper center", ncols=2)

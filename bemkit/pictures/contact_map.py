@@ -18,8 +18,8 @@ from bemkit.results.contact_table import ContactTable
 from bemkit.results.drawing import VERMILION, Axes, legend_below
 from bemkit.scene.unit_names import UnitNames, amount
 
-_TOOTH, _SHARE = 0.1, 1.0 / 3.0
-"""Length of the longest tooth: share of the picture, or of a body where there are many."""
+_TOOTH, _SHARE, _SHORTEST = 0.1, 1.0 / 3.0, 0.03
+"""Length of the longest tooth: share of the picture, or of the smallest body, down to another share of the picture."""
 SHORT = 0.4
 """Size of a zone of contact, relative to the bodies, below which it is worth a picture of its own."""
 _LONGEST, _LEAST = 0.25, 0.01
@@ -64,8 +64,8 @@ def draw_contact_map(solution: Result, axes: Axes | None = None, *, units: UnitN
 
 
 def _longest_tooth(scene: Shown) -> float:
-    diameters = [body.mesh.diameter for body in scene.bodies if not body.mesh.is_exterior]
-    return float(min(_TOOTH * scene.size, _SHARE * np.median(diameters or [np.inf])))
+    smallest = min((body.mesh.diameter for body in scene.bodies if not body.mesh.is_exterior), default=np.inf)
+    return float(np.clip(_SHARE * smallest, _SHORTEST * scene.size, _TOOTH * scene.size))
 
 
 def is_short(solution: Result) -> bool:

@@ -43,10 +43,9 @@ def draw_friction_loop(solution: Result, axes: Axes | None = None, *, units: Uni
     places = np.array([0.0, *(step.mean_displacement for step in loading.steps)])
     forces = np.array([0.0, *(step.force_tangential for step in loading.steps)])
     axes.plot(places, forces, color=BLUE, linewidth=1.4, marker="o", markersize=3.0)
-    axes.plot(places[:1], forces[:1], color=GREY, marker="o", markersize=6.0)
-    axes.plot(places[-1:], forces[-1:], color=VERMILION, marker="o", markersize=6.0)
-    axes.annotate("begin", (places[0], forces[0]), textcoords="offset points", xytext=(8, 6), color=GREY)
-    axes.annotate("end", (places[-1], forces[-1]), textcoords="offset points", xytext=(-34, 8), color=VERMILION)
+    axes.plot(places[:1], forces[:1], color=GREY, marker="o", markersize=6.0, linestyle="", label="begin")
+    axes.plot(places[-1:], forces[-1:], color=VERMILION, marker="o", markersize=6.0, linestyle="", label="end")
+    axes.legend(frameon=False)
     axes.set_xlabel(with_unit("mean tangential displacement", "length", units))
     axes.set_ylabel(with_unit("friction force on the body", "force", units))
     axes.set_title(f"Friction over displacement\n{solution.title}", parse_math=False, fontsize=11)
@@ -66,6 +65,7 @@ def has_friction(loading: LoadHistory) -> bool:
 def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | None = None) -> Axes:
     """Draw over time what loads have put in, what friction has taken, and the elastic energy.
 
+    What the size of the increments leaves is drawn where it matters: the external work is the sum of the others.
     See `draw_friction_loop`.
     """
     loading, units = history_of(solution), units or solution.units
@@ -77,6 +77,9 @@ def draw_work(solution: Result, axes: Axes | None = None, *, units: UnitNames | 
     axes.plot(times, external, color=BLUE, label="external work")
     axes.plot(times, taken, color=VERMILION, linestyle="--", label="taken by friction")
     axes.plot(times, energy, color=GREEN, linestyle="-.", label="elastic energy")
+    if loading.has_coarse_increments:
+        left = np.cumsum([0.0, *(step.work.increment_work for step in loading.steps)])
+        axes.plot(times, left, color=GREY, linestyle=":", label="left by increments")
     axes.set_xlabel("time $t$")
     axes.set_ylabel(with_unit("work and energy", "energy", units))
     axes.set_title(f"Work and energy\n{solution.title}", parse_math=False, fontsize=11)

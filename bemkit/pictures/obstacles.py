@@ -22,7 +22,6 @@ from bemkit.scene.conditions import Contact
 
 _EDGE, _HATCH = "#555555", "#888888"
 _FILLED: dict[str, Any] = {"facecolor": "#EDEDED", "hatch": "////", "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
-_EMPTY: dict[str, Any] = {"fill": False, "edgecolor": _EDGE, "linewidth": 1.0, "zorder": 0}
 _BEFORE: dict[str, Any] = {"fill": False, "edgecolor": GREY, "linewidth": 1.0, "linestyle": "--", "zorder": 0}
 _POINTS_OF_CIRCLE, _POINTS_OF_SPAN, _POINTS_OF_GRID, _POINTS_OF_ELEMENT = 181, 12, 301, 5
 _BAND = 0.04
@@ -43,7 +42,7 @@ def draw_obstacles(axes: Axes, shown: Shown) -> None:
             obstacle, label = part.condition.obstacle, None if drawn else "obstacle"
             if loops := outline_of(obstacle, frame):
                 if not any(obstacle is other for other in drawn):
-                    _draw(axes, loops, _EMPTY if _is_hollow(obstacle) else _FILLED, label)
+                    _draw(axes, _with_outside(loops, obstacle, frame), _FILLED, label)
                 drawn.append(obstacle)
             elif bands := facing_bands(obstacle, body.mesh, elements, _BAND * shown.size):
                 _draw(axes, bands, _FILLED | {"edgecolor": _HATCH, "linewidth": 0.0}, label)
@@ -90,7 +89,8 @@ def draw_rigid_bodies(axes: Axes, shown: Shown, factor: float) -> None:
         motion = factor * np.array([result.x, result.y, result.turn])
         moved = [loop + body.motions_at(loop) @ motion for loop in loops]
         _draw(axes, loops, _BEFORE, None)
-        _draw(axes, moved, _EMPTY if _is_hollow(body.obstacle) else _FILLED, None if is_labelled else "rigid body")
+        filled = _with_outside(moved, body.obstacle, widest)
+        _draw(axes, filled, _FILLED, None if is_labelled else "rigid body")
         is_labelled = True
         if not _is_endless(body.obstacle):
             places = np.clip(np.concatenate([*loops, *moved]), widest[:, 0], widest[:, 1])
@@ -156,9 +156,25 @@ def _where_negative(distance: Any, frame: FloatArray) -> list[FloatArray]:
 def _is_hollow(obstacle: object) -> bool:
     """Whether an obstacle fills the outside of its outline."""
     if isinstance(obstacle, SplineObstacle) and obstacle.is_closed:
-        x, y = obstacle.curve().T
-        return bool(np.sum(x[:-1] * np.diff(y) - y[:-1] * np.diff(x)) < 0.0)
+        return not _is_anticlockwise(obstacle.curve())
     return isinstance(obstacle, Cavity)
+
+
+def _with_outside(loops: list[FloatArray], obstacle: object, frame: FloatArray) -> list[FloatArray]:
+    """Return the loops of an obstacle, of one that fills their outside with a rectangle far beyond a frame.
+
+    It runs against them, so that they are holes in it.
+    """
+    if not _is_hollow(obstacle):
+        return loops
+    reach = 4.0 * float(np.hypot(*np.ptp(frame, axis=1)))
+    outside = frame.mean(axis=1) + reach * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return [*loops, outside[::-1] if _is_anticlockwise(loops[0]) else outside]
+
+
+def _is_anticlockwise(loop: FloatArray) -> bool:
+    x, y = np.vstack([loop, loop[:1]]).T
+    return bool(np.sum(x[:-1] * np.diff(y) - y[:-1] * np.diff(x)) > 0.0)
 
 
 def _is_endless(obstacle: object) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from bemkit.atomic_files import check_target
+from bemkit.atomic_files import OutputFileError, check_target
 from bemkit.pictures.shown import Result
 from bemkit.report.html import Element, element, facts, render
 from bemkit.report.pictures import has_pictures, picture_elements
@@ -86,6 +86,8 @@ def save_report(path: str | Path, result: Result) -> Path:
 
 def check_report(path: str | Path) -> Path:
     """Find out whether a report can be written, and return its path; OutputFileError if not."""
+    if Path(path).suffix.lower() not in (".html", ".htm"):
+        raise OutputFileError(f"{path}: a report is a page of HTML: give a name that ends in .html")
     return check_target(Path(path), "report", lambda existing: begins_with(existing, _START))
 
 

@@ -54,8 +54,8 @@ def ignore_round_off(axes: Axes, scale: float, axis: Literal["x", "y"] = "y") ->
     axis : {"x", "y"}
         Along which the values stand.
     """
-    low, high = axes.get_ylim() if axis == "y" else axes.get_xlim()
-    if high - low < _NOISE * scale:
+    low, high = axes.dataLim.intervaly if axis == "y" else axes.dataLim.intervalx
+    if high - low < _NOISE * scale:  # of the values: axes of a single one are widened by matplotlib
         middle = 0.5 * (low + high)
         flat = middle - _FLAT * scale, middle + _FLAT * scale
         _ = axes.set_ylim(flat) if axis == "y" else axes.set_xlim(flat)

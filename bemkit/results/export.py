@@ -104,7 +104,7 @@ def boundary_arrays(solution: Solution | AssemblySolution) -> dict[str, FloatArr
     for prefix, body in bodies_of(solution).items():
         fields = body.boundary
         arrays |= {f"{prefix}nodes": body.mesh.nodes, f"{prefix}elements": body.mesh.elements}
-        for name in ("points", "displacement", "centres", "traction", "traction_dofs"):
+        for name in ("points", "displacement", "centres", "traction", "traction_dofs", "reaction"):
             arrays[prefix + name] = getattr(fields, name)
     return arrays
 

@@ -35,6 +35,7 @@ MEANINGS: Mapping[str, Mapping[str, tuple[str, str]]] = MappingProxyType(
                 "stress",
                 "traction along x and y at the local nodes of the elements, one after the other",
             ),
+            "reaction": ("force", "force of supports along x and y at the points"),
         },
         "contact": {
             **_POINTS,

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     import h5py
 
 _Row = TypeVar("_Row", ContactForce, RigidResult)
-_FIELDS = ("displacement", "traction", "traction_dofs")
+_FIELDS = ("displacement", "traction", "traction_dofs", "reaction")
 TRANSITION_COLUMNS: Mapping[str, Sequence[str]] = MappingProxyType(
     {"texts": ("part", "from", "to"), "floats": ("x", "y", "s")}
 )
@@ -216,10 +216,10 @@ def _read_transitions(reader: Reader, n_steps: int) -> list[tuple[Transition, ..
 
 def _read_body(reader: Reader, place: str, body: SolvedBody, n_steps: int) -> list[tuple[BoundaryFields, float]]:
     energies = reader.floats(f"{place}/energy")
-    columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS}
+    columns = {name: reader.floats(f"{place}/{name}") for name in _FIELDS if reader.has(f"{place}/{name}")}
     if any(len(column) != n_steps for column in (energies, *columns.values())):
         raise InputError(f"the fields of {n_steps} steps differ in number")
-    shaped = {name: column.reshape(-1, *getattr(body.boundary, name).shape) for name, column in columns.items()}
+    shaped = {name: column.reshape(n_steps, *getattr(body.boundary, name).shape) for name, column in columns.items()}
     return [
         (replace(body.boundary, **{name: column[k].copy() for name, column in shaped.items()}), float(energies[k]))
         for k in range(n_steps)

@@ -28,6 +28,10 @@ class StepEnd(Protocol):
         """What every contact node carries."""
 
 
+_COARSE = 0.01
+"""Share of the external work that the size of increments may leave without a word."""
+
+
 @dataclass(frozen=True)
 class StepWork:
     """Work in one step, or in several.
@@ -184,6 +188,12 @@ class LoadHistory:
     def total(self, first: int = 0, last: int | None = None) -> StepWork:
         """Return the work in the steps from `first` (counted from 0) up to, not including, `last`."""
         return sum((step.work for step in self.steps[first:last]), StepWork())
+
+    @property
+    def has_coarse_increments(self) -> bool:
+        """Whether the size of the increments leaves more than a hundredth of the external work unexplained."""
+        work = self.total()
+        return abs(work.increment_work) > _COARSE * abs(work.external_work)
 
     def where(self) -> str:
         """Say in words how far the history has come."""

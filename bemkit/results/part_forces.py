@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from bemkit.arrays import FloatArray, IntArray
+from bemkit.geometry.local_values import summed_at_dofs
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.quadrature import gauss_legendre
 from bemkit.geometry.spaces import BoundarySpace
@@ -17,7 +18,7 @@ from bemkit.solvers.active_sets import NodeStatus
 
 @dataclass(frozen=True)
 class PartForce:
-    """The resultant of the tractions on a part of the boundary.
+    """The resultant of what acts on a part of the boundary: of tractions, or of the reactions of a support.
 
     Parameters
     ----------
@@ -107,6 +108,49 @@ def part_force(
     force = measured.sum(axis=(0, 1))
     moment = float(np.sum(x * measured[:, :, 1] - y * measured[:, :, 0]))
     return PartForce(name, float(force[0]), float(force[1]), moment)
+
+
+def support_forces(
+    supports: Sequence[str],
+    moved: BoundarySpace,
+    loaded: BoundarySpace,
+    traction: FloatArray,
+    points: FloatArray,
+    reaction: FloatArray,
+) -> dict[str, PartForce]:
+    """Sum up the reactions of supports at the nodes of each part.
+
+    The reaction at a node of several supports is divided as their tractions divide it; what these leave, equally.
+
+    Parameters
+    ----------
+    supports : sequence of str
+        Parts of the mesh.
+    moved, loaded : BoundarySpace
+        Of displacements and tractions.
+    traction : (n_elements, n_local, 2) array [Pa]
+    points : (n_points, 2) array [m]
+        Of the displacements.
+    reaction : (n_points, 2) array [N/m]
+        There, of all supports.
+    """
+    mesh, shares, counts = moved.mesh, {}, np.zeros(len(reaction), int)
+    xi, weights = gauss_legendre(moved.degree + loaded.degree + 4)
+    for name in supports:
+        elements = mesh.part(name)
+        values = np.einsum("lq,elc->eqc", loaded.basis(xi), traction[elements])
+        measured = values * (mesh.jacobian(elements, xi) * weights)[:, :, None]
+        shares[name] = summed_at_dofs(moved, np.einsum("pq,eqc->epc", moved.basis(xi), measured), elements)
+        counts[np.unique(moved.element_dofs[elements])] += 1
+    left = reaction - sum(shares.values(), np.zeros_like(reaction))
+    left /= np.maximum(counts, 1)[:, None]
+    forces = {}
+    for name, share in shares.items():
+        nodes = np.unique(moved.element_dofs[mesh.part(name)])
+        (x, y), (force_x, force_y) = points[nodes].T, (share + left)[nodes].T
+        moment = float(x @ force_y - y @ force_x)
+        forces[name] = PartForce(name, float(force_x.sum()), float(force_y.sum()), moment)
+    return forces
 
 
 def nodal_resultants(table: ContactTable, frame: FloatArray, acting_at: FloatArray) -> tuple[PartForce, ...]:

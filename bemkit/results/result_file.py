@@ -10,7 +10,7 @@ stranger runs no code. The layout, version 2:
     /mesh            nodes, elements, part_elements, table parts; attribute is_exterior,
                      with a symmetry also symmetry_x, symmetry_y;
                      with curved elements also element_curve and element_span
-    /boundary        points, displacement, centres, traction, traction_dofs
+    /boundary        points, displacement, centres, traction, traction_dofs, reaction
     /parts, /contacts    tables: resultants of the tractions on each part, what each contact part feels; for other
                      programs, since they follow from the fields
     /contact, /transitions, /history    tables: one dataset per column, all of one length
@@ -255,7 +255,7 @@ def _write_forces(file: h5py.File, name: str, forces: Sequence[PartForce]) -> No
 def _write_fields(group: h5py.Group, mesh: BoundaryMesh, boundary: BoundaryFields) -> None:
     """Write the mesh of a body, and displacement and traction on it, into a group."""
     _write_mesh(group.create_group("mesh"), mesh)
-    for name in _BOUNDARY:
+    for name in (*_BOUNDARY, "reaction"):
         group.create_dataset(f"boundary/{name}", data=getattr(boundary, name))
 
 
@@ -264,7 +264,8 @@ def _read_fields(
 ) -> tuple[BoundaryMesh, BoundaryFields]:
     """Read the mesh of a body and its fields; `curves` gives the curves that the file names by their numbers."""
     mesh = _read_mesh(reader, f"{prefix}mesh", curves)
-    boundary = BoundaryFields(**{name: reader.floats(f"{prefix}boundary/{name}") for name in _BOUNDARY})
+    names = [*_BOUNDARY, *(["reaction"] if reader.has(f"{prefix}boundary/reaction") else [])]  # none in older files
+    boundary = BoundaryFields(**{name: reader.floats(f"{prefix}boundary/{name}") for name in names})
     if len(boundary.centres) != mesh.n_elements:
         raise InputError(f"{len(boundary.centres)} tractions for {mesh.n_elements} elements")
     return mesh, boundary

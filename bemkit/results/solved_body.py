@@ -12,7 +12,7 @@ from bemkit.arrays import BoolArray, FloatArray, read_only
 from bemkit.errors import InputError
 from bemkit.geometry.mesh import BoundaryMesh
 from bemkit.geometry.spaces import ConstantSpace
-from bemkit.scene.conditions import Pressure, Traction
+from bemkit.scene.conditions import Clamped, PrescribedDisplacement, Pressure, Roller, Traction
 from bemkit.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ class BoundaryFields:
     traction_dofs : (n_elements * n_local, 2) array [Pa], optional
         Values at the local nodes of the traction space of the discretisation, element by element: loads may jump
         anywhere; see `ElementwiseSpace`. The means by default.
+    reaction : (n_points, 2) array [N/m], optional
+        Forces of supports at the points, with which the body is in equilibrium to round-off; tractions there are so but
+        for their error. Empty by default, and in files of older versions.
 
     Raises
     ------
@@ -49,8 +52,12 @@ class BoundaryFields:
     centres: FloatArray
     traction: FloatArray
     traction_dofs: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    reaction: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
+        if self.reaction.size and self.reaction.shape != self.points.shape:
+            raise InputError(f"reaction has the shape {self.reaction.shape}: give {self.points.shape} to match points")
+        read_only(self.reaction)
         dofs = self.traction_dofs if self.traction_dofs.size else self.traction.copy()
         object.__setattr__(self, "traction_dofs", dofs)
         for place, value in (("points", "displacement"), ("centres", "traction")):
@@ -72,6 +79,11 @@ class BoundaryFields:
 
 _FREE_SHARE = 1e-16
 """Share of the energy of a heated body that cannot expand at all, below which a body counts as free to expand."""
+
+
+_ROUND_OFF = 1e-13
+"""Differences of displacements, relative to the largest one, that may be round-off: up to 2e-14 is measured of bodies
+that only move as a whole."""
 
 
 class SolvedBody:
@@ -160,18 +172,33 @@ class SolvedBody:
 
     @cached_property
     def part_forces(self) -> tuple[PartForce, ...]:
-        """The resultants of the tractions on each part."""
-        from bemkit.results.part_forces import part_force
+        """The resultants on each part: of the reactions of a support, and of tractions."""
+        from bemkit.results.part_forces import part_force, support_forces
 
         space = self.scene.discretisation.traction_space(self.mesh)
         if len(self.boundary.traction_dofs) != space.element_dofs.size:  # a file of an older version
             space = ConstantSpace(self.mesh)
         traction = self.boundary.traction_dofs.reshape(self.mesh.n_elements, -1, 2)
         parts = self.mesh.parts.items()
-        return tuple(part_force(part, self.mesh, space, traction, elements) for part, elements in parts)
+        forces = {part: part_force(part, self.mesh, space, traction, elements) for part, elements in parts}
+        if self.boundary.reaction.size:
+            held = (Clamped, Roller, PrescribedDisplacement)
+            supports = [
+                part.name for part in self.scene.parts if isinstance(part.condition, held) and part.name in forces
+            ]
+            moved = self.scene.discretisation.displacement_space(self.mesh)
+            fields = self.boundary
+            forces |= support_forces(supports, moved, space, traction, fields.points, fields.reaction)
+        return tuple(forces.values())
 
     @property
     def error_unit(self) -> float:
         """What squared errors in the energy norm are measured by [J/m]: a(u, u), unless heat expands a free body."""
         held = 0.0 if self.particular is None else _FREE_SHARE * self.particular.held_energy
         return 2.0 * max(self.energy, held)
+
+    @property
+    def energy_of_round_off(self) -> float:
+        """Elastic energy [J/m] that round-off may leave of a body that only moves as a whole."""
+        moved = float(np.abs(self.boundary.displacement).max(initial=0.0))
+        return self.scene.material.plane_modulus * (_ROUND_OFF * moved) ** 2

@@ -159,13 +159,13 @@ class SolvedProblem(ShownInNotebooks):
         """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
         None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
-        zero of bodies at rest.
+        zero of bodies at rest, or that only move as a whole.
         """
         errors = [float(np.sum(body.element_errors)) for body in self.solved_bodies if body.element_errors is not None]
         unit = sum(body.error_unit for body in self.solved_bodies)
         if len(errors) < len(self.solved_bodies):
             return None
-        if not any(errors):
+        if max(sum(errors), unit) <= sum(body.energy_of_round_off for body in self.solved_bodies):
             return 0.0
         return float(np.sqrt(sum(errors) / unit)) if unit > 0.0 else None
 

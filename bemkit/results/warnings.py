@@ -40,6 +40,9 @@ LARGEST_PENETRATION = 0.2
 pressed by constant elements on a zone of six of them comes to that."""
 _MOST_ALIKE = 3
 """Doubts of one kind about several bodies and contacts that are told."""
+LARGEST_DISTANCE_OFF = 0.2
+"""Difference between distances from an obstacle after the displacement and the clearances that were solved, relative to
+the displacement that the contact force causes, above which contact is no longer where it was solved."""
 FEWEST_NODES = 4
 """Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
 _CLOSED = 1e-9
@@ -72,6 +75,7 @@ def find_warnings(solution: Solution | AssemblySolution) -> tuple[str, ...]:
         (title + doubt for title, body in titled.items() for doubt in _coarse_curves(body.mesh)),
         (title + doubt for title, body in titled.items() for doubt in _large_strains(body)),
         (title + doubt for title, body in titled.items() for doubt in _unbounded_tractions(solution, body)),
+        (title + doubt for title, body in titled.items() for doubt in _moved_contacts(body, solution.units)),
         _narrow_zones(solution.contact, smooth, remedy),
         _hidden_overlaps(solution.contacts_between_nodes, solution.contact, solution.units, remedy),
     ]
@@ -175,6 +179,23 @@ def _large_strains(body: SolvedBody) -> Iterator[str]:
             "small displacements, where results are proportional to loads but not true: check the units of loads "
             "and of Young's modulus, or load less."
         )
+
+
+def _moved_contacts(body: SolvedBody, units: UnitNames | None) -> Iterator[str]:
+    """Doubt contacts with obstacles along which the body moves so far that their gaps have become others."""
+    if not body.scene.contact_parts:
+        return
+    from bemkit.results.moved_contacts import distances_off
+
+    for name, (off, length) in distances_off(body).items():
+        if off > LARGEST_DISTANCE_OFF * length:
+            distance = amount(off, "length", units, 2)
+            share = f"{100.0 * off / length:.0f} % of" if off < length else "more than"
+            yield (
+                f"Part {name!r} moves so far that its contact ends {distance} off the obstacle, {share} the "
+                "displacement that its contact force causes: gaps and normals are those of the undeformed body; "
+                "draw it where it will touch."
+            )
 
 
 def boundary_gradients(body: SolvedBody) -> tuple[FloatArray, FloatArray]:

@@ -132,7 +132,8 @@ def assembly_solution(
     slip = table.u_t - model.problem.slip_origin * prepared.units.displacement
     transitions = find_transitions(table, slip)
     bodies = {}
-    for body, (displacement, traction, energy) in zip(prepared.bodies, solved, strict=True):
+    reactions = model.reactions(result.state)
+    for body, (displacement, traction, energy), reaction in zip(prepared.bodies, solved, reactions, strict=True):
         space = body.scene.discretisation.traction_space(body.mesh)
         fields = BoundaryFields(
             dof_points(body.space),
@@ -140,6 +141,7 @@ def assembly_solution(
             body.mesh.centres.copy(),
             mean_tractions(space, traction),
             traction.reshape(-1, 2),
+            reaction,
         )
         bodies[body.name] = BodyResult(body.name, body.scene, body.mesh, fields, energy)
     rigid = {

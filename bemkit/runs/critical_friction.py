@@ -23,6 +23,7 @@ from bemkit.runs.run import LoadHistoryError, run
 from bemkit.runs.steps import UnsolvableSceneError
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import NoContactError, Scene
+from bemkit.scene.steps import check_stated
 from bemkit.solvers.active_sets import NodeStatus
 from bemkit.solvers.base import solve
 
@@ -139,6 +140,7 @@ def _coefficients(
 
 def _solved(scene: Scene | Assembly) -> tuple[ContactProblem, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Return the contact problem of a scene, on the mesh that its accuracy needs, and the statuses of its nodes."""
+    check_stated(scene)
     if len(scene.load_factors) > 1:
         raise LoadHistoryError(
             f"a load history of {len(scene.load_factors)} steps has no single state: give one load factor"

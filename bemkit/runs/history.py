@@ -112,7 +112,7 @@ def solution_of(
     of_contact = contact_warnings(model, displacement, node_status) if result.is_converged else ()
     points, centres = dof_points(model.prepared.space, model.mesh), model.mesh.centres.copy()
     means = mean_tractions(model.elastic.traction_space, traction_dofs)
-    fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2))
+    fields = BoundaryFields(points, displacement, centres, means, traction_dofs.reshape(-1, 2), model.reactions(state))
     clock = clock.closed(Stage.RECOVER)
     if result.is_converged and not (
         np.isfinite(energy) and np.isfinite(displacement).all() and np.isfinite(traction_dofs).all()

@@ -20,6 +20,7 @@ from bemkit.runs.history import ONE_BODY, run_history, run_on_mesh, solution_of
 from bemkit.runs.steps import UnsolvableSceneError as UnsolvableSceneError
 from bemkit.scene.load_history import load_steps
 from bemkit.scene.scene import NoContactError, Scene
+from bemkit.scene.steps import check_stated
 from bemkit.solvers.base import StepRecord
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ def run(
     ValueError
         If the scene is not well posed; the message names the part and the remedy.
     """
+    check_stated(scene)
     if not isinstance(scene, Scene):
         return _run_assembly(scene, mesh, start, callback, executor)
     if executor is not None:

@@ -18,6 +18,7 @@ from bemkit.scene.body import Body, check_place, lines_across
 from bemkit.scene.conditions import Contact, Free, Part
 from bemkit.scene.discretisation import Discretisation, Galerkin, LinearGalerkin
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.objects import check_objects
 from bemkit.scene.plane_motion import RigidBody
 from bemkit.scene.scene import Scene
 from bemkit.scene.steps import Stated, Step, check_laws, check_names
@@ -68,6 +69,7 @@ class ContactPair:
     reach: float | None = None
 
     def __post_init__(self) -> None:
+        check_objects(self, "contact")
         object.__setattr__(self, "sides", tuple(self.sides))
         if len(self.sides) != 2 or not self.elastic_sides:
             raise InputError(
@@ -131,6 +133,7 @@ class Touching:
     reach: float | None = None
 
     def __post_init__(self) -> None:
+        check_objects(self, "touching")
         _check_reach(self.reach, "touching.reach")
         if not 0.0 <= self.within < np.inf:
             raise InputError(f"touching.within is {self.within}: give a length, zero or positive")

@@ -19,6 +19,7 @@ from bemkit.scene.conditions import Clamped, Contact, Free, Part, PrescribedDisp
 from bemkit.scene.copies import Copies
 from bemkit.scene.discretisation import Discretisation
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.objects import check_objects
 from bemkit.scene.steps import check_names
 
 _ALONG = np.linspace(0.0, 1.0, 33)
@@ -71,6 +72,7 @@ class Body:
     def __post_init__(self) -> None:
         if not self.name or not self.name.isprintable() or "." in self.name:
             raise InputError(f"the body name {self.name!r} does not do: give printable text without a dot")
+        check_objects(self, f"body {self.name!r}")
         check_names(f"body {self.name!r}", (part.name for part in self.parts), "parts")
         if self.mesh is not None and self.mesh.accuracy is not None:
             raise InputError(f"body {self.name!r}: an accuracy is that of all bodies: give it to the assembly")

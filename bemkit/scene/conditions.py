@@ -15,6 +15,7 @@ from bemkit.errors import InputError
 from bemkit.formulas import Expression, ScalarField, check_field, evaluate_field
 from bemkit.geometry.outline import Selection
 from bemkit.geometry.vectors import turned_left
+from bemkit.scene.objects import check_objects
 
 Region: TypeAlias = Expression | Callable[[FloatArray, FloatArray], BoolArray]
 """A condition on the coordinates, such as ``Expression("x > 0.5")``."""
@@ -139,10 +140,18 @@ class Contact:
     obstacle : Obstacle
     law : FrictionLaw, optional
         The friction law on this part; the scene's law if left out.
+
+    Raises
+    ------
+    InputError
+        If one is a word or a class.
     """
 
     obstacle: Obstacle
     law: FrictionLaw | None = None
+
+    def __post_init__(self) -> None:
+        check_objects(self)
 
 
 Condition: TypeAlias = Clamped | Roller | PrescribedDisplacement | Traction | Pressure | Contact | Free
@@ -178,7 +187,7 @@ class Part:
     Raises
     ------
     ValueError
-        If the name is empty, or `where` is not a condition.
+        If the name is empty, `where` is not a condition, or a word stands where an object or a tuple belongs.
     """
 
     name: str
@@ -189,6 +198,11 @@ class Part:
     def __post_init__(self) -> None:
         if not self.name or not self.name.isprintable():
             raise InputError(f"the part name {self.name!r} is not printable text: give a name such as 'foundation'")
+        check_objects(self, f"part {self.name!r}")
+        if isinstance(self.where, str):
+            raise InputError(
+                f"part {self.name!r}: where is the text {self.where!r}: give Expression({self.where!r}) or a function"
+            )
         if isinstance(self.where, Expression) and not self.where.is_condition:
             raise InputError(f"where is '{self.where.text}', which is a number: give a condition such as 'x > 0.5'")
 

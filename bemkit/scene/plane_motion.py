@@ -11,6 +11,7 @@ import numpy as np
 from bemkit.arrays import BoolArray, FloatArray
 from bemkit.contact.obstacle import Obstacle, check_pair
 from bemkit.errors import InputError
+from bemkit.scene.objects import check_objects
 
 COMPONENTS = (("x", "force_x"), ("y", "force_y"), ("turn", "moment"))
 """The three motions in the plane, each with the load that does work on it."""
@@ -111,6 +112,7 @@ class RigidBody(PlaneMotion):
     def __post_init__(self) -> None:
         if not self.name or not self.name.isprintable() or "." in self.name:
             raise InputError(f"the rigid body name {self.name!r} does not do: give printable text without a dot")
+        check_objects(self, f"rigid body {self.name!r}")
         super().__post_init__()
 
     @property

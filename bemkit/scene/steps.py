@@ -15,6 +15,7 @@ import numpy as np
 from bemkit.contact.laws import FrictionLaw
 from bemkit.errors import InputError
 from bemkit.notebook import ShownInNotebooks
+from bemkit.scene.objects import check_objects
 
 TimeValue: TypeAlias = float | str | Callable[[float], float]
 """A number, a formula in the time t, or a Python function of it."""
@@ -74,6 +75,7 @@ class Stated(ShownInNotebooks):
     steps: tuple[Step, ...]
 
     def __post_init__(self) -> None:
+        check_objects(self)
         object.__setattr__(self, "load_factors", tuple(self.load_factors))
         object.__setattr__(self, "steps", tuple(self.steps))
         if not self.title or not self.title.isprintable():
@@ -94,6 +96,19 @@ class Stated(ShownInNotebooks):
     def n_steps(self) -> int:
         """Number of load steps, increments counted."""
         return sum(step.increments for step in self.steps) if self.steps else len(self.load_factors)
+
+
+def check_stated(scene: object) -> None:
+    """Refuse what is neither a scene nor an assembly, such as the name of one.
+
+    Raises
+    ------
+    InputError
+        Naming the value and what reads a scene.
+    """
+    if not isinstance(scene, Stated):
+        remedy = f"load_scene({scene!r}) reads one" if isinstance(scene, str) else "load_scene(path) reads one"
+        raise InputError(f"scene is {scene!r}: give a Scene or an Assembly; {remedy}")
 
 
 def check_names(owner: str, names: Iterable[str], kind: str) -> None:

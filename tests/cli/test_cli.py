@@ -28,6 +28,7 @@ from bemkit.operators.linear.solvers import Hierarchical
 from bemkit.results.result_file import read_result
 from bemkit.scene.discretisation import QuadraticGalerkin
 from bemkit.scene.mesh_options import MeshOptions
+from bemkit.scene.steps import Step
 from bemkit.scene.toml import load_scene, scene_from_toml, scene_to_toml, shipped_files
 from bemkit.solvers.base import Status
 from bemkit.solvers.ssn import SemismoothNewton
@@ -54,6 +55,15 @@ def test_run_prints_a_summary(capsys: pytest.CaptureFixture[str]) -> None:
     for word in ("converged", "contact nodes", "normal force", "friction force", "separated to slip", "certificate"):
         assert word in output.out
     assert output.err == ""  # no convergence table unless a person is watching
+
+
+def test_the_summary_of_a_history_says_what_coarse_increments_leave(capsys: pytest.CaptureFixture[str]) -> None:
+    one_step = dataclasses.replace(
+        load_scene("cylinder-on-half-plane"), mesh=MeshOptions(elements=60), steps=(Step(1.0),)
+    )
+    Path("coarse.toml").write_text(scene_to_toml(one_step), "utf-8")
+    assert call("run", "coarse.toml") == 0
+    assert "by the size of increments: smaller ones leave less" in " ".join(capsys.readouterr().out.split())
 
 
 def test_json_on_standard_output_is_one_object(capsys: pytest.CaptureFixture[str]) -> None:

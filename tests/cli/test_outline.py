@@ -68,6 +68,12 @@ def test_sides_lengths_and_notes_are_shown(tmp_path) -> None:
     assert lines[-1] == "note: 3 arcs through the ends of straight pieces of the mesh"
 
 
+def test_the_sides_of_a_scene_that_comes_with_bemkit_are_shown() -> None:
+    shown = call("outline", "paper-1")
+    assert shown.exit_code == 0
+    assert all(side in shown.output for side in ("bottom", "right", "top", "left"))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

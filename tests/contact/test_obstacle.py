@@ -243,3 +243,29 @@ def test_in_the_middle_of_a_wedge_the_first_side_counts_whatever_the_round_off(o
     for gap, direction in (measure_contact(wedge, at, up), distance_to(wedge, at, up)):
         np.testing.assert_allclose(gap, -1e-4 * side[0], rtol=1e-10)
         np.testing.assert_allclose(direction[0], into_first, atol=1e-12)
+
+
+class Misshapen:
+    """An obstacle of one's own that returns what it should not."""
+
+    def __init__(self, gap: object, approach: object) -> None:
+        self._gap, self._approach = gap, approach
+
+    def gap(self, points: np.ndarray, normals: np.ndarray) -> object:
+        return self._gap
+
+    def approach(self, points: np.ndarray, normals: np.ndarray) -> object:
+        return self._approach
+
+
+def test_arrays_of_an_obstacle_of_ones_own_have_the_shapes_of_the_points() -> None:
+    points, normals = np.zeros((2, 2)), np.tile([0.0, -1.0], (2, 1))
+    gap, direction = measure_contact(Misshapen([0.1, 0.2], normals.tolist()), points, normals)
+    np.testing.assert_array_equal(gap, [0.1, 0.2])  # lists will do
+    np.testing.assert_array_equal(direction, normals)
+    with pytest.raises(
+        ValueError, match=r"Misshapen.gap returned an array of the shape \(3,\): return the shape \(2,\)"
+    ):
+        measure_contact(Misshapen(np.zeros(3), normals), points, normals)
+    with pytest.raises(ValueError, match=r"Misshapen.approach returned an array of the shape \(2,\): return the shape"):
+        measure_contact(Misshapen(np.zeros(2), np.array([0.0, -1.0])), points, normals)

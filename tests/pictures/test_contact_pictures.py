@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import matplotlib.colors
 import numpy as np
@@ -141,6 +142,47 @@ def test_the_map_draws_each_contact_node_of_one_body_once(solution: Solution) ->
     teeth = np.concatenate([each.get_segments() for each in axes.collections if hasattr(each, "get_segments")])
     assert teeth[..., 1].min() > -1e-12  # into the body, away from the obstacle below
     assert teeth[..., 1].max() > 0.05
+
+
+def test_teeth_of_a_small_body_do_not_cross_it() -> None:
+    steel = bk.Material(1.0, 0.3)
+    base, load = bk.Part("base", bk.Clamped(), ("bottom",)), bk.Part("load", bk.Pressure(1e-3), ("top",))
+    block = bk.Body(name="block", shape=bk.Rectangle(20.0, 10.0), material=steel, parts=(base,))
+    cube = bk.Body(
+        name="cube", shape=bk.Rectangle(1.0, 1.0), material=steel, parts=(load,), placement=bk.Placement((9.0, 10.0))
+    )
+    scene = bk.Assembly(
+        title="A small cube on a large block",
+        bodies=(block, cube),
+        contacts=(bk.ContactPair(("cube.bottom", "block.top")),),
+        law=bk.Coulomb(0.5),
+        mesh=bk.MeshOptions(elements=24),
+    )
+    axes = draw_contact_map(run(scene))
+    teeth = np.concatenate([each.get_segments() for each in axes.collections if hasattr(each, "get_segments")])
+    assert 0.5 < np.hypot(*(teeth[:, 1] - teeth[:, 0]).T).max() < 1.0  # 3 % of the picture, not more than the cube
+
+
+@pytest.mark.parametrize(
+    ("draw", "peak"), [(draw_contact_traction, "down to -0.0"), (draw_contact_clearance, "up to 0.0")]
+)
+def test_peaks_at_the_edges_of_a_punch_are_cut_and_told(draw: Callable[..., Axes], peak: str) -> None:
+    solution = run(load_scene("tilted-punch"))
+    (part,) = solution.contact.parts
+    axes = draw(solution, part)
+    assert np.abs(axes.get_ylim()).max() < 0.2 * -solution.contact.sigma_n.min()
+    (note,) = (text.get_text() for text in axes.texts)
+    assert note.startswith("peaks ")
+    assert peak in note
+
+
+def test_a_clearance_of_nothing_but_zeros_is_drawn_on_the_scale_of_the_displacements() -> None:
+    solution = run(with_overrides(load_scene("uniform-slip"), elements=24))
+    still = replace(solution.contact, gap=solution.contact.u_n.copy())
+    assert not still.clearance.any()
+    axes = draw_contact_clearance(replace(solution, contact=still), "floor")
+    (right,) = (other for other in axes.get_figure().axes if other.get_ylabel() == "clearance")
+    assert np.ptp(right.get_ylim()) < np.abs([still.u_n, still.u_t]).max()
 
 
 def test_the_convergence_ends_where_the_certificate_is(solution: Solution) -> None:

@@ -65,6 +65,15 @@ def test_work_is_drawn_as_it_adds_up(solution: bk.Solution, loading: LoadHistory
     assert np.all(np.diff(taken) >= 0.0)
 
 
+def test_what_coarse_increments_leave_is_drawn_so_that_the_curves_add_up() -> None:
+    half_plane = bk.load_scene("cylinder-on-half-plane")  # whose gaps close within its only increment
+    axes = draw_work(bk.run(replace(half_plane, mesh=bk.MeshOptions(elements=60), steps=(bk.Step(1.0),))))
+    ends = {line.get_label(): line.get_ydata()[-1] for line in axes.lines}
+    assert ends["left by increments"] > 0.02 * ends["external work"]
+    others = sum(value for name, value in ends.items() if name != "external work")
+    assert others == pytest.approx(ends["external work"], rel=1e-9)
+
+
 def test_status_is_drawn_for_every_node_and_step(solution: bk.Solution, loading: LoadHistory) -> None:
     axes = draw_status_over_time(solution, "floor", Figure().add_subplot())
     (cells,) = axes.collections

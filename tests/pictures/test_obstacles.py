@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.path import Path
 
 import bemkit as bk
 from bemkit.pictures import draw_deformation
@@ -84,19 +86,35 @@ def test_obstacles_are_drawn_and_filled_on_their_side(obstacle: bk.Obstacle) -> 
     draw_obstacles(axes, shown(block(obstacle)))
     (first,) = axes.patches
     assert first.get_label() == "obstacle"
-    assert first.get_fill() is not isinstance(obstacle, bk.Cavity)
     assert (axes.get_xlim(), axes.get_ylim()) == ((-3.0, 3.0), (-2.0, 2.0))
-    if first.get_fill():
-        points = np.random.default_rng(0).uniform(-1.9, 1.9, (300, 2))
-        gap = obstacle.gap(points, np.zeros_like(points))
-        is_clear = np.abs(gap) > 2e-3
-        np.testing.assert_array_equal(first.get_path().contains_points(points[is_clear]), gap[is_clear] < 0.0)
+    points = np.random.default_rng(0).uniform(-1.9, 1.9, (300, 2))
+    gap = obstacle.gap(points, np.zeros_like(points))
+    is_clear = np.abs(gap) > 2e-3
+    np.testing.assert_array_equal(is_filled(first, points[is_clear]), gap[is_clear] < 0.0)
 
 
-def test_a_clockwise_spline_is_empty() -> None:
+def is_filled(patch: Patch, points: np.ndarray) -> np.ndarray:
+    """Whether points are painted: by the rule of matplotlib, which counts turns, loops of opposite sense are holes."""
+    assert patch.get_fill()
+    turns = np.zeros(len(points), int)
+    for loop in patch.get_path().to_polygons():
+        area = np.sum(loop[:-1, 0] * np.diff(loop[:, 1]) - loop[:-1, 1] * np.diff(loop[:, 0]))
+        turns += int(np.sign(area)) * Path(loop).contains_points(points)
+    return turns != 0
+
+
+def test_a_clockwise_spline_fills_its_outside() -> None:
     axes = Figure().add_subplot()
     draw_obstacles(axes, shown(block(bk.SplineObstacle(ROUND[::-1]))))
-    assert not axes.patches[0].get_fill()
+    np.testing.assert_array_equal(is_filled(axes.patches[0], np.array([[0.2, 0.3], [0.0, 1.2]])), [False, True])
+
+
+def test_a_rigid_body_that_is_a_cavity_fills_its_outside_where_it_has_moved_to() -> None:
+    axes = Figure().add_subplot()
+    body = bk.RigidBody(name="bearing", obstacle=bk.Cavity((0.5, 0.5), 2.0))
+    draw_rigid_bodies(axes, with_rigid(body, RigidResult("bearing", 0.0, 0.0, 0.0, 0.1, 0.0, 0.0)), 10.0)
+    filled = is_filled(axes.patches[1], np.array([[-1.0, 0.5], [3.0, 0.5], [3.7, 0.5]]))
+    np.testing.assert_array_equal(filled, [True, False, True])
 
 
 def test_rigid_bodies_are_drawn_before_and_after_and_widen_the_frame() -> None:

@@ -155,6 +155,9 @@ def test_the_command_writes_it(
     Path("mine.html").write_text("mine", "utf-8")
     with pytest.raises(OutputFileError, match="exists and is not a report"):
         save_report("mine.html", solution)
+    with pytest.raises(OutputFileError, match=r"r.pdf: a report is a page of HTML: give a name that ends in .html"):
+        save_report("r.pdf", solution)
+    assert not Path("r.pdf").exists()
 
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")

@@ -89,6 +89,25 @@ def test_a_body_at_rest_has_no_error() -> None:
     assert bk.run(scene).estimated_error == 0.0
 
 
+@pytest.mark.parametrize("degree", [1, 2, 6])
+@pytest.mark.parametrize("motion", [(0.0, 1e-3), (0.3, 1.0)])
+def test_a_body_that_only_moves_as_a_whole_has_no_error(degree: int, motion: tuple[float, float]) -> None:
+    parts = (
+        bk.Part("floor", bk.Contact(bk.HalfPlane((0.0, 2.0))), sides=("bottom",)),
+        bk.Part("lid", bk.PrescribedDisplacement(*motion), sides=("top",)),
+    )
+    scene = bk.Scene(
+        title="lifted", shape=bk.Rectangle(1.0, 1.0, (3.0, 2.0)), material=bk.Material(2e11, 0.3), parts=parts,
+        discretisation=bk.Galerkin(degree), mesh=bk.MeshOptions(elements=24),
+    )  # fmt: skip
+    solution = bk.run(scene)
+    assert solution.energy > 0.0  # of round-off, by which an error must not be measured
+    assert solution.estimated_error == 0.0
+    assert not solution.warnings
+    pressed = dataclasses.replace(scene, parts=(parts[0], bk.Part("lid", bk.PrescribedDisplacement(y=-1e-9), ("top",))))
+    assert bk.run(pressed).estimated_error > 0.0
+
+
 def test_the_largest_error_leaves_out_an_equally_small_share() -> None:
     lengths = np.array([0.5, 0.3, 0.19, 0.01])
     assert largest_but_a_share(np.array([0.1, 0.2, 0.15, 0.05]), lengths) == 0.2

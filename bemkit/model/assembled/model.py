@@ -121,6 +121,20 @@ class AssembledModel:
         displacements += [motion for motion, _ in rigid]
         return np.concatenate(forces), np.concatenate(displacements)
 
+    def reactions(self, state: ContactState) -> list[FloatArray]:
+        """Return the forces (n_nodes, 2) [N/m] of supports on all nodes of each body, in the axes of the scene."""
+        prepared, reactions = self.prepared, []
+        unknowns = self.body.member_displacements(state)[: len(self.condensed)]
+        bodies = zip(
+            prepared.bodies, self._contact_forces(state), prepared.conditions, prepared.forces, self.condensed,
+            unknowns, strict=True,
+        )  # fmt: skip
+        for body, of_contact, conditions, given, condensed, own in bodies:
+            _, force = condensed.recover(own)
+            held = supporting_forces(conditions, np.zeros_like(force), force - of_contact - given).reshape(-1, 2)
+            reactions.append(np.asarray(body.turn.turned(held)) * prepared.force_unit)
+        return reactions
+
     def _contact_forces(self, state: ContactState) -> list[FloatArray]:
         """Return the nodal forces (n_nodes, 2) of contact on each body, in its own axes, dimensionless."""
         bodies = self.prepared.bodies

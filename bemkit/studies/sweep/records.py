@@ -12,24 +12,31 @@ from bemkit.results.assembly_solution import AssemblySolution
 from bemkit.results.part_forces import contact_sizes
 from bemkit.results.record_file import RecordFile
 from bemkit.results.solution import Solution
+from bemkit.scene.unit_names import UnitNames, unit_of
 from bemkit.studies.engine import Attempt
 
-UNITS: Mapping[str, str] = MappingProxyType(
+QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
-        "force_normal": "N/m",
-        "force_tangential": "N/m",
-        "energy": "J/m",
-        "contact_length": "m",
-        "peak_pressure": "Pa",
-        "largest_slip": "m",
+        "force_normal": "force",
+        "force_tangential": "force",
+        "energy": "energy",
+        "contact_length": "length",
+        "peak_pressure": "stress",
+        "largest_slip": "length",
         "estimated_error": "",
         "n_elements": "",
         "n_contact": "",
         "linear_solves": "",
-        "seconds": "s",
+        "seconds": "time",
     }
 )
-"""The numerical results of a row, in the order in which they are shown, with their units."""
+"""The numerical results of a row, in the order in which they are shown, with their quantities."""
+
+
+def unit_of_column(column: str, units: UnitNames | None) -> str:
+    """Return the name of the unit of a column; of what the scene has no name for, empty."""
+    quantity = QUANTITIES.get(column, "")
+    return "s" if quantity == "time" else unit_of(quantity, units)
 
 
 @dataclass(frozen=True)
@@ -94,7 +101,7 @@ class SweepRow:
         return bool(self.certified)
 
 
-_MEASURED = tuple(UNITS)[:7]
+_MEASURED = tuple(QUANTITIES)[:7]
 RESULTS = tuple(entry.name for entry in fields(SweepRow) if entry.name != "values")
 """The names of all results of a row."""
 

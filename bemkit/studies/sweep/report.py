@@ -12,7 +12,7 @@ from rich.text import Text
 
 from bemkit.results.drawing import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Axes, Figure, new_figure, show_grid
 from bemkit.results.outputs import plain_table, stdout_console
-from bemkit.studies.sweep.records import UNITS
+from bemkit.studies.sweep.records import QUANTITIES, unit_of_column
 from bemkit.studies.sweep.table import Sweep
 
 _SHOWN = ("force_normal", "force_tangential", "energy", "contact_length", "peak_pressure")
@@ -99,8 +99,8 @@ def draw_sweep(sweep: Sweep, over: str, show: str, axes: Axes | None = None) -> 
         order = np.array(rows)[np.argsort(sweep.column(along)[rows], kind="stable")]
         style: dict[str, Any] = {"color": _COLOURS[number % 6], "linestyle": _LINES[number // 6 % 4]}
         axes.plot(x[order], y[order], marker="o", markersize=3.5, linewidth=1.2, label=label or None, **style)
-    axes.set_xlabel(_named(over), parse_math=False)
-    axes.set_ylabel(_named(show), parse_math=False)
+    axes.set_xlabel(_named(over, sweep), parse_math=False)
+    axes.set_ylabel(_named(show, sweep), parse_math=False)
     failed = f" ({len(sweep.failed)} of {len(sweep.rows)} rows failed)" if sweep.failed else ""
     axes.set_title(sweep.scene.title + failed, parse_math=False, fontsize=11)
     show_grid(axes)
@@ -115,6 +115,6 @@ def draw_all(over: str, shown: Sequence[str], sweep: Sweep) -> dict[str, Figure]
     return {figure_name(over, show): draw_sweep(sweep, over, show) for show in shown}
 
 
-def _named(column: str) -> str:
-    unit = UNITS.get(column, "")
-    return f"{column.replace('_', ' ') if column in UNITS else column}{f' [{unit}]' if unit else ''}"
+def _named(column: str, sweep: Sweep) -> str:
+    unit = unit_of_column(column, sweep.scene.units)
+    return f"{column.replace('_', ' ') if column in QUANTITIES else column}{f' [{unit}]' if unit else ''}"

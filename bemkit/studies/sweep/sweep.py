@@ -18,6 +18,7 @@ from bemkit.runs.run import run
 from bemkit.runs.shared_body import SharedBody
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
+from bemkit.scene.steps import check_stated
 from bemkit.scene.toml import scene_to_toml
 from bemkit.studies.engine import Attempt, StudyError, Task, attempt, compute
 from bemkit.studies.sweep.grid import Key, all_rows, check_number, with_values
@@ -73,6 +74,7 @@ def sweep(
     ResultFileError, OutputFileError
         If the file cannot be written, or holds another sweep.
     """
+    check_stated(scene)
     n_workers = cpu_count() or 1
     return run_sweep(scene, vary, partial(compute, executor=executor, n_workers=n_workers), file=file, cold=cold)
 

@@ -17,7 +17,7 @@ from bemkit.results.outputs import csv_text, json_text
 from bemkit.scene.assembly import Assembly
 from bemkit.scene.scene import Scene
 from bemkit.scene.toml import scene_from_toml
-from bemkit.studies.sweep.records import FILE, RESULTS, UNITS, SweepRow
+from bemkit.studies.sweep.records import FILE, QUANTITIES, RESULTS, SweepRow, unit_of_column
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Sweep:
         InputError
             If there is no such column of numbers.
         """
-        names = [*self.keys, *UNITS]
+        names = [*self.keys, *QUANTITIES]
         if name not in names:
             raise InputError(f"column {name!r}: the columns of numbers are {', '.join(names)}{closest(name, names)}")
         return np.array([self.entry(row, name) for row in self.solved], dtype=float)
@@ -85,8 +85,10 @@ class Sweep:
 
     def columns(self) -> dict[str, Any]:
         """Return the keys and all results of the solved rows: arrays of numbers, lists of texts."""
-        numbers = {name: self.column(name) for name in (*self.keys, *UNITS)}
-        return numbers | {name: [getattr(row, name) for row in self.solved] for name in RESULTS if name not in UNITS}
+        numbers = {name: self.column(name) for name in (*self.keys, *QUANTITIES)}
+        return numbers | {
+            name: [getattr(row, name) for row in self.solved] for name in RESULTS if name not in QUANTITIES
+        }
 
     def to_csv(self) -> str:
         """Return all rows as comma-separated values; numbers of failed rows are nan, messages stand at the end."""
@@ -129,10 +131,10 @@ class Sweep:
         axes = [np.unique([self.entry(row, key) for row in self.rows]) for key in self.keys]
         places = tuple(np.searchsorted(axis, self.column(key)) for axis, key in zip(axes, self.keys, strict=True))
         data = {}
-        for name, unit in UNITS.items():
+        for name in QUANTITIES:
             values = np.full([axis.size for axis in axes], np.nan)
             values[places] = self.column(name)
-            data[name] = (self.keys, values, {"units": unit})
+            data[name] = (self.keys, values, {"units": unit_of_column(name, self.scene.units)})
         return xr.Dataset(data, coords=dict(zip(self.keys, axes, strict=True)), attrs={"title": self.scene.title})
 
     def _as_dict(self, row: SweepRow, names: Sequence[str]) -> dict[str, Any]:

@@ -191,9 +191,13 @@ def test_any_column_is_drawn_over_any_other() -> None:
         assert list(line.get_xdata()) == [0.2, 0.4, 0.6]
         rows = {row.values: row.energy for row in table.rows}
         assert list(line.get_ydata()) == [rows[x, (0.0, 0.2)[number]] for x in (0.2, 0.4, 0.6)]
-    assert axes.get_ylabel() == "energy [J/m]"
+    assert axes.get_ylabel() == "energy"  # the scene names no units
     both = draw_sweep(table, "energy", "force_tangential").axes[0]
-    assert both.get_xlabel() == "energy [J/m]"
+    assert both.get_xlabel() == "energy"
+    named = replace(table, scene=replace(SCENE, units=bk.UnitNames(length="mm", stress="MPa", force="N/mm")))
+    assert draw_sweep(named, FRICTION, "energy").axes[0].get_ylabel() == "energy [N/mm mm]"
+    assert draw_sweep(named, FRICTION, "peak_pressure").axes[0].get_ylabel() == "peak pressure [MPa]"
+    assert draw_sweep(table, FRICTION, "seconds").axes[0].get_ylabel() == "seconds [s]"
     assert [list(line.get_ydata()) for line in both.lines] == [
         [row.force_tangential for row in sorted(table.rows, key=lambda row: row.values) if row.values[1] == ratio]
         for ratio in (0.0, 0.2)

@@ -1,0 +1,54 @@
+"""How far contacts with rigid obstacles are from where the obstacles are, once the body has moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bemkit.arrays import IntArray
+from bemkit.contact.obstacle import Cavity, Circle, HalfPlane, Obstacle
+from bemkit.contact.polygon import PolygonalObstacle
+from bemkit.contact.signed_distance import SignedDistance
+from bemkit.contact.spline import SplineObstacle
+from bemkit.geometry.neighbours import along_boundary
+from bemkit.geometry.vectors import norms
+from bemkit.results.between_nodes import Interpolation, points_at_obstacle, points_between
+from bemkit.results.solved_body import SolvedBody
+from bemkit.scene.conditions import Contact
+
+_IN_THE_PLANE = (HalfPlane, Circle, Cavity, PolygonalObstacle, SplineObstacle, SignedDistance)
+"""Obstacles that stand somewhere in the plane, so that their distance from a point that has moved is known."""
+_PRESSED = 0.01
+"""Share of the largest pressure from which on a point counts as pressed."""
+
+
+def distances_off(body: SolvedBody) -> dict[str, tuple[float, float]]:
+    """Return by how much distances from obstacles after the displacement differ from the clearances that were solved.
+
+    Clearances are linear in the displacement, along the normal of the obstacle at its point nearest to the undeformed
+    body. A body that slides along a curved obstacle, or turns, leaves that.
+
+    Returns
+    -------
+    dict of str to (float, float) [m]
+        By contact part, of obstacles that stand in the plane: the largest difference where the part is pressed, and the
+        displacement that its contact force causes, force / E'. Parts without contact force are left out.
+    """
+    found = {}
+    for part in body.scene.parts:
+        if isinstance(part.condition, Contact) and isinstance(part.condition.obstacle, _IN_THE_PLANE):
+            elements = along_boundary(body.mesh, body.mesh.part(part.name))
+            force = float(body.mesh.lengths[elements] @ norms(body.boundary.traction[elements]))
+            if force > 0.0:
+                off = _distance_off(body, part.condition.obstacle, elements)
+                found[part.name] = off, force / body.scene.material.plane_modulus
+    return found
+
+
+def _distance_off(body: SolvedBody, obstacle: Obstacle, elements: IntArray) -> float:
+    values = points_at_obstacle(body, obstacle, elements)
+    is_pressed = -values.sigma_n > _PRESSED * float(np.maximum(-values.sigma_n, 0.0).max(initial=0.0))
+    xi = points_between(body.scene.discretisation.displacement_space(body.mesh).degree)
+    at = np.broadcast_to(xi, (elements.size, xi.size))
+    moved = values.points + Interpolation.at(body, elements, at).displacement(body).reshape(-1, 2)
+    distance = obstacle.gap(moved[is_pressed], -values.directions[is_pressed])
+    return float(np.abs(distance - values.clearance[is_pressed]).max(initial=0.0))

@@ -1,0 +1,57 @@
+"""What scenes are made of in Python: objects, where scene files have words, and tuples, where they have lists."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from bemkit.errors import InputError
+
+_EXAMPLES: Mapping[str, str] = MappingProxyType(
+    {
+        "shape": "Rectangle(width=1.0, height=1.0)",
+        "material": "Material(youngs_modulus=1e4, poisson_ratio=0.2)",
+        "law": "Coulomb(friction_coefficient=0.5)",
+        "solver": "SemismoothNewton()",
+        "discretisation": "QuadraticGalerkin()",
+        "linear_solver": "Automatic()",
+        "mesh": "MeshOptions(elements=320)",
+        "symmetry": "Symmetry(x=0.5)",
+        "far": "FarField(force_y=1.0)",
+        "touching": "Touching(within=0.01)",
+        "units": "UnitNames(length='mm', stress='MPa')",
+        "condition": "Clamped()",
+        "obstacle": "HalfPlane()",
+    }
+)
+_SEVERAL = ("parts", "steps", "load_factors", "body_forces", "bodies", "rigid", "contacts", "sides")
+
+
+def check_objects(owner: Any, name: str = "") -> None:
+    """Refuse words, numbers and classes where a part of a scene takes an object, and one thing where it takes several.
+
+    They would be taken for objects of an unknown kind, and a condition that no code knows leaves the boundary free.
+
+    Parameters
+    ----------
+    owner : object
+        Its attributes are checked by their names; None stands for what is left out.
+    name : str
+        Of the owner, to begin messages with.
+
+    Raises
+    ------
+    InputError
+        Naming the attribute, its value and an example.
+    """
+    begin = f"{name}: " if name else ""
+    for attribute, example in _EXAMPLES.items():
+        value = getattr(owner, attribute, None)
+        if isinstance(value, str | int | float | type | Mapping):
+            shown = f"the class {value.__name__}" if isinstance(value, type) else repr(value)
+            raise InputError(f"{begin}{attribute} is {shown}: give an object, such as {example}")
+    for attribute in _SEVERAL:
+        value = getattr(owner, attribute, ())
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            raise InputError(f"{begin}{attribute} is {value!r}: give a tuple, such as ({value!r},)")

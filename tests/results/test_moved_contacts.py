@@ -1,0 +1,68 @@
+"""Contact with obstacles along which a body has moved too far for its gaps is warned of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import bemkit as bk
+
+CYLINDER = bk.Circle((0.5, -1.0), 1.0)
+
+
+def block(x: float, obstacle: bk.Obstacle = CYLINDER) -> bk.Scene:
+    """A block of unit size, pressed by a hundredth onto an obstacle and moved sideways."""
+    return bk.Scene(
+        title="Block on a cylinder",
+        shape=bk.Rectangle(1.0, 1.0),
+        material=bk.Material(1e4, 0.3),
+        law=bk.Coulomb(0.1),
+        parts=(
+            bk.Part("floor", bk.Contact(obstacle), ("bottom",)),
+            bk.Part("top", bk.PrescribedDisplacement(x=x, y=-0.01), ("top",)),
+        ),
+        discretisation=bk.QuadraticGalerkin(),
+        mesh=bk.MeshOptions(elements=60, density={"bottom": 4.0}),
+    )
+
+
+def doubts(solution: bk.Solution | bk.AssemblySolution) -> list[str]:
+    return [sentence for sentence in solution.warnings if "moves so far" in sentence]
+
+
+def test_sliding_far_along_a_curved_obstacle_is_doubted() -> None:
+    """By a tenth of the radius, which takes the block 5e-3 away from the cylinder that it is pressed into by 1e-2."""
+    solution = bk.run(block(0.1))
+    assert solution.is_converged
+    (doubt,) = doubts(solution)
+    assert "Part 'floor' moves so far that its contact ends 0.00" in doubt
+    assert "draw it where it will touch" in doubt
+    there = bk.run(replace(block(0.0), shape=bk.Rectangle(1.0, 1.0, (0.1, 0.0))))
+    assert solution.force_normal > 1.2 * there.force_normal  # the doubt is right
+
+
+@pytest.mark.parametrize("scene", [block(0.01), block(0.1, bk.HalfPlane()), block(0.1, bk.Gap(0.0))])
+def test_small_motions_and_straight_obstacles_are_not_doubted(scene: bk.Scene) -> None:
+    assert not doubts(bk.run(scene))
+
+
+def test_bodies_of_an_assembly_are_doubted_where_they_are_placed() -> None:
+    scene = block(0.1)
+    placed = bk.Body(
+        name="block",
+        shape=bk.Rectangle(1.0, 1.0, (3.0, 2.0)),
+        material=scene.material,
+        parts=scene.parts,
+        placement=bk.Placement((-3.0, -2.0)),
+    )
+    lid = bk.Body(
+        name="lid", shape=bk.Rectangle(1.0, 1.0), material=scene.material, placement=bk.Placement((1.0, 0.0)),
+        parts=(bk.Part("end", bk.Clamped(), ("right",)),),
+    )  # fmt: skip
+    pair = bk.ContactPair(("block.right", "lid.left"), gap=1.0)
+    assembly = bk.Assembly(
+        title="Block on a cylinder", bodies=(placed, lid), contacts=(pair,), law=scene.law, mesh=scene.mesh
+    )
+    (doubt,) = doubts(bk.run(assembly))
+    assert doubt.startswith("Body 'block': Part 'floor' moves so far")
