@@ -59,11 +59,11 @@ class BodyResult(SolvedBody):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AssemblySolution(SolvedProblem):
-    """What `bemkit.run` returns of an assembly.
+    """The solution of an assembly, as `bemkit.run` returns it and result files hold it.
 
-    How it was solved is said by the entries of `SolvedProblem`. The contact table has one row for each multiplier node;
-    `part` is the name of the contact, displacements are relative ones: those of the body with the node less those of
-    its partner.
+    Status, certificate, contact table and history are entries of `SolvedProblem`. The contact table has a row for each
+    multiplier node; `part` is the name of the contact, and displacements are those of the body with the node less those
+    of its partner.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class AssemblySolution(SolvedProblem):
 
     @property
     def stated(self) -> Assembly:
-        """What was asked: the assembly, with all its load steps."""
+        """The assembly that was solved, with all its load steps."""
         return self.assembly if self.loading is None else cast(Assembly, self.loading.asked)
 
     @property

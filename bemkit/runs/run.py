@@ -204,7 +204,7 @@ def run_probe(scene: Scene, *, n_starts: int = 8, mesh: BoundaryMesh | None = No
 
 @dataclass(frozen=True)
 class FailedRun:
-    """Stands in a list of solutions for a scene that has none.
+    """Entry of `run_all` for a scene that was refused.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ class FailedRun:
 
     @property
     def is_converged(self) -> bool:
-        """False, as of a solution that is none."""
+        """False."""
         return False
 
 
