@@ -1,13 +1,13 @@
-"""How far a Galerkin solution is from the exact one, judged from the solution itself.
+"""Estimated errors of a Galerkin solution, from the solution itself.
 
 The exact solution has continuous strains along the boundary wherever tractions are continuous, and smooth tractions
 between corners and ends of boundary parts. Strains of the computed displacements jump from element to element, and
-computed tractions are constant or linear on each of them: by as much as jumps and steps tell, element by element, they
-are wrong. Where displacements are given, as on clamped sides, all of the error is in the tractions.
+computed tractions are constant or linear on each. The sizes of these jumps and steps estimate the error of an element.
+Where displacements are given, as on clamped sides, all of the error is in the tractions.
 
-What is estimated is the error of displacements u_h and tractions t_h together, in the norm in which the Galerkin method
-is stable, <W (u - u_h), u - u_h> + <V (t - t_h), t - t_h>: it is a(u - u_h, u - u_h), twice the elastic energy of the
-difference, where t_h is the exact traction of u_h.
+The estimate is one of displacements u_h and tractions t_h together, in the norm in which the Galerkin method is stable,
+<W (u - u_h), u - u_h> + <V (t - t_h), t - t_h>. If t_h is the exact traction of u_h, that is a(u - u_h, u - u_h), twice
+the elastic energy of the difference.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ CONTACT_CALIBRATION = (1.0 / 16.0, 1.0 / 25.0)
 """Factor between second differences of nodal contact tractions and their squared errors, for degrees 1 and 2: on the
 shipped scenes with a reference the square root of the sum then lies between 0.5 and 2.7 times the error."""
 MEAN_CALIBRATION = 1.25
-"""Of the error of constant tractions on a half-plane in the mean: without it cylinders, wedges and punches on uniform,
-graded and adaptive meshes have estimates of 0.85 to 1.6 times the error."""
+"""Factor of the mean error of constant tractions on a half-plane. Without it estimates of cylinders, wedges and punches
+on uniform, graded and adaptive meshes are 0.85 to 1.6 times the error."""
 LOCAL_CALIBRATION = 1.6
-"""Of the same element by element, on top of that: errors of single elements are up to so much larger."""
+"""Further factor of the same error element by element: errors of single elements are larger by up to so much."""
 PLACE_CALIBRATION = 0.03
 """The square of the 0.17 in the error of elements that end beside a place of change."""
 STEEPEST = 6.0
@@ -81,7 +81,7 @@ def squared_errors(
 
 
 def element_errors(space: BoundarySpace, displacement: FloatArray, plane_modulus: float) -> FloatArray:
-    """Estimate the squared error of each element in the energy norm that shows in the displacements.
+    """Estimate the squared error of each element in the energy norm from jumps of strains.
 
     Parameters
     ----------
