@@ -1,8 +1,9 @@
 """The contact problem: a body, a gap, a friction law; and the certificate of a solution, numbers anyone can check."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,8 @@ __all__ = [
     "certificate_scales",
     "certify",
 ]
+
+Result = TypeVar("Result")
 
 _ROUND_OFF = 1e-13
 """Tractions below this share of those of the sticking state are round-off (450 eps) of the sums they come from. Larger
@@ -98,16 +101,23 @@ class ContactProblem:
         Nodes are held at ``u_n = min(g, 0)`` and ``u_t = reference_slip``, or ``sigma_t = 0`` where the body has
         eliminated the tangent.
         """
-        return self.respond(stick(np.minimum(self.gap, 0.0), self.slip_origin))
+        sticking = stick(np.minimum(self.gap, 0.0), self.slip_origin)
+        return self.for_all_laws("sticking_state", lambda: self.respond(sticking))
 
     @cached_property
     def modulus(self) -> float:
         """Nodal force per displacement of a typical node [Pa]: about E' of the material."""
         return self.body.stiffness_scale * float(np.median(self.body.weights))
 
+    def for_all_laws(self, name: str, compute: Callable[[], Result]) -> Result:
+        """Return a result that does not depend on the law, computed once for the problems that `with_law` makes."""
+        if name not in self._law_independent:
+            self._law_independent[name] = compute()
+        result: Result = self._law_independent[name]
+        return result
+
     @cached_property
-    def law_independent(self) -> dict[str, Any]:
-        """Results by name that depend on body, load and gap but not on the law; `with_law` hands them on."""
+    def _law_independent(self) -> dict[str, Any]:
         return {}
 
     def respond(self, conditions: LinearConditions) -> ContactState:
@@ -132,9 +142,7 @@ class ContactProblem:
     def with_law(self, law: FrictionLaw) -> "ContactProblem":
         """Return the problem under another law, with the results that do not depend on it."""
         other = replace(self, law=law)
-        other.__dict__["law_independent"] = self.law_independent
-        if "sticking_state" in self.__dict__:
-            other.__dict__["sticking_state"] = self.sticking_state
+        other.__dict__["_law_independent"] = self._law_independent
         return other
 
     @cached_property

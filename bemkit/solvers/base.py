@@ -306,11 +306,10 @@ class _Run:
 
     def _untouched(self) -> FloatingResponse | None:
         """Return the response without any contact, if there is one; it does not depend on the law."""
-        results = self.problem.law_independent
-        if "untouched" not in results:
-            results["untouched"] = None if needs_contact(self.problem) else untouched_response(self.problem.body)
-        untouched: FloatingResponse | None = results["untouched"]
-        return untouched
+        problem = self.problem
+        return problem.for_all_laws(
+            "untouched", lambda: None if needs_contact(problem) else untouched_response(problem.body)
+        )
 
     def _first(self, start: ContactState | None, n_before: int) -> Iterate:
         """Return the iterate of a start, its linear solves and those before it counted."""
