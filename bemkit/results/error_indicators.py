@@ -223,21 +223,23 @@ def largest_but_a_share(errors: FloatArray, lengths: FloatArray) -> float:
 def place_error(
     contact: ContactTable, transition: Transition, transitions: Sequence[Transition], end: ZoneEnd
 ) -> float:
-    """Estimate the squared L2 error [Pa^2 m] of the contact tractions of a side for nodes beside a place of change.
+    """Estimate the squared L2 error [Pa^2 m] of contact tractions where a transition lies inside an element.
 
-    Tractions that grow like K sqrt(d) from there are wrong by 0.17 K times its distance from the nearest end of an
-    element; K is that of tractions an element's length away, or halfway to the next place, on the steeper side.
+    Tractions that grow like K sqrt(d) with the distance d from the transition have the error 0.17 K times the distance
+    of the transition from the nearest end of an element. K is fitted to the tractions an element's length away, or
+    halfway to the next transition, on the steeper side.
     """
     rows, length = contact.rows(transition.part), float(end.mesh.lengths[end.element])
-    others = [each.s for each in transitions if each.part == transition.part and each.s != transition.s]
+    others = [other.s for other in transitions if other.part == transition.part and other.s != transition.s]
     bounds = np.array([contact.s[rows].min(), *others, contact.s[rows].max()]) - transition.s
     squared = 0.0
-    for own in (contact.sigma_n, contact.sigma_t):
+    for traction in (contact.sigma_n, contact.sigma_t):
         steepest = 0.0
         for sign in (-1.0, 1.0):
             reach = min([length, *(0.5 * sign * bounds[sign * bounds > 0.0])])
-            here, there = np.interp(transition.s + np.array([0.0, sign * reach]), contact.s[rows], own[rows])
-            steepest = max(steepest, (there - here) ** 2 / reach)
+            places = transition.s + np.array([0.0, sign * reach])
+            at_transition, at_reach = np.interp(places, contact.s[rows], traction[rows])
+            steepest = max(steepest, (at_reach - at_transition) ** 2 / reach)
         squared += steepest
     return float(PLACE_CALIBRATION * squared * end.distance**2)
 
@@ -305,7 +307,7 @@ def _into_the_last(mesh: BoundaryMesh, sizes: FloatArray, *, of_nodes: bool) -> 
 
 
 def _continued(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return what precedes two sizes as in a geometric sequence; the first again if the second is NaN."""
+    """Return the size before two sizes of a geometric sequence; the first again if the second is NaN."""
     divisor = np.fmax(second, first / STEEPEST)
     return np.nan_to_num(np.divide(first**2, divisor, out=np.zeros_like(first), where=divisor > 0.0))
 

@@ -293,19 +293,19 @@ def with_times(result: AnySolution, solutions: Sequence[AnySolution]) -> AnySolu
 
 
 def following(
-    so_far: AnySolution | None, solution: AnySolution, asked: Scene | Assembly, number: int, n_steps: int
+    so_far: AnySolution | None, solution: AnySolution, stated: Scene | Assembly, number: int, n_steps: int
 ) -> AnySolution:
-    """Return a step of a load history with the records, solves, times, memory and warnings of all before it as well.
+    """Return a step of a load history with the records, solves, times, memory and warnings of all before it.
 
-    Of warnings that differ in numbers alone the last one stands for all; `at_step` keeps those of a step.
+    Of warnings that differ in numbers alone the last one is kept; `at_step` has those of a step.
 
     Parameters
     ----------
     so_far : Solution or AssemblySolution, optional
-        What this function returned for the step before.
+        The result of this function for the step before.
     solution : Solution or AssemblySolution
         Of the step.
-    asked : Scene or Assembly
+    stated : Scene or Assembly
         With all steps.
     number, n_steps : int
         Of the step, counted from 1, and of all.
@@ -315,8 +315,8 @@ def following(
     name = f"load step {number} of {n_steps}"
     before = () if so_far is None else (so_far,)
     total: AnySolution = with_totals(solution, [*before, solution], [*("" for _ in before), name])
-    warnings = unlike((*solution.warnings, *(text for each in before for text in each.warnings)))
-    loading = None if solution.loading is None else replace(solution.loading, asked=asked)
+    warnings = unlike((*solution.warnings, *(text for earlier in before for text in earlier.warnings)))
+    loading = None if solution.loading is None else replace(solution.loading, asked=stated)
     message = f"{name}: {solution.message}"
     whole: AnySolution = replace(total, message=message, warnings=warnings, loading=loading)
     return whole
