@@ -153,8 +153,8 @@ class SolvedProblem(ShownInNotebooks):
     def estimated_error(self) -> float | None:
         """Estimated error of all bodies in the energy norm, sqrt(a(u - u_h, u - u_h) / a(u_h, u_h)).
 
-        None without an estimate, and where the energy is not positive, so that there is no relative error. Zero for
-        bodies at rest.
+        None without an estimate, and where the energy is not positive, so that an error is measured against nothing;
+        zero of bodies at rest.
         """
         errors = [float(np.sum(body.element_errors)) for body in self.solved_bodies if body.element_errors is not None]
         unit = sum(body.error_unit for body in self.solved_bodies)

@@ -36,12 +36,12 @@ LARGEST_STRAIN = 0.1
 STRAINED_SHARE = 0.05
 """That share. In theory strains at corners and ends of parts have no bound, but on short lengths only."""
 LARGEST_PENETRATION = 0.2
-"""Penetration between the nodes, as in `BetweenNodes`, above which the nodes do not resolve the contact: about that of
-a cylinder on a zone of six constant elements."""
+"""Penetration between the nodes, as `BetweenNodes` measures it, above which nodes do not feel the contact: a cylinder
+pressed by constant elements on a zone of six of them comes to that."""
 _MOST_ALIKE = 3
-"""Largest number of doubts of one kind about several bodies and contacts."""
+"""Doubts of one kind about several bodies and contacts that are told."""
 FEWEST_NODES = 4
-"""Least number of contact nodes that resolve the size and the largest traction of a zone."""
+"""Contact nodes that resolve a zone: fewer tell neither its size nor its largest traction."""
 _CLOSED = 1e-9
 """Clearance, relative to the largest one, up to which a node counts as closed: round-off of zero."""
 
