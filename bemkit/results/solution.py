@@ -64,10 +64,10 @@ class Solution(SolvedProblem, SolvedBody):
 
     @cached_property
     def estimated_traction_error(self) -> float | None:
-        """Estimated error of the contact tractions in L2, relative to their norm.
+        """Estimated error of the contact tractions in L2, relative to them.
 
-        Of a half-plane the estimated mean error of all tractions but loads. None if there is no estimate or there are
-        no such tractions.
+        Of a half-plane that of all tractions but loads, in the mean. None without an estimate and without such
+        tractions.
         """
         if self.surface_errors is not None:
             return self.surface_errors.in_the_mean

@@ -219,7 +219,7 @@ class SolvedProblem(ShownInNotebooks):
             ``n_elements``, ``n_contact``, ``linear_solves``, ``outer_steps``, ``force_normal`` and
             ``force_tangential`` [N/m], ``energy`` [J/m], ``estimated_error`` (None without an estimate),
             of one body ``estimated_traction_error`` and ``estimated_local_traction_error`` (the same), ``parts``
-            (resultants of the tractions on each part) and ``contacts`` (forces on each contact part), of an assembly
+            (resultants of the tractions on each part) and ``contacts`` (what each contact part feels), of an assembly
             ``contacts``, ``bodies`` and ``rigid``,
             ``transitions``, ``certificate``, ``between_nodes`` (None without contact), ``timings`` [s], ``plan``,
             ``work``, ``memory`` [bytes], ``steps`` (of a load history, see `LoadStep.as_dict`).
